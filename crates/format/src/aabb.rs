@@ -1,0 +1,70 @@
+//! Axis-aligned boxes in world coordinates.
+
+/// An axis-aligned box, world coordinates, closed: `min ≤ p ≤ max`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aabb {
+    /// Lower corner: x, y, z.
+    pub min: [f64; 3],
+    /// Upper corner: x, y, z.
+    pub max: [f64; 3],
+}
+
+impl Aabb {
+    /// The box that contains nothing; growing it by a point gives that point.
+    pub const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+
+    /// True while no point was added (or a side is inverted or not a number).
+    pub fn is_empty(&self) -> bool {
+        !(0..3).all(|a| self.min[a] <= self.max[a])
+    }
+
+    /// Enlarges the box so that it contains `p`.
+    pub fn grow(&mut self, p: [f64; 3]) {
+        for (a, &v) in p.iter().enumerate() {
+            self.min[a] = self.min[a].min(v);
+            self.max[a] = self.max[a].max(v);
+        }
+    }
+
+    /// The smallest box that contains both.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        let mut out = *self;
+        for a in 0..3 {
+            out.min[a] = out.min[a].min(other.min[a]);
+            out.max[a] = out.max[a].max(other.max[a]);
+        }
+        out
+    }
+
+    /// True if `p` lies inside or on the border.
+    pub fn contains(&self, p: [f64; 3]) -> bool {
+        (0..3).all(|a| self.min[a] <= p[a] && p[a] <= self.max[a])
+    }
+
+    /// Side lengths: x, y, z.
+    pub fn extent(&self) -> [f64; 3] {
+        std::array::from_fn(|a| self.max[a] - self.min[a])
+    }
+
+    /// The midpoint.
+    pub fn center(&self) -> [f64; 3] {
+        std::array::from_fn(|a| self.min[a] + 0.5 * (self.max[a] - self.min[a]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grows_from_nothing_to_a_point_to_a_box() {
+        let mut b = Aabb::EMPTY;
+        assert!(b.is_empty());
+        b.grow([1.0, 2.0, 3.0]);
+        assert_eq!(b.extent(), [0.0; 3]);
+        b.grow([-1.0, 4.0, 3.0]);
+        assert_eq!(b, Aabb { min: [-1.0, 2.0, 3.0], max: [1.0, 4.0, 3.0] });
+        assert!(b.contains([1.0, 4.0, 3.0]) && !b.contains([1.0, 4.1, 3.0]));
+    }
+}

@@ -1,0 +1,41 @@
+//! Integer coordinates and the world.
+
+/// A lattice of coordinates: `world = quantized · scale + offset`, per axis, evaluated in double precision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// Step of one unit, world units, > 0 and finite.
+    pub scale: [f64; 3],
+    /// World coordinate of the quantized 0.
+    pub offset: [f64; 3],
+}
+
+impl Lattice {
+    /// The world coordinates of a lattice point.
+    pub fn world(&self, quantized: [i64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| quantized[a] as f64 * self.scale[a] + self.offset[a])
+    }
+
+    /// The nearest lattice coordinate on `axis`; saturates at the ends of `i64`, NaN gives 0.
+    pub fn quantize(&self, axis: usize, world: f64) -> i64 {
+        ((world - self.offset[axis]) / self.scale[axis]).round() as i64
+    }
+
+    /// True if every scale is finite and > 0 and every offset finite.
+    pub fn is_valid(&self) -> bool {
+        self.scale.iter().all(|s| s.is_finite() && *s > 0.0) && self.offset.iter().all(|o| o.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantize_undoes_world_far_from_the_origin() {
+        let l = Lattice { scale: [0.001; 3], offset: [4_428_000.0, -1.0, 0.0] };
+        for q in [0, 1, -7, 2_147_483_647, -2_147_483_648] {
+            let w = l.world([q; 3]);
+            assert_eq!([0, 1, 2].map(|a| l.quantize(a, w[a])), [q; 3]);
+        }
+    }
+}

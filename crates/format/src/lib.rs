@@ -1,0 +1,28 @@
+//! Readers and writers of point-cloud formats, for renderers and for preprocessors.
+//!
+//! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
+//! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
+//!
+//! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
+//! found in a file are never trusted; an allocation is bounded by the size of the file that asks for it.
+#![forbid(unsafe_code)]
+
+mod aabb;
+mod attributes;
+mod error;
+mod lattice;
+mod node_key;
+mod points;
+mod scan;
+
+#[cfg(feature = "las")]
+pub mod las;
+pub mod potree2;
+
+pub use aabb::Aabb;
+pub use attributes::{Attribute, AttributeType};
+pub use error::{ErrorKind, ReadError};
+pub use lattice::Lattice;
+pub use node_key::NodeKey;
+pub use points::{Column, PointBatch, Positions};
+pub use scan::{Crs, MAX_BATCH_POINTS, Piece, Scan, ScanInfo, Scratch, Wanted};

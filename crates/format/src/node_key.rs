@@ -1,0 +1,95 @@
+//! The address of an octree node.
+
+use std::fmt;
+
+/// Address of an octree node: its level (root = 0) and its cell in the `2^level` grid of that level.
+///
+/// Child index is `4·x + 2·y + z` of the lowest cell bits (x owns bit 2), as Potree spells it: `r042` is child 2 of
+/// child 4 of child 0 of the root. Levels reach 31, so that cells fit 31 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeKey {
+    /// 0 for the root.
+    pub level: u8,
+    /// Cell along x, `0..2^level`.
+    pub x: u32,
+    /// Cell along y, `0..2^level`.
+    pub y: u32,
+    /// Cell along z, `0..2^level`.
+    pub z: u32,
+}
+
+impl NodeKey {
+    /// The root.
+    pub const ROOT: Self = Self { level: 0, x: 0, y: 0, z: 0 };
+
+    /// The deepest level that a key can address.
+    pub const MAX_LEVEL: u8 = 31;
+
+    /// The child with index `child` (0–7; x is bit 2, y bit 1, z bit 0), or `None` below [`Self::MAX_LEVEL`].
+    pub fn child(self, child: u8) -> Option<Self> {
+        (self.level < Self::MAX_LEVEL && child < 8).then(|| Self {
+            level: self.level + 1,
+            x: self.x << 1 | u32::from(child >> 2 & 1),
+            y: self.y << 1 | u32::from(child >> 1 & 1),
+            z: self.z << 1 | u32::from(child & 1),
+        })
+    }
+
+    /// The parent, or `None` for the root.
+    pub fn parent(self) -> Option<Self> {
+        (self.level > 0).then(|| Self { level: self.level - 1, x: self.x >> 1, y: self.y >> 1, z: self.z >> 1 })
+    }
+
+    /// Index of this node among its parent's children (0–7); 0 for the root.
+    pub fn child_index(self) -> u8 {
+        ((self.x & 1) << 2 | (self.y & 1) << 1 | (self.z & 1)) as u8
+    }
+
+    /// The ancestor at `level` (itself if `level` is its own), or `None` if `level` is deeper than this node.
+    pub fn ancestor(self, level: u8) -> Option<Self> {
+        let up = self.level.checked_sub(level)?;
+        Some(Self { level, x: self.x >> up, y: self.y >> up, z: self.z >> up })
+    }
+
+    /// Parses a Potree name: `r` and one digit 0–7 a level.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let digits = name.strip_prefix('r')?;
+        digits.bytes().try_fold(Self::ROOT, |key, b| key.child(b.checked_sub(b'0').filter(|d| *d < 8)?))
+    }
+}
+
+impl fmt::Display for NodeKey {
+    /// The Potree name: `r`, `r0`, `r042`, …
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("r")?;
+        for level in 1..=self.level {
+            let up = self.level - level;
+            let digit = (self.x >> up & 1) << 2 | (self.y >> up & 1) << 1 | (self.z >> up & 1);
+            write!(f, "{digit}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_round_trip_and_children_know_their_parent() {
+        let key = NodeKey::from_name("r0427").unwrap();
+        assert_eq!(key.to_string(), "r0427");
+        assert_eq!(key.child_index(), 7);
+        assert_eq!(key.parent().unwrap().to_string(), "r042");
+        assert_eq!(key.ancestor(1).unwrap().to_string(), "r0");
+        assert_eq!(NodeKey::from_name("r8"), None);
+        assert_eq!(NodeKey::from_name("042"), None);
+    }
+
+    #[test]
+    fn the_deepest_level_is_reachable_and_no_deeper() {
+        let deepest = NodeKey::from_name(&format!("r{}", "7".repeat(31))).unwrap();
+        assert_eq!(deepest.x, (1 << 31) - 1);
+        assert_eq!(deepest.child(0), None);
+    }
+}

@@ -1,0 +1,106 @@
+//! What every reader of scans offers: a description, pieces that decode alone, and batches of points.
+
+use std::path::PathBuf;
+
+use crate::{Aabb, Attribute, Lattice, PointBatch, ReadError};
+
+/// No batch handed to a sink is larger than this.
+pub const MAX_BATCH_POINTS: usize = 65_536;
+
+/// The coordinate reference system as the file tells it; nothing is derived.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Crs {
+    /// OGC WKT text, as stored, without trailing zero bytes.
+    pub wkt: Option<String>,
+    /// EPSG code of the projected (else geographic) system from GeoTIFF keys, 1–32766.
+    pub epsg: Option<u32>,
+    /// EPSG code of the vertical system from GeoTIFF keys.
+    pub vertical_epsg: Option<u32>,
+}
+
+/// What is known of a scan before its points are decoded. Header values are claims, not facts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanInfo {
+    /// The file.
+    pub path: PathBuf,
+    /// For people: "LAZ 1.4, point format 7".
+    pub format: String,
+    /// What the header says, unchecked.
+    pub points_declared: u64,
+    /// What the header says, unchecked; `None` if it says nothing or nonsense (inverted, not finite).
+    pub bounds_declared: Option<Aabb>,
+    /// The lattice of [`crate::Positions::Quantized`] batches; `None` for world coordinates.
+    pub lattice: Option<Lattice>,
+    /// The columns beside the position, in order.
+    pub attributes: Vec<Attribute>,
+    /// The coordinate reference system.
+    pub crs: Crs,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+    /// Disagreements that did not stop the reader ("the header declares 10 points, 3 are there"), a line each.
+    pub warnings: Vec<String>,
+}
+
+/// A part of a scan that decodes without any other part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Piece {
+    /// Index in the scan of the first point.
+    pub first_point: u64,
+    /// Number of points, as the structures of the file give it.
+    pub points: u64,
+    /// Where the (compressed) bytes lie.
+    pub byte_offset: u64,
+    /// How many there are.
+    pub byte_len: u64,
+}
+
+/// Which columns a decode shall fill: one flag for each of [`ScanInfo::attributes`]. Positions always come.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Wanted(pub Vec<bool>);
+
+impl Wanted {
+    /// Everything.
+    pub fn all(info: &ScanInfo) -> Self {
+        Self(vec![true; info.attributes.len()])
+    }
+
+    /// Positions alone.
+    pub fn positions(info: &ScanInfo) -> Self {
+        Self(vec![false; info.attributes.len()])
+    }
+}
+
+/// Memory that a thread reuses from piece to piece, of any scan.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// Bytes as read from the file.
+    pub raw: Vec<u8>,
+    /// Bytes after decompression.
+    pub decoded: Vec<u8>,
+    /// The batch that is handed to the sink; its columns fit the scan that was decoded last.
+    pub batch: Option<PointBatch>,
+}
+
+/// A scan that is open for reading; any number of threads may decode different pieces at once.
+pub trait Scan: Send + Sync {
+    /// What is known without decoding.
+    fn info(&self) -> &ScanInfo;
+
+    /// The parts, in file order; their points are consecutive from 0.
+    fn pieces(&self) -> &[Piece];
+
+    /// Decodes one piece and hands its points to `sink`, in file order, in batches of at most [`MAX_BATCH_POINTS`].
+    ///
+    /// A sink that returns `false` ends the decode early, without an error.
+    ///
+    /// # Errors
+    /// A piece that cannot be decoded to its end; batches handed over before stay valid. A panic inside a
+    /// decompressor comes out as an error too.
+    fn decode(
+        &self,
+        piece: usize,
+        wanted: &Wanted,
+        scratch: &mut Scratch,
+        sink: &mut dyn FnMut(&PointBatch) -> bool,
+    ) -> Result<(), ReadError>;
+}

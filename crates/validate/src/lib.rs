@@ -1,0 +1,1 @@
+//! Does a dataset keep the promises of its format?
