@@ -7,6 +7,7 @@ use crate::{NodeKey, ReadError};
 
 use super::brotli::{self, Fault};
 use super::chunk::{self, ChunkRanges};
+use super::morton::breadth_first_rank;
 use super::{ByteSource, DatasetFile, Encoding, Folder, Metadata, Node, NodePoints, NodeRecord};
 
 /// More JSON than this is not metadata.
@@ -129,7 +130,7 @@ impl Dataset {
                 }
             }
         }
-        nodes.sort_by_cached_key(|n| super::encode_hierarchy::breadth_first_rank(n.key));
+        nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
         Ok(nodes)
     }
 

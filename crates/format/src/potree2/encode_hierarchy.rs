@@ -1,9 +1,11 @@
 //! The table of nodes, cut into chunks.
 
-use std::collections::HashSet;
+use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::NodeKey;
 
+use super::morton::breadth_first_rank;
 use super::{NodeRecord, NodeType};
 
 /// A node to be written.
@@ -20,7 +22,7 @@ pub struct NodeEntry {
 }
 
 /// What [`encode_hierarchy`] made.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct HierarchyBytes {
     /// The contents of `hierarchy.bin`.
     pub bytes: Vec<u8>,
@@ -28,14 +30,6 @@ pub struct HierarchyBytes {
     pub first_chunk_size: u64,
     /// For [`super::Metadata::depth`]: the deepest level that has a node.
     pub depth: u32,
-}
-
-/// Where a node stands in breadth-first order: by level, then by name. The level in the top bits, then the name's
-/// digits as an index.
-pub(super) fn breadth_first_rank(key: NodeKey) -> u128 {
-    let low = super::morton::interleave(key.z as u16, key.y as u16, key.x as u16);
-    let high = super::morton::interleave((key.z >> 16) as u16, (key.y >> 16) as u16, (key.x >> 16) as u16);
-    u128::from(key.level) << 96 | u128::from(high) << 48 | u128::from(low)
 }
 
 /// Writes `hierarchy.bin`: chunks of `step_size` levels (4 is usual), the root's first, the others by level and name of
@@ -46,92 +40,120 @@ pub(super) fn breadth_first_rank(key: NodeKey) -> u128 {
 /// that are missing are added as nodes without points, so the result is a valid hierarchy whatever is passed.
 pub fn encode_hierarchy(nodes: &mut [NodeEntry], step_size: u32) -> HierarchyBytes {
     nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
-    match with_missing_ancestors(nodes) {
-        None => Levels::of(nodes).encode(step_size),
-        Some(mut complete) => {
-            complete.sort_by_cached_key(|n| breadth_first_rank(n.key));
-            Levels::of(&complete).encode(step_size)
-        }
+    if let Some(tree) = Tree::link(nodes) {
+        return tree.encode(step_size);
     }
+    let complete = with_missing_ancestors(nodes);
+    Tree::link(&complete).map_or_else(HierarchyBytes::default, |tree| tree.encode(step_size))
 }
 
-/// `nodes` and the ancestors that they lack, unsorted; `None` if they lack none.
-fn with_missing_ancestors(nodes: &[NodeEntry]) -> Option<Vec<NodeEntry>> {
-    let complete = Levels::of(nodes).is_complete();
-    if complete {
-        return None;
-    }
-    let mut keys: HashSet<NodeKey> = nodes.iter().map(|n| n.key).collect();
-    let mut all = nodes.to_vec();
-    let mut add = |key: NodeKey| {
-        let missing = keys.insert(key);
-        if missing {
-            all.push(NodeEntry { key, points: 0, byte_offset: 0, byte_size: 0 });
-        }
-        missing
-    };
-    add(NodeKey::ROOT);
+/// `nodes` and the ancestors that they lack, in breadth-first order, keys that repeat merged.
+fn with_missing_ancestors(nodes: &[NodeEntry]) -> Vec<NodeEntry> {
+    let empty = |key| NodeEntry { key, points: 0, byte_offset: 0, byte_size: 0 };
+    let mut by_rank = BTreeMap::from([(breadth_first_rank(NodeKey::ROOT), empty(NodeKey::ROOT))]);
+    by_rank.extend(nodes.iter().map(|n| (breadth_first_rank(n.key), *n)));
     for node in nodes {
         let mut key = node.key;
-        while let Some(parent) = key.parent().filter(|p| add(*p)) {
+        while let Some(parent) = key.parent() {
+            by_rank.entry(breadth_first_rank(parent)).or_insert(empty(parent));
             key = parent;
         }
     }
-    Some(all)
+    by_rank.into_values().collect()
 }
 
-/// Sorted nodes with the links between levels.
-struct Levels<'a> {
+/// Nodes in breadth-first order, linked.
+struct Tree<'a> {
     nodes: &'a [NodeEntry],
-    /// For each node, and one past the last: index of the first node of the next level that is a child of it or of a
-    /// node after it.
+    /// The children of node i are the nodes `first_child[i]..first_child[i + 1]`: in breadth-first order, children
+    /// follow the children of the node before. So the descendants of a node in a level are one range, too.
     first_child: Vec<usize>,
 }
 
-impl<'a> Levels<'a> {
-    /// `nodes` by level and name. One sweep: the children of a node follow those of the node before it.
-    fn of(nodes: &'a [NodeEntry]) -> Self {
+/// A chunk to be written.
+struct Chunk {
+    root: usize,
+    byte_offset: u64,
+    byte_size: u64,
+}
+
+impl<'a> Tree<'a> {
+    /// `None` if `nodes` is no tree: no root, a parent missing, a key twice.
+    fn link(nodes: &'a [NodeEntry]) -> Option<Self> {
+        nodes.first().filter(|n| n.key == NodeKey::ROOT)?;
         let mut first_child = Vec::with_capacity(nodes.len() + 1);
         let mut next = 1;
-        for (index, node) in nodes.iter().enumerate() {
-            next = next.max(index + 1);
-            // Skip what belongs to parents before this one; only an incomplete tree has such nodes left over.
-            while next < nodes.len() && nodes[next].key.level <= node.key.level {
-                next += 1;
-            }
+        for node in nodes {
             first_child.push(next);
-            while next < nodes.len() && nodes[next].key.parent() == Some(node.key) {
+            let mut mask = 0;
+            while let Some(child) = nodes.get(next).filter(|n| n.key.parent() == Some(node.key)) {
+                let bit = 1u8 << child.key.child_index();
+                if mask & bit != 0 {
+                    return None;
+                }
+                mask |= bit;
                 next += 1;
             }
         }
-        first_child.push(nodes.len());
-        Self { nodes, first_child }
+        first_child.push(next);
+        (next == nodes.len()).then_some(Self { nodes, first_child })
     }
 
-    /// True if there is a root and every other node has its parent.
-    fn is_complete(&self) -> bool {
-        let has_root = self.nodes.first().is_some_and(|n| n.key == NodeKey::ROOT);
-        has_root && self.first_child.last() == Some(&self.nodes.len()) && {
-            let children: usize = (0..self.nodes.len()).map(|i| self.child_mask(i).count_ones() as usize).sum();
-            children + 1 == self.nodes.len()
-        }
-    }
-
-    fn child_mask(&self, index: usize) -> u8 {
-        let key = self.nodes[index].key;
-        let children = self.nodes[self.first_child[index]..].iter().take(8).map(|n| n.key);
-        children.take_while(|c| c.parent() == Some(key)).fold(0, |mask, c| mask | 1 << c.child_index())
-    }
-
-    fn encode(&self, _step_size: u32) -> HierarchyBytes {
-        let mut bytes = Vec::with_capacity(self.nodes.len() * NodeRecord::LEN);
-        for (index, node) in self.nodes.iter().enumerate() {
-            let child_mask = self.child_mask(index);
-            let node_type = if child_mask == 0 { NodeType::Leaf } else { NodeType::Normal } as u8;
-            let NodeEntry { points, byte_offset, byte_size, .. } = *node;
-            bytes.extend(NodeRecord { node_type, child_mask, points, byte_offset, byte_size }.to_bytes());
+    fn encode(&self, step_size: u32) -> HierarchyBytes {
+        // Deeper than the deepest level is the same as everything in one chunk.
+        let step = step_size.clamp(1, u32::from(NodeKey::MAX_LEVEL) + 1);
+        let chunks = self.chunks(step);
+        // Proxies come in the order of their chunks, as both follow breadth-first order.
+        let mut own_chunks = chunks.iter().skip(1);
+        let mut bytes = Vec::with_capacity((self.nodes.len() + chunks.len()) * NodeRecord::LEN);
+        for chunk in &chunks {
+            for (level, range) in self.levels_below(chunk.root, step) {
+                for index in range {
+                    let own = if level == step && self.has_children(index) { own_chunks.next() } else { None };
+                    bytes.extend_from_slice(&self.record(index, own).to_bytes());
+                }
+            }
         }
         let depth = self.nodes.last().map_or(0, |n| u32::from(n.key.level));
-        HierarchyBytes { first_chunk_size: bytes.len() as u64, bytes, depth }
+        HierarchyBytes { bytes, first_chunk_size: chunks.first().map_or(0, |c| c.byte_size), depth }
+    }
+
+    /// The chunks in breadth-first order of their roots.
+    fn chunks(&self, step: u32) -> Vec<Chunk> {
+        let begins = |index: &usize| {
+            let level = u32::from(self.nodes[*index].key.level);
+            level == 0 || level.is_multiple_of(step) && self.has_children(*index)
+        };
+        let mut byte_offset = 0;
+        let mut chunks = Vec::new();
+        for root in (0..self.nodes.len()).filter(begins) {
+            let records: usize = self.levels_below(root, step).map(|(_, range)| range.len()).sum();
+            let byte_size = (records * NodeRecord::LEN) as u64;
+            chunks.push(Chunk { root, byte_offset, byte_size });
+            byte_offset += byte_size;
+        }
+        chunks
+    }
+
+    /// The node `root` and its descendants down to `step` levels below: levels below it, and range of nodes.
+    fn levels_below(&self, root: usize, step: u32) -> impl Iterator<Item = (u32, Range<usize>)> + '_ {
+        let next = |r: &Range<usize>| Some(self.first_child[r.start]..self.first_child[r.end]);
+        (0..=step).zip(std::iter::successors(Some(root..root + 1), next))
+    }
+
+    fn has_children(&self, index: usize) -> bool {
+        self.first_child[index] < self.first_child[index + 1]
+    }
+
+    /// The record of a node, or the proxy for its chunk.
+    fn record(&self, index: usize, own_chunk: Option<&Chunk>) -> NodeRecord {
+        let NodeEntry { points, byte_offset, byte_size, .. } = self.nodes[index];
+        if let Some(&Chunk { byte_offset, byte_size, .. }) = own_chunk {
+            return NodeRecord { node_type: NodeType::Proxy as u8, child_mask: 0, points, byte_offset, byte_size };
+        }
+        let children = &self.nodes[self.first_child[index]..self.first_child[index + 1]];
+        let child_mask = children.iter().fold(0, |mask, c| mask | 1 << c.key.child_index());
+        let node_type = if child_mask == 0 { NodeType::Leaf } else { NodeType::Normal } as u8;
+        NodeRecord { node_type, child_mask, points, byte_offset, byte_size }
     }
 }

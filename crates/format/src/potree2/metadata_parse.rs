@@ -67,7 +67,7 @@ fn check(m: &Metadata) -> Result<(), Fault> {
     if !m.lattice.is_valid() {
         return broken(format!("scale {:?} has to be greater than 0", m.lattice.scale));
     }
-    if !(m.spacing > 0.0) {
+    if m.spacing <= 0.0 {
         return broken(format!("spacing {} has to be greater than 0", m.spacing));
     }
     if m.cube.is_empty() {

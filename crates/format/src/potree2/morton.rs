@@ -1,4 +1,6 @@
-//! Interleaved bits. In these codes x owns bit 0, unlike child indices, in which z does.
+//! Interleaved bits. In payloads x owns bit 0; in the names of nodes z does.
+
+use crate::NodeKey;
 
 /// Bit k of a goes to bit 3k, of b to 3k+1, of c to 3k+2: 48 bits.
 pub(super) fn interleave(a: u16, b: u16, c: u16) -> u64 {
@@ -38,6 +40,13 @@ pub(super) fn position_from_words(upper: u64, lower: u64) -> [i32; 3] {
     std::array::from_fn(|a| (u32::from(upper[a]) << 16 | u32::from(lower[a])) as i32)
 }
 
+/// Where a node stands in breadth-first order: the level in the top bits, then the digits of the name.
+pub(super) fn breadth_first_rank(key: NodeKey) -> u128 {
+    let low = interleave(key.z as u16, key.y as u16, key.x as u16);
+    let high = interleave((key.z >> 16) as u16, (key.y >> 16) as u16, (key.x >> 16) as u16);
+    u128::from(key.level) << 96 | u128::from(high) << 48 | u128::from(low)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,5 +78,13 @@ mod tests {
             let (upper, lower) = position_words(p);
             assert_eq!(position_from_words(upper, lower), p);
         }
+    }
+
+    #[test]
+    fn ranks_order_nodes_by_level_and_then_by_name() {
+        let deep = format!("r{}", "0".repeat(31));
+        let names = ["r", "r0", "r3", "r7", "r00", "r04", "r40", "r777", &deep];
+        let ranks = names.map(|n| breadth_first_rank(NodeKey::from_name(n).unwrap()));
+        assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:x?}");
     }
 }

@@ -1,6 +1,6 @@
 //! Payloads to typed columns.
 
-use crate::{AttributeType, Column};
+use crate::Column;
 
 use super::metadata::planar_size;
 use super::{Metadata, column_bytes, morton};
@@ -53,7 +53,7 @@ impl NodePoints {
     /// Takes `self.stored` apart: whole records in DEFAULT layout.
     pub(super) fn fill_from_records(&mut self, metadata: &Metadata) {
         let record_len = metadata.record_len();
-        for block in self.stored.chunks(BLOCK_POINTS * record_len) {
+        for block in self.stored.chunks(record_len.saturating_mul(BLOCK_POINTS)) {
             let mut columns = self.columns.iter_mut();
             let mut at = 0;
             for attribute in metadata.attributes.iter().map(|a| &a.attribute) {
@@ -76,15 +76,14 @@ impl NodePoints {
         for attribute in metadata.attributes.iter().map(|a| &a.attribute) {
             let (plane, after) = rest.split_at(points * planar_size(attribute));
             rest = after;
-            match attribute.name.as_str() {
-                "position" => fill_positions(&mut self.positions, plane),
-                name => match (name, attribute.ty, columns.next()) {
-                    ("rgb", AttributeType::UInt16, Some(Column::UInt16(values))) => fill_rgb(values, plane),
-                    (_, _, Some(column)) => {
-                        column_bytes::append(column, plane, attribute.size(), 0, attribute.elements)
-                    }
-                    (_, _, None) => {}
-                },
+            if attribute.name == "position" {
+                fill_positions(&mut self.positions, plane);
+                continue;
+            }
+            match (attribute.name.as_str(), columns.next()) {
+                ("rgb", Some(Column::UInt16(values))) => fill_rgb(values, plane),
+                (_, Some(column)) => column_bytes::append(column, plane, attribute.size(), 0, attribute.elements),
+                (_, None) => {}
             }
         }
     }
