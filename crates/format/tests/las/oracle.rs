@@ -17,7 +17,8 @@ fn the_las_crate_agrees_point_by_point() {
         let Column::UInt16(intensity) = cloud.column("intensity") else { panic!() };
         let Column::UInt8(returns) = cloud.column("return number") else { panic!() };
         let mut count = 0;
-        for (i, point) in reader.points().enumerate() {
+        let points = reader.read_all().unwrap();
+        for (i, point) in points.points().enumerate() {
             let point = point.unwrap();
             let world = [0, 1, 2].map(|a| f64::from(cloud.xyz[a][i]) * scale[a] + offset[a]);
             assert_eq!([point.x, point.y, point.z], world, "{}", path.display());
