@@ -1,6 +1,6 @@
 //! A piece to batches.
 
-use std::io::{Cursor, Read};
+use std::io::Read;
 
 use super::LasScan;
 use super::decompress::{self, Decompressor, Stop};
@@ -146,7 +146,7 @@ impl Laz<'_> {
             return self.sequential(self.scan.source.reader(byte_offset, byte_offset + byte_len), None, decoded, out);
         }
         let bytes = self.scan.source.slice_at(byte_offset, byte_len, raw)?;
-        self.sequential(Cursor::new(bytes), None, decoded, out)
+        self.sequential(bytes, None, decoded, out)
     }
 
     fn stream(&self, chunk_points: Option<u32>, decoded: &mut Vec<u8>, out: &mut Emitter<'_>) -> Result<(), ReadError> {

@@ -137,7 +137,7 @@ fn a_cut_laz_file_gives_what_is_before_the_cut() {
     let whole = fixture("chunks_fixed_format7.laz");
     let right = read_bytes(&whole).unwrap();
     let cloud = read_bytes(&whole[..whole.len() / 2]).unwrap();
-    assert!(cloud.len() >= 120 && cloud.len() % 120 == 0, "whole chunks");
+    assert!(cloud.len() >= 120 && cloud.len().is_multiple_of(120), "whole chunks");
     assert_eq!(cloud.xyz[0], right.xyz[0][..cloud.len()]);
     assert!(cloud.warned("are missing"));
 
