@@ -151,7 +151,10 @@ fn the_header_is_told_as_it_is() {
     let info = scan.info();
     assert_eq!((info.format.as_str(), info.points_declared), ("LAZ 1.2, point format 3", 110_000));
     let bounds = info.bounds_declared.unwrap();
-    assert_eq!((bounds.min, bounds.max), ([636001.76, 848935.2000000001, 406.26], [637179.2200000001, 849497.9, 520.51]));
+    assert_eq!(
+        (bounds.min, bounds.max),
+        ([636001.76, 848935.2000000001, 406.26], [637179.2200000001, 849497.9, 520.51])
+    );
     assert_eq!(info.lattice.unwrap().scale, [0.01; 3]);
     assert_eq!(scan.pieces().iter().map(|p| p.points).collect::<Vec<_>>(), [50_000, 50_000, 10_000]);
     let scan = las::open(&common::fixtures().join("las_1_5.las")).unwrap();
