@@ -1,5 +1,7 @@
 //! From scans to datasets: gathering, octree building and sampling within a memory budget.
 
+#[allow(dead_code)] // until the passes use it
+mod crs;
 mod error;
 mod events;
 pub mod memory;
