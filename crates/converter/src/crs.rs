@@ -125,8 +125,7 @@ fn from_code(code: u32) -> ResolvedCrs {
         };
     };
     let name = wkt::read(def.wkt).map(|s| s.name).unwrap_or_default();
-    let proj4 = lookup(horizontal(code)).map_or(def.proj4, |d| d.proj4);
-    let (projection, note) = unzip(for_viewers(proj4));
+    let (projection, note) = unzip(for_viewers(def.proj4));
     let note = note.map(|n| format!("EPSG:{code}: {n}"));
     ResolvedCrs { projection, wkt: None, label: format!("EPSG:{code} {name}").trim_end().to_owned(), note }
 }
@@ -277,6 +276,8 @@ mod tests {
         let crs = in_wkt(utm, Some(2994));
         assert!(crs.projection.starts_with("+proj=utm +zone=33"));
         assert!(crs.note.unwrap().contains("EPSG:2994"));
+        // A compound system in the keys agrees with its horizontal part in the text.
+        assert_eq!(in_wkt(r#"GEOGCS["NAD83(2011)",AUTHORITY["EPSG","6318"]]"#, Some(6349)).note, None);
     }
 
     #[test]
