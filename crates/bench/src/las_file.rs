@@ -94,9 +94,9 @@ impl Header {
         for index in 0..u64::from(self.count) {
             let point = self.scene.point(index, u64::from(self.count), &mut random);
             let quantized = quantize(self.scene, &point);
-            for a in 0..3 {
-                self.min[a] = self.min[a].min(quantized[a]);
-                self.max[a] = self.max[a].max(quantized[a]);
+            for (a, &q) in quantized.iter().enumerate() {
+                self.min[a] = self.min[a].min(q);
+                self.max[a] = self.max[a].max(q);
             }
             self.by_return[usize::from(point.returns) - 1] += 1;
             write(&record(self.scene, index, &point))?;
