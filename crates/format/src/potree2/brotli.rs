@@ -8,7 +8,8 @@ use brotlic::{BrotliDecoder, CompressionMode, Quality, WindowSize, decode::Decod
 pub(super) fn compress(input: &[u8], quality: u8, out: &mut Vec<u8>) -> io::Result<()> {
     let quality = Quality::new(quality).map_err(io::Error::other)?;
     let window = WindowSize::new(22).map_err(io::Error::other)?;
-    let bound = brotlic::compress_bound(input.len(), quality)
+    // The bound holds for qualities from 2 up; below, the library stores what does not fit it uncompressed.
+    let bound = brotlic::compress_bound(input.len(), Quality::best())
         .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "a payload too large for Brotli"))?;
     out.clear();
     out.resize(bound, 0);
