@@ -4,8 +4,10 @@ use std::collections::HashMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use pointmill_format::potree2::{Dataset, Encoding, NodePoints};
-use pointmill_format::{Column, NodeKey};
+use pointmill_format::potree2::{
+    BrotliScratch, Dataset, Encoding, Memory, Metadata, NodeEntry, NodePoints, encode_brotli, encode_hierarchy,
+};
+use pointmill_format::{Attribute, Column, NodeKey, with_column};
 
 use crate::util::corpus;
 
@@ -153,4 +155,57 @@ fn wrong_types_and_empty_nodes_of_the_reference_are_read_as_meant() {
     }
     let has_root = nodes.first().is_some_and(|n| n.key == NodeKey::ROOT);
     assert!(has_root && nodes.iter().all(|n| !n.record.is_proxy()));
+}
+
+/// DEFAULT records of the points, `position` first as these datasets have it.
+fn records(points: &NodePoints) -> Vec<u8> {
+    let mut records = Vec::new();
+    for i in 0..points.len() {
+        records.extend(points.positions.iter().flat_map(|axis| axis[i].to_le_bytes()));
+        for column in &points.columns {
+            let elements = column.len() / points.len();
+            with_column!(column, v => records.extend(v[i * elements..(i + 1) * elements].iter().flat_map(|v| v.to_le_bytes())));
+        }
+    }
+    records
+}
+
+/// Our encoders on what the reference's files hold: the same tree, the same order of positions, the same points.
+#[test]
+fn nodes_of_the_reference_are_encoded_to_the_same_points_in_the_same_order() {
+    let Some(path) = corpus("potree2/autzen_trim_BROTLI") else { return };
+    let dataset = Dataset::open(&path).unwrap();
+    let attributes: Vec<Attribute> = dataset.metadata().attributes.iter().map(|a| a.attribute.clone()).collect();
+    let nodes = dataset.read_hierarchy().unwrap();
+    let (mut octree, mut entries) = (Vec::new(), Vec::new());
+    let mut points = NodePoints::default();
+    let mut scratch = BrotliScratch::default();
+    for node in &nodes {
+        dataset.read_points(node, &mut points).unwrap();
+        let byte_offset = octree.len() as u64;
+        encode_brotli(&attributes, &records(&points), 2, &mut scratch, &mut octree).unwrap();
+        let byte_size = octree.len() as u64 - byte_offset;
+        entries.push(NodeEntry { byte_offset, byte_size, ..NodeEntry::from(node) });
+    }
+    let hierarchy = encode_hierarchy(&mut entries, 4);
+    let metadata = Metadata { first_chunk_size: hierarchy.first_chunk_size, ..dataset.metadata().clone() };
+    let files = Memory { metadata: metadata.to_json().into_bytes(), hierarchy: hierarchy.bytes, octree };
+    let ours = Dataset::from_source(Box::new(files)).unwrap();
+
+    let mut again = NodePoints::default();
+    let our_nodes = ours.read_hierarchy().unwrap();
+    assert_eq!(our_nodes.len(), nodes.len());
+    for (node, our_node) in nodes.iter().zip(&our_nodes) {
+        assert_eq!((node.key, node.record.child_mask), (our_node.key, our_node.record.child_mask));
+        dataset.read_points(node, &mut points).unwrap();
+        ours.read_points(our_node, &mut again).unwrap();
+        assert!(points.positions == again.positions, "{}: another order", node.key);
+        let [rows, our_rows] = [&points, &again].map(|p| {
+            let bytes = records(p);
+            let mut rows: Vec<Vec<u8>> = bytes.chunks_exact(metadata.record_len()).map(<[u8]>::to_vec).collect();
+            rows.sort_unstable();
+            rows
+        });
+        assert!(rows == our_rows, "{}: other points", node.key);
+    }
 }
