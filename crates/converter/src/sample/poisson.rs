@@ -1,10 +1,10 @@
 //! A maximal Poisson-disk sample: no two points closer than the spacing, and every candidate closer than the spacing
 //! to one that was taken. By greedy choice in Morton order.
 //!
-//! Candidates come in Morton order, so those of a cell are one run, and so are the points taken from it. A cell is a
-//! few spacings wide. When its run begins, the few taken points around it that can conflict (closer than the spacing to
-//! the cell's box) are copied into a small array; each candidate is then compared with that array alone, eight points
-//! at a time, and joins it if it is taken.
+//! Candidates come in Morton order, so those of a cube are one run, and so are the points taken from it. The node is
+//! walked in *tiles* of four spacings. When a tile's run begins, the few taken points around it that can conflict
+//! (closer than the spacing to the tile's box) are copied into a small array, found through *cells* of two spacings;
+//! each candidate is then compared with that array alone, eight points at a time, and joins it if it is taken.
 //!
 //! Distances are compared in `f32`, in units of the spacing from the node's corner (0 to 128, so a coordinate is off by
 //! 2^-18 at most): a pair conflicts below `1 + MARGIN`, which is more than all rounding together. So no pair is ever
@@ -14,10 +14,10 @@ use super::{SPACING_BITS, cell_shift};
 use crate::grid::TREE_BITS;
 use crate::morton::interleave;
 
-/// A cell is `2^CELL_BITS` spacings wide. Measured on aerial and terrestrial scenes: 1 and 2 cost the same, 0 and 3 more.
-const CELL_BITS: u32 = 2;
+/// A cell is `2^CELL_BITS` spacings wide; a tile is two cells wide.
+const CELL_BITS: u32 = 1;
 const GRID_BITS: u32 = SPACING_BITS - CELL_BITS;
-const GRID_MAX: u32 = (1 << GRID_BITS) - 1;
+const GRID_SIZE: u32 = 1 << GRID_BITS;
 const CELL_SPACINGS: f32 = (1 << CELL_BITS) as f32;
 
 /// Squared distances (units of the squared spacing) below this conflict. Coordinates below 128 carry an error of 2^-18,
@@ -106,30 +106,34 @@ impl Poisson {
         let Some(first) = candidates.first() else { return };
         let shift = cell_shift(level);
         let cell_shift = shift + CELL_BITS;
+        let tile_shift = cell_shift + 1;
         let node_bits = TREE_BITS - u32::from(level).min(TREE_BITS);
         let corner = first.map(|t| t >> node_bits << node_bits);
         // A power of two, so nothing is lost by it.
         let unit = 1.0 / (1u32 << shift) as f32;
-        let mut rest = candidates.iter().zip(accepted).peekable();
-        while let Some((t, _)) = rest.peek() {
-            let cell = t.map(|t| t >> cell_shift);
-            let in_node = cell.map(|c| c & GRID_MAX);
-            let start = self.taken.len() as u32;
-            self.collect_near(in_node);
-            while let Some((t, accepted)) = rest.next_if(|(t, _)| t.map(|t| t >> cell_shift) == cell) {
+        let mut at = 0;
+        while let Some(&first) = candidates.get(at) {
+            self.collect_near(first.map(|t| t >> tile_shift << 1 & (GRID_SIZE - 1)));
+            let mut cell_start = self.taken.len() as u32;
+            let mut previous = first;
+            while let Some(&t) = candidates.get(at) {
+                let change = (t[0] ^ previous[0]) | (t[1] ^ previous[1]) | (t[2] ^ previous[2]);
+                if change >> cell_shift != 0 {
+                    cell_start = self.close_cell(previous.map(|t| t >> cell_shift), cell_start);
+                    if change >> tile_shift != 0 {
+                        break;
+                    }
+                }
+                previous = t;
                 let p: [f32; 3] = std::array::from_fn(|a| (t[a] - corner[a]) as i32 as f32 * unit);
                 if !self.near.conflicts(p) {
-                    *accepted = true;
+                    accepted[at] = true;
                     self.near.push(p);
                     self.taken.push(p);
                 }
+                at += 1;
             }
-            let end = self.taken.len() as u32;
-            if end > start {
-                let code = interleave(in_node) as u32;
-                self.ranges[code as usize] = Range { start, end };
-                self.touched.push(code);
-            }
+            self.close_cell(previous.map(|t| t >> cell_shift), cell_start);
         }
         for cell in self.touched.drain(..) {
             self.ranges[cell as usize] = EMPTY;
@@ -137,31 +141,51 @@ impl Poisson {
         self.taken.clear();
     }
 
-    /// Gathers the taken points of the cells around that lie closer than the spacing to the cell's box.
+    /// Notes which points were taken from a cell whose run has ended.
+    #[inline]
+    fn close_cell(&mut self, cell: [u32; 3], start: u32) -> u32 {
+        let end = self.taken.len() as u32;
+        if end > start {
+            let code = interleave(cell.map(|c| c & (GRID_SIZE - 1))) as u32;
+            self.ranges[code as usize] = Range { start, end };
+            self.touched.push(code);
+        }
+        end
+    }
+
+    /// Gathers the taken points that lie closer than the spacing to a tile; `cell` is the tile's lowest cell.
     fn collect_near(&mut self, cell: [u32; 3]) {
         self.near.clear();
+        // Rounding moves a coordinate by less than a ten-thousandth of a spacing.
         let low: [f32; 3] = cell.map(|c| c as f32 * CELL_SPACINGS - 1.0001);
-        let high: [f32; 3] = cell.map(|c| (c + 1) as f32 * CELL_SPACINGS + 1.0001);
-        let around = |c: u32| c.saturating_sub(1)..=(c + 1).min(GRID_MAX);
-        let mut z_codes = [0u64; 3];
-        let mut z_count = 0;
-        for z in around(cell[2]) {
-            z_codes[z_count] = interleave([0, 0, z]);
-            z_count += 1;
-        }
-        for x in around(cell[0]) {
-            let x = interleave([x, 0, 0]);
-            for y in around(cell[1]) {
-                let xy = x | interleave([0, y, 0]);
-                for z in &z_codes[..z_count] {
-                    let range = self.ranges[(xy | z) as usize];
+        let high: [f32; 3] = cell.map(|c| (c + 2) as f32 * CELL_SPACINGS + 1.0001);
+        // The cells around the tile: four an axis, of which the middle two are the tile's own.
+        let along = |c: u32, axis: usize| -> [Option<u64>; 4] {
+            std::array::from_fn(|i| {
+                let mut v = [0; 3];
+                v[axis] = (c + i as u32).checked_sub(1).filter(|v| *v < GRID_SIZE)?;
+                Some(interleave(v))
+            })
+        };
+        let (xs, ys, zs) = (along(cell[0], 0), along(cell[1], 1), along(cell[2], 2));
+        let is_own = |i: usize| i == 1 || i == 2;
+        for (i, x) in xs.into_iter().enumerate() {
+            let Some(x) = x else { continue };
+            for (j, y) in ys.into_iter().enumerate() {
+                let Some(y) = y else { continue };
+                let step = if is_own(i) && is_own(j) { 3 } else { 1 };
+                for z in zs.iter().step_by(step).flatten() {
+                    let range = self.ranges[(x | y | z) as usize];
                     if range == EMPTY {
                         continue;
                     }
                     for p in &self.taken[range.start as usize..range.end as usize] {
-                        let inside = (p[0] > low[0]) & (p[0] < high[0])
-                            & (p[1] > low[1]) & (p[1] < high[1])
-                            & (p[2] > low[2]) & (p[2] < high[2]);
+                        let inside = (p[0] > low[0])
+                            & (p[0] < high[0])
+                            & (p[1] > low[1])
+                            & (p[1] < high[1])
+                            & (p[2] > low[2])
+                            & (p[2] < high[2]);
                         if inside {
                             self.near.push(*p);
                         }
