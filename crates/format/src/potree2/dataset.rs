@@ -1,0 +1,252 @@
+//! A dataset that is open for reading.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+use crate::{NodeKey, ReadError};
+
+use super::brotli::{self, Fault};
+use super::chunk::{self, ChunkRanges};
+use super::morton::breadth_first_rank;
+use super::{ByteSource, DatasetFile, Encoding, Folder, Metadata, Node, NodePoints, NodeRecord};
+
+/// More JSON than this is not metadata.
+const MAX_METADATA_BYTES: u64 = 16 << 20;
+
+/// No Brotli stream gives more bytes than this for one of its own: 16 MiB is the longest run that a command of a few
+/// bytes can ask for.
+const MAX_BROTLI_RATIO: u64 = 1 << 24;
+
+/// Default of [`Dataset::set_max_node_bytes`].
+const MAX_NODE_BYTES: u64 = 4 << 30;
+
+/// A Potree 2.0 dataset. Threads may share it; every method reads what it needs and keeps nothing.
+pub struct Dataset {
+    source: Box<dyn ByteSource>,
+    metadata: Metadata,
+    hierarchy_bytes: u64,
+    octree_bytes: u64,
+    max_node_bytes: u64,
+}
+
+impl Dataset {
+    /// Opens the dataset in `folder` (or beside the `metadata.json` that is named) and reads its metadata.
+    ///
+    /// # Errors
+    /// A missing file, or what [`Metadata::from_json`] has to say.
+    pub fn open(folder: &Path) -> Result<Self, ReadError> {
+        let named_metadata = folder.file_name().is_some_and(|n| n == "metadata.json");
+        let folder = if named_metadata { folder.parent().unwrap_or(folder) } else { folder };
+        Self::from_source(Box::new(Folder::open(folder)?))
+    }
+
+    /// Opens a dataset wherever its bytes are.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_source(source: Box<dyn ByteSource>) -> Result<Self, ReadError> {
+        let size = |file| source.size(file).map_err(|e| ReadError::io(source.locate(file), "asking for the size", e));
+        let path = source.locate(DatasetFile::Metadata);
+        let metadata_bytes = size(DatasetFile::Metadata)?;
+        if metadata_bytes > MAX_METADATA_BYTES {
+            let what = format!("{metadata_bytes} bytes are too many for metadata (at most {MAX_METADATA_BYTES})");
+            return Err(ReadError::broken(path, None, what));
+        }
+        let (hierarchy_bytes, octree_bytes) = (size(DatasetFile::Hierarchy)?, size(DatasetFile::Octree)?);
+        let mut bytes = vec![0; metadata_bytes as usize];
+        source.read_at(DatasetFile::Metadata, 0, &mut bytes).map_err(|e| ReadError::io(&path, "reading", e))?;
+        let metadata = Metadata::from_json(&bytes, &path)?;
+        Ok(Self { source, metadata, hierarchy_bytes, octree_bytes, max_node_bytes: MAX_NODE_BYTES })
+    }
+
+    /// What `metadata.json` says.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// Bytes of `hierarchy.bin`.
+    pub fn hierarchy_bytes(&self) -> u64 {
+        self.hierarchy_bytes
+    }
+
+    /// Bytes of `octree.bin`.
+    pub fn octree_bytes(&self) -> u64 {
+        self.octree_bytes
+    }
+
+    /// What a file of the dataset is called in messages.
+    pub fn locate(&self, file: DatasetFile) -> PathBuf {
+        self.source.locate(file)
+    }
+
+    /// The largest decompressed payload that [`Self::read_points`] accepts, in bytes; 4 GiB if nothing is set. Only
+    /// BROTLI datasets need it: others hold no more than the file.
+    pub fn set_max_node_bytes(&mut self, bytes: u64) {
+        self.max_node_bytes = bytes;
+    }
+
+    /// Reads one hierarchy chunk: the subtree of `root`, breadth first, `root` first, proxies as they stand.
+    ///
+    /// `byte_offset` and `byte_size` are those of the proxy record of `root`.
+    ///
+    /// # Errors
+    /// A range outside the file, or records that do not form a tree.
+    pub fn read_chunk(&self, root: NodeKey, byte_offset: u64, byte_size: u64) -> Result<Vec<Node>, ReadError> {
+        let file = DatasetFile::Hierarchy;
+        self.check_range(file, byte_offset, byte_size, || format!("the hierarchy chunk of {root}"))?;
+        let path = self.locate(file);
+        let mut bytes = vec![0; as_len(byte_size, &path)?];
+        self.source.read_at(file, byte_offset, &mut bytes).map_err(|e| ReadError::io(&path, "reading", e))?;
+        chunk::parse(root, &bytes, byte_offset, &path)
+    }
+
+    /// Reads the chunk of the root.
+    ///
+    /// # Errors
+    /// As [`Self::read_chunk`].
+    pub fn read_root_chunk(&self) -> Result<Vec<Node>, ReadError> {
+        self.read_chunk(NodeKey::ROOT, 0, self.metadata.first_chunk_size)
+    }
+
+    /// Reads all nodes, by level and then by name. Every node appears once; there are no proxies among them.
+    ///
+    /// # Errors
+    /// As [`Self::read_chunk`]; chunks that overlap (and so also proxies that go round in circles).
+    pub fn read_hierarchy(&self) -> Result<Vec<Node>, ReadError> {
+        let path = self.locate(DatasetFile::Hierarchy);
+        let mut ranges = ChunkRanges::default();
+        let mut nodes = Vec::new();
+        let mut queue = VecDeque::from([(NodeKey::ROOT, 0, self.metadata.first_chunk_size)]);
+        while let Some((root, offset, size)) = queue.pop_front() {
+            ranges.claim(root, offset, size, &path)?;
+            for node in self.read_chunk(root, offset, size)? {
+                if !node.record.is_proxy() {
+                    nodes.push(node);
+                } else if node.key == root {
+                    let what = format!("the hierarchy chunk of {root} begins with a proxy");
+                    return Err(ReadError::broken(path, offset, what));
+                } else {
+                    queue.push_back((node.key, node.record.byte_offset, node.record.byte_size));
+                }
+            }
+        }
+        nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
+        Ok(nodes)
+    }
+
+    /// Reads the payload of a node as stored; replaces the contents of `out`.
+    ///
+    /// # Errors
+    /// A proxy (load its chunk first), or a range outside `octree.bin`.
+    pub fn read_payload(&self, node: &Node, out: &mut Vec<u8>) -> Result<(), ReadError> {
+        let Node { key, record } = *node;
+        let path = self.locate(DatasetFile::Octree);
+        if record.is_proxy() {
+            let what = format!("node {key} is a proxy: its payload is told by its own hierarchy chunk");
+            return Err(ReadError::unsupported(path, what));
+        }
+        out.clear();
+        if record.byte_size == 0 {
+            return Ok(());
+        }
+        self.check_range(DatasetFile::Octree, record.byte_offset, record.byte_size, || format!("node {key}"))?;
+        out.resize(as_len(record.byte_size, &path)?, 0);
+        let read = self.source.read_at(DatasetFile::Octree, record.byte_offset, out);
+        read.map_err(|e| ReadError::io(path, &format!("reading node {key}"), e))
+    }
+
+    /// Reads the points of a node; replaces the contents of `out`. A node without payload has no points, whatever its
+    /// record claims (PotreeConverter 2.0 wrote such nodes).
+    ///
+    /// # Errors
+    /// As [`Self::read_payload`]; a payload that does not hold just as many points as the record says.
+    pub fn read_points(&self, node: &Node, out: &mut NodePoints) -> Result<(), ReadError> {
+        out.reset(&self.metadata);
+        let mut stored = std::mem::take(&mut out.stored);
+        let read = self.read_payload(node, &mut stored);
+        out.stored = stored;
+        read?;
+        if out.stored.is_empty() {
+            return Ok(());
+        }
+        match self.metadata.encoding {
+            Encoding::Default => {
+                self.check_record_count(node)?;
+                out.fill_from_records(&self.metadata);
+            }
+            Encoding::Brotli => {
+                self.decompress(node, out)?;
+                out.fill_from_planes(&self.metadata, node.record.points as usize);
+            }
+        }
+        Ok(())
+    }
+
+    fn check_record_count(&self, node: &Node) -> Result<(), ReadError> {
+        let NodeRecord { points, byte_size, byte_offset, .. } = node.record;
+        let expected = u128::from(points) * self.metadata.record_len() as u128;
+        if expected == u128::from(byte_size) {
+            return Ok(());
+        }
+        let what = format!(
+            "node {} has {byte_size} bytes, but {points} points of {} bytes are {expected}",
+            node.key,
+            self.metadata.record_len()
+        );
+        Err(ReadError::broken(self.locate(DatasetFile::Octree), byte_offset, what))
+    }
+
+    fn decompress(&self, node: &Node, out: &mut NodePoints) -> Result<(), ReadError> {
+        let NodeRecord { points, byte_size, byte_offset, .. } = node.record;
+        let broken = |what: String| {
+            let what = format!("node {} {what}", node.key);
+            ReadError::broken(self.locate(DatasetFile::Octree), byte_offset, what)
+        };
+        let expected = u128::from(points) * self.metadata.planar_len() as u128;
+        if expected > u128::from(byte_size) * u128::from(MAX_BROTLI_RATIO) {
+            return Err(broken(format!("claims {points} points, more than {byte_size} compressed bytes can hold")));
+        }
+        let len = usize::try_from(expected).ok().filter(|_| expected <= u128::from(self.max_node_bytes));
+        let Some(len) = len else {
+            let what = format!("would take {expected} bytes of memory, {} are allowed", self.max_node_bytes);
+            return Err(broken(what));
+        };
+        brotli::decompress(&out.stored, len, &mut out.planar).map_err(|fault| match fault {
+            Fault::Corrupt => broken("is not a Brotli stream, or a damaged one".into()),
+            Fault::Short(got) => broken(format!("decompresses to {got} bytes, its {points} points need {len}")),
+            Fault::Long => broken(format!("decompresses to more than the {len} bytes of its {points} points")),
+        })
+    }
+
+    fn check_range(
+        &self,
+        file: DatasetFile,
+        offset: u64,
+        size: u64,
+        who: impl Fn() -> String,
+    ) -> Result<(), ReadError> {
+        let available = match file {
+            DatasetFile::Hierarchy => self.hierarchy_bytes,
+            _ => self.octree_bytes,
+        };
+        match offset.checked_add(size) {
+            Some(end) if end <= available => Ok(()),
+            _ => {
+                let what = format!("{} needs {size} bytes, but {} has {available}", who(), file.name());
+                let advice = "the file was cut short or belongs to another dataset; copy or convert it again";
+                Err(ReadError::broken(self.locate(file), offset, what).advise(advice))
+            }
+        }
+    }
+}
+
+impl std::fmt::Debug for Dataset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Dataset").field("at", &self.locate(DatasetFile::Metadata)).finish_non_exhaustive()
+    }
+}
+
+/// `size`, already checked against the file, as a length in memory.
+fn as_len(size: u64, path: &Path) -> Result<usize, ReadError> {
+    usize::try_from(size).map_err(|_| ReadError::unsupported(path, format!("{size} bytes at once do not fit memory")))
+}

@@ -1,0 +1,179 @@
+//! What `metadata.json` says.
+
+use std::path::Path;
+
+use crate::{Aabb, Attribute, Lattice, NodeKey, ReadError};
+
+use super::{metadata_json, metadata_parse};
+
+/// How the payloads in `octree.bin` are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// `DEFAULT`: interleaved records of [`Metadata::record_len`] bytes.
+    Default,
+    /// `BROTLI`: one Brotli stream a node, planar, in Morton order, positions and colours as Morton codes.
+    Brotli,
+}
+
+impl Encoding {
+    /// The word in the metadata.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "DEFAULT",
+            Self::Brotli => "BROTLI",
+        }
+    }
+}
+
+/// An attribute and what its values are like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AttributeStats {
+    /// Name, type, scale and offset.
+    pub attribute: Attribute,
+    /// Smallest stored value of each element; of `position`: world coordinates. Empty if the file does not say.
+    pub min: Vec<f64>,
+    /// Largest stored value of each element; of `position`: world coordinates. Empty if the file does not say.
+    pub max: Vec<f64>,
+    /// Number of points for each of the 256 values of a one-byte attribute.
+    pub histogram: Option<Vec<u64>>,
+}
+
+/// The contents of `metadata.json`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Metadata {
+    /// Name of the cloud.
+    pub name: String,
+    /// Free text.
+    pub description: String,
+    /// Points of all nodes together.
+    pub points: u64,
+    /// A proj4 definition or nothing.
+    pub projection: String,
+    /// Bytes of the chunk at the start of `hierarchy.bin`.
+    pub first_chunk_size: u64,
+    /// Levels a hierarchy chunk.
+    pub step_size: u32,
+    /// The deepest level that has a node (root = 0); PotreeConverter 2 often tells less.
+    pub depth: u32,
+    /// `world = stored · scale + offset`.
+    pub lattice: Lattice,
+    /// Spacing of the root, world units.
+    pub spacing: f64,
+    /// The root's box, a cube.
+    pub cube: Aabb,
+    /// How payloads are stored.
+    pub encoding: Encoding,
+    /// In the order of the bytes, `position` among them.
+    pub attributes: Vec<AttributeStats>,
+    /// Top-level keys that the format does not know; ours is `pointmill`.
+    pub extra: serde_json::Map<String, serde_json::Value>,
+}
+
+impl Metadata {
+    /// Parses `metadata.json`; `path` is for messages.
+    ///
+    /// # Errors
+    /// What is missing, of the wrong type or out of range, and where; [`crate::ErrorKind::Unsupported`] for a version,
+    /// an encoding or an attribute type that is not of Potree 2.0.
+    pub fn from_json(bytes: &[u8], path: &Path) -> Result<Self, ReadError> {
+        metadata_parse::parse(bytes, path)
+    }
+
+    /// The text of `metadata.json`, with all keys that PotreeConverter 2.1 writes and then [`Self::extra`].
+    ///
+    /// Doubles come back bit for bit. JSON has neither NaN nor infinities: they become 0 and ±[`f64::MAX`].
+    pub fn to_json(&self) -> String {
+        metadata_json::to_json(self)
+    }
+
+    /// Bytes a point in DEFAULT encoding.
+    pub fn record_len(&self) -> usize {
+        self.attributes.iter().map(|a| a.attribute.size()).sum()
+    }
+
+    /// Bytes a point in a decompressed BROTLI payload: 16 for `position`, 8 for `rgb`, else as in DEFAULT.
+    pub fn planar_len(&self) -> usize {
+        self.attributes.iter().map(|a| planar_size(&a.attribute)).sum()
+    }
+
+    /// The box of a node: the cube halved [`NodeKey::level`] times, as viewers do it.
+    pub fn node_cube(&self, key: NodeKey) -> Aabb {
+        let mut cube = self.cube;
+        for level in (0..key.level).rev() {
+            for (axis, cell) in [key.x, key.y, key.z].into_iter().enumerate() {
+                let mid = cube.min[axis] + (cube.max[axis] - cube.min[axis]) / 2.0;
+                if cell >> level & 1 == 1 {
+                    cube.min[axis] = mid;
+                } else {
+                    cube.max[axis] = mid;
+                }
+            }
+        }
+        cube
+    }
+
+    /// Spacing of the nodes of `level`, world units: halves with every level.
+    pub fn spacing_at(&self, level: u8) -> f64 {
+        self.spacing * (-f64::from(level)).exp2()
+    }
+
+    /// Where `position` stands in [`Self::attributes`]; always there if the metadata was parsed.
+    pub fn position_index(&self) -> Option<usize> {
+        self.index_of("position")
+    }
+
+    /// Where `rgb` stands in [`Self::attributes`].
+    pub fn rgb_index(&self) -> Option<usize> {
+        self.index_of("rgb")
+    }
+
+    fn index_of(&self, name: &str) -> Option<usize> {
+        self.attributes.iter().position(|a| a.attribute.name == name)
+    }
+}
+
+/// Bytes a point of one attribute in a decompressed BROTLI payload.
+pub(super) fn planar_size(attribute: &Attribute) -> usize {
+    match attribute.name.as_str() {
+        "position" => 16,
+        "rgb" => 8,
+        _ => attribute.size(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit_cube() -> Metadata {
+        Metadata {
+            name: String::new(),
+            description: String::new(),
+            points: 0,
+            projection: String::new(),
+            first_chunk_size: 22,
+            step_size: 4,
+            depth: 0,
+            lattice: Lattice { scale: [1.0; 3], offset: [0.0; 3] },
+            spacing: 8.0,
+            cube: Aabb { min: [0.0; 3], max: [16.0; 3] },
+            encoding: Encoding::Default,
+            attributes: Vec::new(),
+            extra: serde_json::Map::new(),
+        }
+    }
+
+    #[test]
+    fn a_node_lies_in_the_octants_of_its_name() {
+        let key = NodeKey::from_name("r41").unwrap(); // upper x, then upper z of that
+        let cube = unit_cube().node_cube(key);
+        assert_eq!(cube, Aabb { min: [8.0, 0.0, 4.0], max: [12.0, 4.0, 8.0] });
+        assert_eq!(unit_cube().node_cube(NodeKey::ROOT), unit_cube().cube);
+    }
+
+    #[test]
+    fn spacing_halves_with_every_level_down_to_the_deepest() {
+        assert_eq!([0, 1, 4].map(|l| unit_cube().spacing_at(l)), [8.0, 4.0, 0.5]);
+        assert_eq!(unit_cube().spacing_at(31), 8.0 / f64::from(1u32 << 31));
+    }
+}

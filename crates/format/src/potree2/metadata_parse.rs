@@ -1,0 +1,252 @@
+//! Reads `metadata.json`: strict on what the bytes of the other files depend on, patient with the rest.
+
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use crate::{Aabb, Attribute, AttributeType, Lattice, ReadError};
+
+use super::{AttributeStats, Encoding, Metadata};
+
+/// More elements a point than any attribute has; keeps a bad count from asking for memory.
+const MAX_ELEMENTS: u64 = 256;
+
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Metadata, ReadError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let value = serde_json::from_slice(bytes).map_err(|e| syntax_error(bytes, path, &e))?;
+    from_value(value).map_err(|fault| match fault {
+        Fault::Broken(what) => ReadError::broken(path, None, what),
+        Fault::Unsupported(what) => ReadError::unsupported(path, what),
+    })
+}
+
+/// What is wrong; the path is added once, above.
+enum Fault {
+    Broken(String),
+    Unsupported(String),
+}
+
+fn broken<T>(what: impl Into<String>) -> Result<T, Fault> {
+    Err(Fault::Broken(what.into()))
+}
+
+fn unsupported<T>(what: impl Into<String>) -> Result<T, Fault> {
+    Err(Fault::Unsupported(what.into()))
+}
+
+fn from_value(value: Value) -> Result<Metadata, Fault> {
+    let Value::Object(mut map) = value else { return broken("is not a JSON object") };
+    let mut top = Fields { map: &mut map, place: "" };
+    match top.text("version")?.as_str() {
+        "" | "2.0" => {}
+        other => return unsupported(format!("version \"{other}\"; 2.0 is the one that is read")),
+    }
+    let (mut hierarchy, mut bounds) = (top.object("hierarchy")?, top.object("boundingBox")?);
+    let mut hierarchy = Fields { map: &mut hierarchy, place: "hierarchy." };
+    let mut bounds = Fields { map: &mut bounds, place: "boundingBox." };
+    let metadata = Metadata {
+        name: top.text("name")?,
+        description: top.text("description")?,
+        points: top.integer("points")?,
+        projection: top.text("projection")?,
+        first_chunk_size: hierarchy.integer("firstChunkSize")?,
+        step_size: hierarchy.small("stepSize")?,
+        depth: hierarchy.small("depth")?,
+        lattice: Lattice { scale: top.vector("scale")?, offset: top.vector("offset")? },
+        spacing: top.number("spacing")?,
+        cube: Aabb { min: bounds.vector("min")?, max: bounds.vector("max")? },
+        encoding: encoding(&top.text("encoding")?)?,
+        attributes: attributes(top.take("attributes"))?,
+        extra: map,
+    };
+    check(&metadata)?;
+    Ok(metadata)
+}
+
+fn check(m: &Metadata) -> Result<(), Fault> {
+    if !m.lattice.is_valid() {
+        return broken(format!("scale {:?} has to be greater than 0", m.lattice.scale));
+    }
+    if m.spacing <= 0.0 {
+        return broken(format!("spacing {} has to be greater than 0", m.spacing));
+    }
+    if m.cube.is_empty() {
+        return broken(format!("boundingBox has its min {:?} above its max {:?}", m.cube.min, m.cube.max));
+    }
+    let Some(position) = m.position_index() else { return broken("there is no attribute named position") };
+    let is = |a: &Attribute, ty| a.ty == ty && a.elements == 3;
+    if !is(&m.attributes[position].attribute, AttributeType::Int32) {
+        return broken("the attribute position is not int32 x 3");
+    }
+    if m.encoding == Encoding::Brotli
+        && let Some(rgb) = m.rgb_index()
+        && !is(&m.attributes[rgb].attribute, AttributeType::UInt16)
+    {
+        return broken("the attribute rgb is not uint16 x 3, which the encoding BROTLI requires");
+    }
+    Ok(())
+}
+
+fn encoding(word: &str) -> Result<Encoding, Fault> {
+    match word {
+        "BROTLI" => Ok(Encoding::Brotli),
+        // UNCOMPRESSED: PotreeConverter copies the word from its command line.
+        "DEFAULT" | "UNCOMPRESSED" | "" => Ok(Encoding::Default),
+        other => unsupported(format!("encoding \"{other}\"; DEFAULT and BROTLI are read")),
+    }
+}
+
+fn attributes(value: Option<Value>) -> Result<Vec<AttributeStats>, Fault> {
+    let Some(Value::Array(list)) = value else { return broken("attributes is missing or not an array") };
+    let mut attributes: Vec<AttributeStats> = Vec::new();
+    let mut names = std::collections::HashSet::new();
+    for (index, value) in list.into_iter().enumerate() {
+        let stats = attribute(value, index)?;
+        if !names.insert(stats.attribute.name.clone()) {
+            return broken(format!("two attributes are named \"{}\"", stats.attribute.name));
+        }
+        attributes.push(stats);
+    }
+    Ok(attributes)
+}
+
+fn attribute(value: Value, index: usize) -> Result<AttributeStats, Fault> {
+    let place = format!("attributes[{index}].");
+    let Value::Object(mut map) = value else { return broken(format!("attributes[{index}] is not an object")) };
+    let mut fields = Fields { map: &mut map, place: &place };
+    let name = fields.text("name")?;
+    if name.is_empty() {
+        return broken(format!("{place}name is missing"));
+    }
+    let word = fields.text("type")?;
+    let Some(ty) = AttributeType::from_potree_name(&word) else {
+        return unsupported(format!("attribute \"{name}\" has the type \"{word}\""));
+    };
+    let elements = fields.integer("numElements")?;
+    if !(1..=MAX_ELEMENTS).contains(&elements) {
+        return broken(format!("attribute \"{name}\" has numElements {elements}"));
+    }
+    let mut attribute = Attribute::new(name, ty, elements as usize);
+    for (key, expected) in [("elementSize", ty.size()), ("size", attribute.size())] {
+        let found = fields.integer(key)?;
+        if found != expected as u64 {
+            let name = &attribute.name;
+            return broken(format!(
+                "attribute \"{name}\" is {word} x {elements}, so its {key} is {expected}, not {found}"
+            ));
+        }
+    }
+    attribute.description = fields.text("description")?;
+    let mut per_element = |key| match fields.numbers(key)? {
+        Some(n) if n.len() != elements as usize => {
+            broken(format!("{place}{key} has {} numbers, not {elements}", n.len()))
+        }
+        other => Ok(other),
+    };
+    if let Some(scale) = per_element("scale")? {
+        attribute.scale = scale;
+    }
+    if let Some(offset) = per_element("offset")? {
+        attribute.offset = offset;
+    }
+    let (min, max) = (per_element("min")?.unwrap_or_default(), per_element("max")?.unwrap_or_default());
+    let histogram = histogram(fields.take("histogram"), &place)?;
+    Ok(AttributeStats { attribute, min, max, histogram })
+}
+
+fn histogram(value: Option<Value>, place: &str) -> Result<Option<Vec<u64>>, Fault> {
+    let Some(value) = value else { return Ok(None) };
+    let counts: Option<Vec<u64>> = value.as_array().and_then(|bins| bins.iter().map(Value::as_u64).collect());
+    match counts {
+        Some(counts) if counts.len() == 256 => Ok(Some(counts)),
+        _ => broken(format!("{place}histogram is not an array of 256 counts")),
+    }
+}
+
+/// An object whose fields are taken out one by one; `place` stands before their names in messages.
+struct Fields<'a> {
+    map: &'a mut Map<String, Value>,
+    place: &'a str,
+}
+
+impl Fields<'_> {
+    fn take(&mut self, key: &str) -> Option<Value> {
+        self.map.remove(key)
+    }
+
+    /// A string; empty if there is none.
+    fn text(&mut self, key: &str) -> Result<String, Fault> {
+        match self.take(key) {
+            None => Ok(String::new()),
+            Some(Value::String(text)) => Ok(text),
+            Some(other) => self.wrong(key, "a string", &other),
+        }
+    }
+
+    fn object(&mut self, key: &str) -> Result<Map<String, Value>, Fault> {
+        match self.take(key) {
+            Some(Value::Object(map)) => Ok(map),
+            Some(other) => self.wrong(key, "an object", &other),
+            None => broken(format!("{key} is missing")),
+        }
+    }
+
+    fn integer(&mut self, key: &str) -> Result<u64, Fault> {
+        match self.take(key) {
+            None => broken(format!("{}{key} is missing", self.place)),
+            Some(value) => value.as_u64().map_or_else(|| self.wrong(key, "a whole number, at least 0", &value), Ok),
+        }
+    }
+
+    /// An integer that readers take as a hint; 0 if there is none.
+    fn small(&mut self, key: &str) -> Result<u32, Fault> {
+        let Some(value) = self.take(key) else { return Ok(0) };
+        let small = value.as_u64().and_then(|v| u32::try_from(v).ok());
+        small.map_or_else(|| self.wrong(key, "a whole number below 2^32", &value), Ok)
+    }
+
+    fn number(&mut self, key: &str) -> Result<f64, Fault> {
+        match self.take(key) {
+            None => broken(format!("{}{key} is missing", self.place)),
+            Some(value) => value.as_f64().map_or_else(|| self.wrong(key, "a number", &value), Ok),
+        }
+    }
+
+    fn numbers(&mut self, key: &str) -> Result<Option<Vec<f64>>, Fault> {
+        let Some(value) = self.take(key) else { return Ok(None) };
+        let numbers = value.as_array().and_then(|list| list.iter().map(Value::as_f64).collect());
+        numbers.map_or_else(|| self.wrong(key, "an array of numbers", &value), |n| Ok(Some(n)))
+    }
+
+    fn vector(&mut self, key: &str) -> Result<[f64; 3], Fault> {
+        match self.numbers(key)?.as_deref() {
+            Some(&[x, y, z]) => Ok([x, y, z]),
+            Some(other) => broken(format!("{}{key} has {} numbers, not 3", self.place, other.len())),
+            None => broken(format!("{}{key} is missing", self.place)),
+        }
+    }
+
+    fn wrong<T>(&self, key: &str, expected: &str, found: &Value) -> Result<T, Fault> {
+        let mut found = found.to_string();
+        if let Some((end, _)) = found.char_indices().nth(40) {
+            found.truncate(end);
+            found.push('…');
+        }
+        broken(format!("{}{key} is {found}, not {expected}", self.place))
+    }
+}
+
+/// Says where JSON ends to be JSON, and names the one fault that the reference converter is known for.
+fn syntax_error(bytes: &[u8], path: &Path, error: &serde_json::Error) -> ReadError {
+    let line_start: usize =
+        bytes.split_inclusive(|b| *b == b'\n').take(error.line().saturating_sub(1)).map(<[u8]>::len).sum();
+    let offset = (line_start + error.column().saturating_sub(1)).min(bytes.len());
+    let word = bytes[offset..].trim_ascii_start();
+    let word = word.strip_prefix(b"-").unwrap_or(word);
+    if word.starts_with(b"inf") || word.starts_with(b"nan") {
+        let what = "is not valid JSON: a number is written as inf or nan";
+        return ReadError::broken(path, offset as u64, what)
+            .advise("PotreeConverter does so for attributes that it leaves empty; replace the word by 0");
+    }
+    ReadError::broken(path, offset as u64, format!("is not valid JSON: {error}"))
+}
