@@ -32,7 +32,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         let estimate = pointmill_converter::estimate(&plan)?;
         return emit(&if args.json { json(&estimate)? } else { text::estimate(&estimate, &plan) });
     }
-    protect_others(&plan)?;
+    protect_inputs(&plan)?;
     if let Some(file) = &args.report {
         require_folder(file)?;
     }
@@ -123,30 +123,15 @@ fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
     name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// `--overwrite` replaces datasets: never a folder of other things, and never the scans that are being read.
-fn protect_others(plan: &Plan) -> Result<(), Failure> {
+/// The scans that are being read are never replaced. What else may be, the converter judges.
+fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
     let Ok(output) = plan.output.canonicalize() else {
         return Ok(()); // not there: nothing to protect
     };
     let inside = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file.starts_with(&output));
-    if let Some(scan) = plan.inputs.iter().find(inside) {
-        let (output, scan) = (plan.output.display(), scan.display());
-        return Err(Failure::Usage(format!(
-            "{output}: the output would replace the input {scan}; choose another folder"
-        )));
-    }
-    if plan.overwrite && !replaceable(&output) {
-        let output = plan.output.display();
-        return Err(Failure::Usage(format!(
-            "{output}: this is no dataset, so --overwrite leaves it alone; remove it yourself or choose another folder"
-        )));
-    }
-    Ok(())
-}
-
-fn replaceable(output: &Path) -> bool {
-    let is_empty_folder = || fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none());
-    output.join("metadata.json").is_file() || is_empty_folder()
+    let Some(scan) = plan.inputs.iter().find(inside) else { return Ok(()) };
+    let (output, scan) = (plan.output.display(), scan.display());
+    Err(Failure::Usage(format!("{output}: the output would replace the input {scan}; choose another folder")))
 }
 
 /// Better to learn before the run than after it that the report has no place to go.

@@ -97,9 +97,19 @@ pub(crate) fn seconds(s: f64) -> String {
     }
 }
 
-/// Three numbers side by side, each as short as it can be without loss.
-pub(crate) fn triple(v: &[f64]) -> String {
-    v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+/// A number for people: at most nine decimals, none that say nothing. JSON has all of them.
+pub(crate) fn number(v: f64) -> String {
+    if v != 0.0 && !(1e-6..1e15).contains(&v.abs()) {
+        return format!("{v:e}");
+    }
+    let fixed = format!("{v:.9}");
+    let short = fixed.trim_end_matches('0').trim_end_matches('.');
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
+/// Numbers side by side.
+pub(crate) fn numbers(values: &[f64]) -> String {
+    values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -145,5 +155,7 @@ mod tests {
         assert_eq!(bytes((1 << 30) - 1), "1.00 GiB");
         assert_eq!((seconds(0.416), seconds(185.0)), ("0.42 s".into(), "3 min 05 s".into()));
         assert_eq!(rate(12_345_678.0), "12.3 M points/s");
+        assert_eq!(numbers(&[848_935.200_000_000_1, -0.0, 1e-7, 0.001]), "848935.2 0 1e-7 0.001");
+        assert_eq!(numbers(&[f64::MAX, f64::NAN, 100.0]), "1.7976931348623157e308 NaN 100");
     }
 }

@@ -9,7 +9,7 @@ use pointmill_format::{Attribute, Crs, ScanInfo};
 
 use crate::convert::points_left_out;
 use crate::measure::Measured;
-use crate::quantities::{bytes, count, plural, rate, seconds, triple};
+use crate::quantities::{bytes, count, number, numbers, plural, rate, seconds};
 
 /// The summary of a run, line by line.
 pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String> {
@@ -62,13 +62,13 @@ fn points_lines(report: &Report) -> Vec<String> {
 fn coordinates_line(report: &Report) -> String {
     let change = &report.coordinate_change;
     if change.max.iter().all(|v| *v == 0.0) {
-        return format!("coordinates are unchanged, step {}", triple(&report.grid.scale));
+        return format!("coordinates are unchanged, step {}", numbers(&report.grid.scale));
     }
-    let step = triple(&report.grid.scale);
+    let step = numbers(&report.grid.scale);
     format!(
         "coordinates moved by at most {} (root mean square {}), step {step}",
-        triple(&change.max),
-        triple(&change.rms)
+        numbers(&change.max),
+        numbers(&change.rms)
     )
 }
 
@@ -96,8 +96,8 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
     t.row("points", format!("{} (as the headers say)", count(estimate.points)));
     t.row("bounds", estimate.bounds.map_or_else(|| "unknown".to_owned(), |b| corners(&b[..3], &b[3..])));
     t.row("CRS", or_none(&estimate.crs));
-    t.row("step", format!("{}, {}", triple(&estimate.grid.scale), estimate.grid.why));
-    t.row("cube side", estimate.grid.cube_side.to_string());
+    t.row("step", format!("{}, {}", numbers(&estimate.grid.scale), estimate.grid.why));
+    t.row("cube side", number(estimate.grid.cube_side));
     t.row("attributes", estimate.attributes.join(", "));
     t.row("bytes a point", estimate.bytes_per_point.to_string());
     t.row("memory", format!("{} of {} allowed", bytes(estimate.memory_bytes), bytes(plan.memory_bytes)));
@@ -113,8 +113,7 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
 
 /// A scan, and its measured figures if there are some.
 pub(crate) fn scan(info: &ScanInfo, pieces: usize, measured: Option<&Measured>) -> String {
-    let mut t = Table::default();
-    let _ = writeln!(t.0, "{}", info.path.display());
+    let mut t = Table::about(&info.path);
     t.row("format", &info.format);
     t.row("points", count(info.points_declared));
     let declared = info.bounds_declared.map_or_else(|| "not told".to_owned(), |b| corners(&b.min, &b.max));
@@ -125,10 +124,10 @@ pub(crate) fn scan(info: &ScanInfo, pieces: usize, measured: Option<&Measured>) 
         t.row("measured", if none { "nothing".into() } else { corners(&measured.bounds.min, &measured.bounds.max) });
     }
     if let Some(lattice) = info.lattice {
-        t.row("lattice", format!("step {}, offset {}", triple(&lattice.scale), triple(&lattice.offset)));
+        t.row("lattice", format!("step {}, offset {}", numbers(&lattice.scale), numbers(&lattice.offset)));
     }
     t.row("CRS", crs(&info.crs));
-    t.row("size", format!("{}, {} that decode alone", bytes(info.file_bytes), plural(pieces as u64, "piece")));
+    t.row("size", format!("{}, {} to decode in parallel", bytes(info.file_bytes), plural(pieces as u64, "piece")));
     for (i, attribute) in info.attributes.iter().enumerate() {
         let ranges = measured.map(|m| m.ranges[i].as_slice());
         t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, ranges));
@@ -139,8 +138,7 @@ pub(crate) fn scan(info: &ScanInfo, pieces: usize, measured: Option<&Measured>) 
 
 /// A dataset; `levels`: nodes and points of each; `size_bytes`: of its three files.
 pub(crate) fn dataset(folder: &Path, metadata: &Metadata, levels: &[[u64; 2]], size_bytes: u64) -> String {
-    let mut t = Table::default();
-    let _ = writeln!(t.0, "{}", folder.display());
+    let mut t = Table::about(folder);
     t.row("format", format!("Potree 2.0, encoding {}", metadata.encoding.name()));
     t.row("name", &metadata.name);
     t.row("points", count(metadata.points));
@@ -150,8 +148,8 @@ pub(crate) fn dataset(folder: &Path, metadata: &Metadata, levels: &[[u64; 2]], s
     }
     t.row("cube", corners(&metadata.cube.min, &metadata.cube.max));
     let lattice = &metadata.lattice;
-    t.row("lattice", format!("step {}, offset {}", triple(&lattice.scale), triple(&lattice.offset)));
-    t.row("spacing", format!("{} at the root, half of it at each level below", metadata.spacing));
+    t.row("lattice", format!("step {}, offset {}", numbers(&lattice.scale), numbers(&lattice.offset)));
+    t.row("spacing", format!("{} at the root, half of it at each level below", number(metadata.spacing)));
     t.row("CRS", or_none(&metadata.projection));
     t.row("size", bytes(size_bytes));
     for (level, [nodes, points]) in levels.iter().enumerate() {
@@ -170,13 +168,13 @@ pub(crate) fn attribute_line(attribute: &Attribute, ranges: Option<&[[f64; 2]]>)
     let times = if attribute.elements > 1 { format!(" × {}", attribute.elements) } else { String::new() };
     let mut line = format!("{:<22} {}{times}", attribute.name, attribute.ty.potree_name());
     if attribute.scale.iter().any(|s| *s != 1.0) || attribute.offset.iter().any(|o| *o != 0.0) {
-        let _ = write!(line, " · {} + {}", triple(&attribute.scale), triple(&attribute.offset));
+        let _ = write!(line, " · {} + {}", numbers(&attribute.scale), numbers(&attribute.offset));
     }
     if let Some(no_data) = &attribute.no_data {
-        let _ = write!(line, ", {} is unknown", triple(no_data));
+        let _ = write!(line, ", {} is unknown", numbers(no_data));
     }
     for [min, max] in ranges.unwrap_or_default().iter().filter(|r| r[0] <= r[1]) {
-        let _ = write!(line, ", {min} to {max}");
+        let _ = write!(line, ", {} to {}", number(*min), number(*max));
     }
     line
 }
@@ -195,7 +193,7 @@ pub(crate) fn crs(crs: &Crs) -> String {
 
 /// Lower and upper corner of a box.
 pub(crate) fn corners(min: &[f64], max: &[f64]) -> String {
-    format!("{} … {}", triple(min), triple(max))
+    format!("{} … {}", numbers(min), numbers(max))
 }
 
 fn or_none(text: &str) -> &str {
@@ -207,9 +205,18 @@ fn or_none(text: &str) -> &str {
 pub(crate) struct Table(pub(crate) String);
 
 impl Table {
-    /// Adds a line. Control characters out of a file (a CRS, an attribute's name) never reach the terminal.
-    pub(crate) fn row(&mut self, word: &str, text: impl AsRef<str>) {
-        let text: String = text.as_ref().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-        let _ = writeln!(self.0, "  {word:<13} {text}");
+    /// A table about a file or folder.
+    fn about(path: &Path) -> Self {
+        Self(printable(&path.to_string_lossy()) + "\n")
     }
+
+    /// Adds a line.
+    pub(crate) fn row(&mut self, word: &str, text: impl AsRef<str>) {
+        let _ = writeln!(self.0, "  {word:<13} {}", printable(text.as_ref()));
+    }
+}
+
+/// Control characters out of a file (a CRS, an attribute's name) never reach the terminal.
+fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
