@@ -34,7 +34,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     }
     protect_inputs(&plan)?;
     if let Some(file) = &args.report {
-        require_folder(file)?;
+        require_folder(file, &plan.output)?;
     }
     let progress = Progress::new(&args.talk);
     let result = pointmill_converter::convert(&plan, &progress);
@@ -135,8 +135,8 @@ fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
 }
 
 /// Better to learn before the run than after it that the report has no place to go.
-fn require_folder(file: &Path) -> Result<(), Failure> {
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty() && *folder != output);
     if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
         return Err(Failure::Usage(format!(
             "{}: the report cannot be written there: no such folder, or a folder itself",
