@@ -65,9 +65,21 @@ impl Checksum {
         self.count += 1;
     }
 
+    /// Takes out what `other` holds.
+    pub(crate) fn remove(&mut self, other: &Self) {
+        self.sum = self.sum.wrapping_sub(other.sum);
+        self.count = self.count.wrapping_sub(other.count);
+    }
+
+    /// Takes out `old` and puts in `new`.
+    pub(crate) fn replace(&mut self, old: &Self, new: &Self) {
+        self.remove(old);
+        self.merge(new);
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         self.sum = self.sum.wrapping_add(other.sum);
-        self.count += other.count;
+        self.count = self.count.wrapping_add(other.count);
     }
 }
 

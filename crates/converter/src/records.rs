@@ -42,8 +42,6 @@ pub(crate) fn position(record: &[u8]) -> [i32; 3] {
 pub(crate) struct OutputLayout {
     /// Attributes of the output beside the position, in order.
     pub(crate) attributes: Vec<Attribute>,
-    /// Index in the schema of each of them.
-    pub(crate) kept: Vec<usize>,
     /// Bytes of an output record.
     pub(crate) stride: usize,
     /// Runs of bytes to copy: (from, to) of the stored record, in output order.
@@ -53,10 +51,10 @@ pub(crate) struct OutputLayout {
 }
 
 impl OutputLayout {
-    pub(crate) fn new(schema: &Schema, kept: Vec<usize>, frame: &RecordFrame) -> Self {
+    pub(crate) fn new(schema: &Schema, kept: &[usize], frame: &RecordFrame) -> Self {
         let mut runs: Vec<(usize, usize)> = Vec::new();
         let mut stride = POSITION_BYTES;
-        for &i in &kept {
+        for &i in kept {
             let (from, to) = (schema.offsets[i], schema.offsets[i] + schema.attributes[i].size());
             stride += to - from;
             match runs.last_mut() {
@@ -66,7 +64,7 @@ impl OutputLayout {
         }
         let attributes = kept.iter().map(|&i| schema.attributes[i].clone()).collect();
         let shift = std::array::from_fn(|a| frame.base[a] - frame.cube.min[a]);
-        Self { attributes, kept, stride, runs, shift }
+        Self { attributes, stride, runs, shift }
     }
 
     /// Appends the output form of a stored record.

@@ -54,6 +54,14 @@ pub(crate) struct Accounts {
 }
 
 impl Accounts {
+    /// What the written records would add up to without the changes made on purpose: equals the sum of what was read.
+    pub(crate) fn unaltered(&self) -> Checksum {
+        let mut sum = self.written;
+        sum.merge(&self.dropped);
+        sum.replace(&self.wide, &self.narrow);
+        sum
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         self.written.merge(&other.written);
         self.narrow.merge(&other.narrow);

@@ -13,8 +13,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pointmill_format::{NodeKey, Scratch, Wanted};
 
+pub(crate) use batch::{Grouping, is_eight_bit};
 pub(crate) use partition::Partition;
-pub(crate) use stats::{SourceStats, Stats};
+pub(crate) use stats::{Range, Stats};
 pub(crate) use store::{Segment, Store};
 
 use crate::error::ConvertError;

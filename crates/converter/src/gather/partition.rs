@@ -36,7 +36,7 @@ impl Partition {
         let fits = |v: i64| i32::try_from(v).is_ok();
         let base = if hint.min.iter().chain(&hint.max).all(|v| fits(*v)) { [0; 3] } else { center };
         // Surfaces: cells quadruple with each level.
-        let level = (points / POINTS_PER_CELL).max(1).ilog2().div_ceil(2).clamp(ANCHOR_BITS + 2, 9);
+        let level = (points / POINTS_PER_CELL).max(1).ilog2().div_ceil(2).clamp(ANCHOR_BITS + 2, 8);
         let cube = Cube::around(&hint, lattice);
         let grid = match cube {
             Ok(cube) if !cube.is_aligned() => Grid::OfCube { cube: Box::new(cube), level },
