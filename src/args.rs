@@ -152,6 +152,12 @@ pub(crate) struct ValidateArgs {
     /// Proves that every point of these scans is in the dataset exactly once: files, folders or globs
     #[arg(long, value_name = "INPUT", num_args = 1..)]
     pub(crate) against: Vec<PathBuf>,
+    /// Leaves out spacing, coverage and quality figures, which take most of the time
+    #[arg(long)]
+    pub(crate) fast: bool,
+    /// Worker threads [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<NonZero<u16>>,
     /// Prints one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

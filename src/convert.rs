@@ -8,8 +8,9 @@ use pointmill_converter::{
 };
 
 use crate::args::{Attributes, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, RgbDepthArg, SamplingArg, Target};
-use crate::exit::{Failure, emit, tell};
+use crate::exit::{Failure, emit, tell, to_json};
 use crate::inputs::Inputs;
+use crate::interrupt::stop_flag;
 use crate::progress::Progress;
 use crate::text;
 
@@ -30,21 +31,21 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let plan = plan(args, inputs)?;
     if args.dry_run {
         let estimate = pointmill_converter::estimate(&plan)?;
-        return emit(&if args.json { json(&estimate)? } else { text::estimate(&estimate, &plan) });
+        return emit(&if args.json { to_json(&estimate)? } else { text::estimate(&estimate, &plan) });
     }
     protect_inputs(&plan)?;
     if let Some(file) = &args.report {
         require_folder(file, &plan.output)?;
     }
-    let progress = Progress::new(&args.talk);
+    let progress = Progress::new(&args.talk, Some(stop_flag()));
     let result = pointmill_converter::convert(&plan, &progress);
     let for_people = progress.end();
     let report = result?;
     if let Some(file) = &args.report {
-        fs::write(file, json(&report)?).map_err(|e| Failure::io(file, "writing the report", &e))?;
+        fs::write(file, to_json(&report)?).map_err(|e| Failure::io(file, "writing the report", &e))?;
     }
     if args.json {
-        emit(&json(&report)?)?;
+        emit(&to_json(&report)?)?;
     }
     if for_people {
         text::report(&report, &plan, args.talk.verbose).iter().for_each(|line| tell(line));
@@ -144,11 +145,6 @@ fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
         )));
     }
     Ok(())
-}
-
-fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Internal(format!("internal fault: {e}")))?;
-    Ok(text + "\n")
 }
 
 /// What a report says besides figures: true if every point read is in the dataset or accounted for.

@@ -80,6 +80,12 @@ pub(crate) fn emit(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// Pretty JSON and a line break.
+pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Internal(format!("internal fault: {e}")))?;
+    Ok(text + "\n")
+}
+
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
         let line = error.to_string();

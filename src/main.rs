@@ -8,6 +8,7 @@ mod convert;
 mod exit;
 mod info;
 mod inputs;
+mod interrupt;
 mod measure;
 mod progress;
 mod quantities;
@@ -22,17 +23,15 @@ use exit::Failure;
 
 fn main() -> ExitCode {
     exit::remember_panics();
+    interrupt::watch();
     let args = Args::parse(); // a mistake ends the process here, with exit code 2
-    let quiet_code = |result: Result<(), Failure>| match result {
+    let result = std::panic::catch_unwind(|| run(&args)).unwrap_or_else(|_| Err(exit::last_panic()));
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             failure.tell();
             ExitCode::from(failure.code())
         }
-    };
-    match std::panic::catch_unwind(|| run(&args)) {
-        Ok(result) => quiet_code(result),
-        Err(_) => quiet_code(Err(exit::last_panic())),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -29,7 +29,7 @@ pub(crate) struct Progress {
     face: Face,
     quiet: bool,
     warnings: AtomicU64,
-    stop: &'static AtomicBool,
+    stop: Option<&'static AtomicBool>,
     done: AtomicU64,
     state: Mutex<State>,
 }
@@ -42,7 +42,8 @@ struct State {
 }
 
 impl Progress {
-    pub(crate) fn new(talk: &TalkArgs) -> Self {
+    /// `stop`: what says that the run shall end, if it can.
+    pub(crate) fn new(talk: &TalkArgs, stop: Option<&'static AtomicBool>) -> Self {
         let bar = || Face::Bar(ProgressBar::no_length());
         let face = match talk.progress {
             ProgressArg::Json => Face::Json,
@@ -56,7 +57,7 @@ impl Progress {
             face,
             quiet: talk.quiet,
             warnings: AtomicU64::new(0),
-            stop: stop_flag(),
+            stop,
             done: AtomicU64::new(0),
             state: Mutex::new(State { phase: "start", total: 0, began: now, told: now }),
         }
@@ -98,6 +99,23 @@ impl Progress {
         }
     }
 
+    /// `done` of `total` points of a phase are done; for those who count by themselves, and may be overtaken.
+    pub(crate) fn at(&self, phase: &'static str, done: u64, total: u64) {
+        let (same_phase, same_total) = {
+            let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            (state.phase == phase, state.total == total)
+        };
+        if !same_phase {
+            self.begin(phase, total);
+        } else if !same_total {
+            self.state.lock().unwrap_or_else(PoisonError::into_inner).total = total;
+            if let Face::Bar(bar) = &self.face {
+                bar.set_length(total);
+            }
+        }
+        self.step(done.saturating_sub(self.done.load(Ordering::Relaxed)));
+    }
+
     /// One line that the user should know.
     pub(crate) fn note(&self, line: &str) {
         if self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
@@ -112,7 +130,7 @@ impl Progress {
 
     /// True once Ctrl-C was pressed.
     pub(crate) fn stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
     /// Clears the bar, so that other lines can follow; true if people are to be told of the result.
@@ -193,19 +211,4 @@ fn style(total: u64) -> ProgressStyle {
                 let _ = write!(w, "{} left", seconds(left as f64 / per_second(state)));
             }
         })
-}
-
-/// The flag that Ctrl-C (or a request to end) raises; the second time ends the process at once.
-fn stop_flag() -> &'static AtomicBool {
-    static STOP: AtomicBool = AtomicBool::new(false);
-    static HANDLER: OnceLock<()> = OnceLock::new();
-    HANDLER.get_or_init(|| {
-        // Without a handler the default one ends the process, and the output is safe all the same.
-        let _ = ctrlc::set_handler(|| {
-            if STOP.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-        });
-    });
-    &STOP
 }

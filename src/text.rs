@@ -6,6 +6,7 @@ use std::path::Path;
 use pointmill_converter::{Estimate, Plan, Report};
 use pointmill_format::potree2::Metadata;
 use pointmill_format::{Attribute, Crs, ScanInfo};
+use pointmill_validate::{LevelQuality, Outcome};
 
 use crate::convert::points_left_out;
 use crate::measure::Measured;
@@ -161,6 +162,85 @@ pub(crate) fn dataset(folder: &Path, metadata: &Metadata, levels: &[[u64; 2]], s
         t.row(if i == 0 { "attributes" } else { "" }, attribute_line(&stats.attribute, Some(&ends)));
     }
     t.0
+}
+
+/// What a validation found: checks, quality by level, problems.
+pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> String {
+    let mut out = printable(&dataset.to_string_lossy());
+    let (points, nodes) = (plural(outcome.points, "point"), plural(outcome.nodes, "node"));
+    let _ = writeln!(out, ": {} {}, {points} in {nodes}", outcome.format, outcome.encoding.unwrap_or_default());
+    for check in &outcome.checks {
+        let verdict = match (check.ok, &check.skipped) {
+            (false, _) => "BROKEN",
+            (true, Some(_)) => "skipped",
+            (true, None) => "ok",
+        };
+        let detail = match (&check.skipped, check.ok) {
+            (Some(why), _) => why.clone(),
+            (None, true) => format!("{} checked", count(check.checked)),
+            (None, false) => format!("{} checked, {} found", count(check.checked), count(check.found)),
+        };
+        let _ = writeln!(out, "  {verdict:<8} {:<17} {} ({detail})", check.name.name(), check.promise);
+    }
+    if let Some(against) = &outcome.against {
+        let (expected, found) = (count(against.points_expected), count(against.points_found));
+        let sources = plural(against.sources as u64, "scan");
+        let _ = writeln!(out, "  {sources}: {expected} points expected, {found} found");
+        if !against.attributes_not_in_dataset.is_empty() {
+            let names = against.attributes_not_in_dataset.join(", ");
+            let _ = writeln!(out, "  not compared, for the dataset does not have them: {}", printable(&names));
+        }
+    }
+    out.push_str(&quality(&outcome.quality, verbose));
+    out + &problems(outcome)
+}
+
+/// Distances over the spacing of the level; `–` where there is nothing to measure.
+fn quality(levels: &[LevelQuality], verbose: bool) -> String {
+    let mut out = String::new();
+    if levels.is_empty() {
+        return out;
+    }
+    let _ = writeln!(
+        out,
+        "  level   nodes        points     spacing  nearest: min   mean   largest hole   seam: min   close"
+    );
+    let ratio = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
+    for l in levels {
+        let _ = writeln!(
+            out,
+            "  {:>5} {:>7} {:>13} {:>11.5} {:>13} {:>6} {:>14} {:>11} {:>7}",
+            l.level,
+            count(l.nodes),
+            count(l.points),
+            l.spacing,
+            ratio(l.nearest_min),
+            ratio(l.nearest_mean),
+            ratio(l.largest_hole),
+            ratio(l.seam_min),
+            count(l.seam_close)
+        );
+    }
+    if verbose {
+        out.push_str(
+            "  Distances are over the spacing of the level. Nearest: from a point of an inner node to the next of that\n  \
+             node. Largest hole: from a point of a deeper level to the next one drawn. Seam: between inner nodes; close:\n  \
+             points that have one of another node nearer than the spacing.\n",
+        );
+    }
+    out
+}
+
+/// One problem a line.
+pub(crate) fn problems(outcome: &Outcome) -> String {
+    let mut out = String::new();
+    outcome.problems.iter().for_each(|problem| out += &(printable(&problem.to_string()) + "\n"));
+    let errors: u64 = outcome.checks.iter().map(|check| check.found + check.warnings).sum();
+    let hidden = errors.saturating_sub(outcome.problems.len() as u64);
+    if hidden > 0 {
+        let _ = writeln!(out, "and {} more", count(hidden));
+    }
+    out
 }
 
 /// A column: its name, type, and range where it is known.

@@ -81,7 +81,9 @@ impl Check {
     pub const fn promise(self) -> &'static str {
         match self {
             Self::Metadata => "metadata.json is complete, in range and consistent",
-            Self::Hierarchy => "every hierarchy chunk holds exactly its records; chunks are disjoint and none is orphaned",
+            Self::Hierarchy => {
+                "every hierarchy chunk holds exactly its records; chunks are disjoint and none is orphaned"
+            }
             Self::NodeTypes => "a node is of type 0 exactly if it has children",
             Self::EmptyNodes => "no node is empty",
             Self::Depth => "hierarchy.depth is the deepest level that has a node",

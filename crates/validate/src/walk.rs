@@ -233,9 +233,7 @@ impl Walk<'_> {
         let Task { tree, geometry, .. } = self.task;
         let key = tree.nodes[index].key;
         let limits = geometry.around(key, coverage::REACH * geometry.spacing_at(key.level));
-        let near = |p: &[i32; 3]| {
-            (0..3).all(|axis| (limits[axis].0..=limits[axis].1).contains(&i64::from(p[axis])))
-        };
+        let near = |p: &[i32; 3]| (0..3).all(|axis| (limits[axis].0..=limits[axis].1).contains(&i64::from(p[axis])));
         let mut sites: Vec<Site> = Vec::new();
         if let Some(own) = own {
             sites.extend(own.iter().map(|p| Site { position: *p, origin: Origin::Own }));

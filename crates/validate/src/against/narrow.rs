@@ -186,10 +186,7 @@ impl Pass<'_> {
     }
 
     /// Hands over every record of both sides: side (0: sources), block, index, node.
-    fn each_record(
-        &self,
-        work: impl Fn(usize, &Block, usize, Option<NodeKey>) + Sync,
-    ) -> Result<(), ReadError> {
+    fn each_record(&self, work: impl Fn(usize, &Block, usize, Option<NodeKey>) + Sync) -> Result<(), ReadError> {
         let rules = &self.against.sums.rules;
         self.against.sources.each_block(rules, self.context.progress, "differences", |block, at| {
             if let Some(rgb) = rules.rgb {
