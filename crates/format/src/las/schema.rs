@@ -1,0 +1,192 @@
+//! Which columns a point format has, and where their bits lie in a record (LAS 1.4 R15 §2.6).
+
+use super::extra_bytes::ExtraBytes;
+use super::header::Header;
+use super::records::Records;
+use crate::{Attribute, AttributeType};
+
+/// Where the values of a column lie in a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Field {
+    /// Bytes from the start of the record.
+    pub(super) at: usize,
+    /// Values a point, side by side.
+    pub(super) elements: usize,
+    /// How the bytes become values.
+    pub(super) kind: FieldKind,
+    /// What must be decompressed for it (formats 6–10).
+    pub(super) layer: Layer,
+}
+
+/// How the bytes of a field become the values of its column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FieldKind {
+    /// `byte >> shift & mask`, a `uint8`.
+    Bits { shift: u8, mask: u8 },
+    /// Little-endian values of the attribute's type, `elements` of them side by side.
+    Plain,
+}
+
+/// The part of a layered LAZ chunk that a field comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Layer {
+    /// Comes with x and y.
+    Base,
+    Classification,
+    Flags,
+    Intensity,
+    ScanAngle,
+    UserData,
+    PointSource,
+    GpsTime,
+    Rgb,
+    Nir,
+    ExtraBytes,
+}
+
+/// The columns beside the position, in order, each with its place in the record.
+#[derive(Debug, Default)]
+pub(super) struct Schema {
+    pub(super) attributes: Vec<Attribute>,
+    pub(super) fields: Vec<Field>,
+}
+
+/// Names that an extra-bytes attribute may not take, whatever the point format: what is joined to a cloud later may
+/// have the standard one.
+const STANDARD_NAMES: [&str; 17] = [
+    "position",
+    "rgb",
+    "rgba",
+    "nir",
+    "intensity",
+    "return number",
+    "number of returns",
+    "classification flags",
+    "classification",
+    "scan angle rank",
+    "user data",
+    "scan angle",
+    "point source id",
+    "gps-time",
+    "scanner channel",
+    "scan direction flag",
+    "edge of flight line",
+];
+
+impl Schema {
+    /// Standard columns first (colour before the rest), then the documented extra bytes.
+    pub(super) fn new(header: &Header, records: &Records, warnings: &mut Vec<String>) -> Self {
+        let mut schema = Self::default();
+        schema.colours(header.point_format);
+        if header.point_format < 6 {
+            schema.legacy(header.point_format);
+        } else {
+            schema.extended();
+        }
+        if matches!(header.point_format, 4 | 5 | 9 | 10) {
+            warnings.push(format!(
+                "point format {} carries waveform packets; they are not read, all other values are",
+                header.point_format
+            ));
+        }
+        schema.extra_bytes(header, records, warnings);
+        schema
+    }
+
+    fn colours(&mut self, point_format: u8) {
+        let at = match point_format {
+            2 => 20,
+            3 | 5 => 28,
+            7 | 8 | 10 => 30,
+            _ => return,
+        };
+        self.plain("rgb", AttributeType::UInt16, 3, at, Layer::Rgb);
+        if matches!(point_format, 8 | 10) {
+            self.plain("nir", AttributeType::UInt16, 1, at + 6, Layer::Nir);
+        }
+    }
+
+    /// Formats 0–5.
+    fn legacy(&mut self, point_format: u8) {
+        self.plain("intensity", AttributeType::UInt16, 1, 12, Layer::Base);
+        self.bits("return number", 14, 0, 0b111, Layer::Base);
+        self.bits("number of returns", 14, 3, 0b111, Layer::Base);
+        // synthetic, key-point, withheld: the order that LAS 1.4 gives them
+        self.bits("classification flags", 15, 5, 0b111, Layer::Base);
+        self.bits("classification", 15, 0, 0b1_1111, Layer::Base);
+        self.plain("scan angle rank", AttributeType::Int8, 1, 16, Layer::Base);
+        self.bits("user data", 17, 0, 0xff, Layer::Base);
+        self.plain("point source id", AttributeType::UInt16, 1, 18, Layer::Base);
+        if matches!(point_format, 1 | 3 | 4 | 5) {
+            self.plain("gps-time", AttributeType::Float64, 1, 20, Layer::Base);
+        }
+        self.bits("scan direction flag", 14, 6, 1, Layer::Base);
+        self.bits("edge of flight line", 14, 7, 1, Layer::Base);
+    }
+
+    /// Formats 6–10.
+    fn extended(&mut self) {
+        self.plain("intensity", AttributeType::UInt16, 1, 12, Layer::Intensity);
+        self.bits("return number", 14, 0, 0b1111, Layer::Base);
+        self.bits("number of returns", 14, 4, 0b1111, Layer::Base);
+        self.bits("classification flags", 15, 0, 0b1111, Layer::Flags);
+        self.bits("classification", 16, 0, 0xff, Layer::Classification);
+        self.bits("user data", 17, 0, 0xff, Layer::UserData);
+        self.plain("scan angle", AttributeType::Int16, 1, 18, Layer::ScanAngle);
+        self.plain("point source id", AttributeType::UInt16, 1, 20, Layer::PointSource);
+        self.plain("gps-time", AttributeType::Float64, 1, 22, Layer::GpsTime);
+        self.bits("scanner channel", 15, 4, 0b11, Layer::Base);
+        self.bits("scan direction flag", 15, 6, 1, Layer::Flags);
+        self.bits("edge of flight line", 15, 7, 1, Layer::Flags);
+    }
+
+    fn extra_bytes(&mut self, header: &Header, records: &Records, warnings: &mut Vec<String>) {
+        for ExtraBytes { mut attribute, at } in ExtraBytes::read_all(header, records, warnings) {
+            attribute.name = self.free_name(&attribute.name);
+            let (elements, kind) = (attribute.elements, FieldKind::Plain);
+            self.push(attribute, Field { at, elements, kind, layer: Layer::ExtraBytes });
+        }
+    }
+
+    /// `wanted`, or with a suffix if it is empty or taken.
+    fn free_name(&self, wanted: &str) -> String {
+        let base = if wanted.is_empty() { "extra bytes" } else { wanted };
+        let taken =
+            |name: &str| STANDARD_NAMES.contains(&name) || self.attributes.iter().any(|a| a.name.as_str() == name);
+        if !taken(base) {
+            return base.to_owned();
+        }
+        (2..).map(|i| format!("{base} {i}")).find(|name| !taken(name)).unwrap_or_default()
+    }
+
+    fn bits(&mut self, name: &str, at: usize, shift: u8, mask: u8, layer: Layer) {
+        let kind = FieldKind::Bits { shift, mask };
+        self.push(Attribute::new(name, AttributeType::UInt8, 1), Field { at, elements: 1, kind, layer });
+    }
+
+    fn plain(&mut self, name: &str, ty: AttributeType, elements: usize, at: usize, layer: Layer) {
+        self.push(Attribute::new(name, ty, elements), Field { at, elements, kind: FieldKind::Plain, layer });
+    }
+
+    fn push(&mut self, attribute: Attribute, field: Field) {
+        self.attributes.push(attribute);
+        self.fields.push(field);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_taken_or_empty_name_gets_a_number() {
+        let mut schema = Schema::default();
+        for expected in ["echo", "echo 2", "echo 3"] {
+            let name = schema.free_name("echo");
+            assert_eq!(name, expected);
+            schema.bits(&name, 0, 0, 1, Layer::Base);
+        }
+        assert_eq!(schema.free_name("intensity"), "intensity 2");
+        assert_eq!(schema.free_name(""), "extra bytes");
+    }
+}
