@@ -4,17 +4,18 @@ use std::io;
 
 use brotlic::{BrotliDecoder, CompressionMode, Quality, WindowSize, decode::DecoderInfo};
 
-/// Compresses `input` into one stream (window 22, generic mode) that replaces the contents of `out`.
+/// Compresses `input` into one stream (window 22, generic mode) and appends it to `out`.
 pub(super) fn compress(input: &[u8], quality: u8, out: &mut Vec<u8>) -> io::Result<()> {
     let quality = Quality::new(quality).map_err(io::Error::other)?;
     let window = WindowSize::new(22).map_err(io::Error::other)?;
-    let bound = brotlic::compress_bound(input.len(), quality)
+    // The bound holds for qualities from 2 up; below, the library stores what does not fit it uncompressed.
+    let bound = brotlic::compress_bound(input.len(), Quality::best())
         .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "a payload too large for Brotli"))?;
-    out.clear();
-    out.resize(bound, 0);
-    let len = brotlic::compress(input, out, quality, window, CompressionMode::Generic).map_err(io::Error::other)?;
-    out.truncate(len);
-    Ok(())
+    let start = out.len();
+    out.resize(start + bound, 0);
+    let result = brotlic::compress(input, &mut out[start..], quality, window, CompressionMode::Generic);
+    out.truncate(start + *result.as_ref().unwrap_or(&0));
+    result.map(|_| ()).map_err(io::Error::other)
 }
 
 /// Why a stream did not give what it should.

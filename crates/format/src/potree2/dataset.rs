@@ -13,8 +13,8 @@ use super::{ByteSource, DatasetFile, Encoding, Folder, Metadata, Node, NodePoint
 /// More JSON than this is not metadata.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
 
-/// No Brotli stream gives more bytes than this for one of its own: 16 MiB is the longest run that a command of a few
-/// bytes can ask for.
+/// No Brotli stream gives more bytes than this for each of its own: a meta-block gives at most 16 MiB and has a header
+/// of more than a byte (RFC 7932, section 9.2).
 const MAX_BROTLI_RATIO: u64 = 1 << 24;
 
 /// Default of [`Dataset::set_max_node_bytes`].

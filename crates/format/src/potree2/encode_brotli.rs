@@ -18,7 +18,7 @@ pub struct BrotliScratch {
     planar: Vec<u8>,
 }
 
-/// Encodes the points of one node; replaces the contents of `out` with one complete Brotli stream (window 22).
+/// Encodes the points of one node as one complete Brotli stream (window 22) and appends it to `out`.
 ///
 /// `records`: DEFAULT records of `attributes`, interleaved, in any order; `position` (int32 × 3) is the first
 /// attribute, an `rgb` is uint16 × 3. `quality`: 0–11. The points are sorted by the Morton code of their position, then

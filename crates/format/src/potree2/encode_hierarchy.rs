@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::NodeKey;
 
 use super::morton::breadth_first_rank;
-use super::{NodeRecord, NodeType};
+use super::{Node, NodeRecord, NodeType};
 
 /// A node to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +19,13 @@ pub struct NodeEntry {
     pub byte_offset: u64,
     /// Bytes of its payload.
     pub byte_size: u64,
+}
+
+impl From<&Node> for NodeEntry {
+    fn from(node: &Node) -> Self {
+        let NodeRecord { points, byte_offset, byte_size, .. } = node.record;
+        Self { key: node.key, points, byte_offset, byte_size }
+    }
 }
 
 /// What [`encode_hierarchy`] made.

@@ -1,0 +1,195 @@
+//! What is written is read back, and does not depend on the order in which it was handed over.
+
+use std::collections::{BTreeSet, HashSet};
+
+use pointmill_format::NodeKey;
+use pointmill_format::potree2::{
+    BrotliScratch, Encoding, Memory, Node, NodeEntry, NodePoints, encode_brotli, encode_hierarchy,
+};
+
+use crate::util::{Random, attributes, metadata, one_node, open};
+
+/// Entries for `leaves` and all their ancestors, with numbers of their own, shuffled.
+fn entries(leaves: impl IntoIterator<Item = NodeKey>, random: &mut Random) -> Vec<NodeEntry> {
+    let ancestors = |leaf: NodeKey| std::iter::successors(Some(leaf), |key| key.parent());
+    let keys: BTreeSet<NodeKey> = leaves.into_iter().flat_map(ancestors).chain([NodeKey::ROOT]).collect();
+    let mut entries: Vec<NodeEntry> = keys
+        .into_iter()
+        .map(|key| NodeEntry {
+            key,
+            points: random.next() as u32,
+            byte_offset: random.next(),
+            byte_size: random.next(),
+        })
+        .collect();
+    shuffle(&mut entries, random);
+    entries
+}
+
+fn shuffle<T>(items: &mut [T], random: &mut Random) {
+    for i in (1..items.len()).rev() {
+        items.swap(i, random.below(i + 1));
+    }
+}
+
+fn name(name: &str) -> NodeKey {
+    NodeKey::from_name(name).unwrap()
+}
+
+/// Encodes, reads back all nodes and checks everything that the format promises; returns what was read, and the bytes.
+fn round_trip(entries: &mut [NodeEntry], step: u32) -> (Vec<Node>, Vec<u8>) {
+    let encoded = encode_hierarchy(entries, step);
+    let json = metadata(Encoding::Default, encoded.first_chunk_size, attributes()).to_json();
+    let files = Memory { metadata: json.into_bytes(), hierarchy: encoded.bytes.clone(), octree: Vec::new() };
+    let dataset = open(&files).unwrap();
+    let nodes = dataset.read_hierarchy().unwrap();
+
+    let found: Vec<NodeEntry> = nodes.iter().map(NodeEntry::from).collect();
+    assert_eq!(found, entries, "step {step}"); // encode_hierarchy sorted them
+    assert_eq!(encoded.depth, nodes.iter().map(|n| u32::from(n.key.level)).max().unwrap());
+    let border = |n: &&Node| n.key.level > 0 && u32::from(n.key.level) % step == 0 && n.record.child_mask != 0;
+    let proxies = nodes.iter().filter(border).count();
+    assert_eq!(encoded.bytes.len(), 22 * (nodes.len() + proxies), "step {step}: a chunk too many, or too few");
+    let keys: HashSet<NodeKey> = nodes.iter().map(|n| n.key).collect();
+    for Node { key, record } in &nodes {
+        let mask = (0..8).filter(|c| key.child(*c).is_some_and(|child| keys.contains(&child)));
+        assert_eq!(record.child_mask, mask.fold(0, |m, c| m | 1 << c), "{key}");
+        assert_eq!(record.node_type, u8::from(record.child_mask == 0), "{key}");
+    }
+    (nodes, encoded.bytes)
+}
+
+#[test]
+fn a_root_alone_is_one_leaf() {
+    let (nodes, bytes) = round_trip(&mut entries([], &mut Random(1)), 4);
+    assert_eq!((nodes.len(), bytes.len()), (1, 22));
+}
+
+#[test]
+fn chains_down_to_the_deepest_level_come_back_for_every_step_size() {
+    for digit in ["0", "7"] {
+        let leaf = name(&format!("r{}", digit.repeat(31)));
+        for step in [1, 2, 4, 5, 30, 31, 32] {
+            let (nodes, _) = round_trip(&mut entries([leaf], &mut Random(2)), step);
+            assert_eq!(nodes.len(), 32);
+        }
+    }
+}
+
+#[test]
+fn a_node_at_the_border_of_a_chunk_is_a_proxy_only_if_it_has_children() {
+    let leaves = ["r0000", "r0001", "r00020", "r7777", "r77777777"].map(name);
+    let mut entries = entries(leaves, &mut Random(3));
+    let (_, bytes) = round_trip(&mut entries, 4);
+    // r · r0 r7 · r00 r77 · r000 r777 · r0000 r0001 r0002* r7777*, then r0002 r00020, then r7777 … r77777777
+    let types: Vec<u8> = bytes.chunks_exact(22).map(|r| r[0]).collect();
+    assert_eq!(types, [0, 0, 0, 0, 0, 0, 0, 1, 1, 2, 2, 0, 1, 0, 0, 0, 0, 1]);
+}
+
+#[test]
+fn random_trees_come_back_and_their_bytes_do_not_depend_on_order() {
+    for seed in 0..30 {
+        let random = &mut Random(seed);
+        let count = 1 + random.below(300);
+        let deepest = 1 + random.below(31);
+        let leaf = |random: &mut Random| {
+            let level = 1 + random.below(deepest);
+            // Few digits near the root, so that paths share ancestors.
+            let digits = |l| if l < 6 { random.below(2) } else { random.below(8) };
+            (0..level).map(digits).fold(NodeKey::ROOT, |key, d| key.child(d as u8).unwrap())
+        };
+        let leaves: Vec<NodeKey> = (0..count).map(|_| leaf(random)).collect();
+        let mut entries = entries(leaves, random);
+        for step in [1, 2, 3, 4, 7] {
+            let (_, bytes) = round_trip(&mut entries, step);
+            shuffle(&mut entries, random);
+            assert_eq!(bytes, encode_hierarchy(&mut entries, step).bytes, "seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn ancestors_that_are_missing_are_added_without_points() {
+    let entry = |key| NodeEntry { key, points: 5, byte_offset: 7, byte_size: 9 };
+    let encoded = encode_hierarchy(&mut [entry(name("r12")), entry(name("r7"))], 4);
+    let points: Vec<(u8, u8)> = encoded.bytes.chunks_exact(22).map(|r| (r[1], r[2])).collect();
+    assert_eq!(points, [(0b1000_0010, 0), (0b100, 0), (0, 5), (0, 5)]); // r, r1, r7, r12: mask, points
+    assert_eq!(encode_hierarchy(&mut [], 4).bytes.len(), 22);
+}
+
+/// DEFAULT records with pseudo-random bytes; every fourth position is one of few, so that positions repeat, and every
+/// eighth record is one of few.
+fn records(points: usize, random: &mut Random) -> Vec<u8> {
+    let record_len: usize = attributes().iter().map(|a| a.size()).sum();
+    let mut bytes = Vec::new();
+    for _ in 0..points {
+        let kind = random.below(8);
+        let mut few = Random(random.below(3) as u64);
+        let (position, rest) = (kind < 2, kind < 1);
+        for at in 0..record_len {
+            let repeat = if at < 12 { position } else { rest };
+            bytes.push(if repeat { few.next() } else { random.next() } as u8);
+        }
+    }
+    bytes
+}
+
+fn read(files: &Memory) -> NodePoints {
+    let dataset = open(files).unwrap();
+    let mut points = NodePoints::default();
+    dataset.read_points(&dataset.read_hierarchy().unwrap()[0], &mut points).unwrap();
+    points
+}
+
+#[test]
+fn brotli_payloads_hold_the_same_points_as_default_ones_in_morton_order() {
+    let mut scratch = BrotliScratch::default();
+    for seed in 0..40 {
+        let random = &mut Random(seed);
+        let count = random.below(2000);
+        let bytes = records(count, random);
+        let record_len = bytes.len().checked_div(count).unwrap_or(1);
+
+        let mut payload = Vec::new();
+        encode_brotli(&attributes(), &bytes, (seed % 7) as u8, &mut scratch, &mut payload).unwrap();
+        let brotli = read(&one_node(Encoding::Brotli, attributes(), count as u32, payload.clone()));
+
+        // The same order, worked out bit by bit.
+        let mut sorted: Vec<&[u8]> = bytes.chunks_exact(record_len).collect();
+        sorted.sort_by_key(|r| (morton_bit_by_bit(r), r.to_vec()));
+        let default = read(&one_node(Encoding::Default, attributes(), count as u32, sorted.concat()));
+        assert_eq!(brotli.positions, default.positions, "seed {seed}");
+        assert_eq!(debug_columns(&brotli), debug_columns(&default), "seed {seed}");
+
+        shuffle(&mut sorted, random);
+        let mut again = b"before".to_vec();
+        encode_brotli(&attributes(), &sorted.concat(), (seed % 7) as u8, &mut scratch, &mut again).unwrap();
+        assert_eq!(again, [b"before", &payload[..]].concat(), "seed {seed}: the order of the records shows");
+    }
+}
+
+/// NaN is among the random numbers, so columns are compared by what they print.
+fn debug_columns(points: &NodePoints) -> String {
+    format!("{:?}", points.columns)
+}
+
+/// The 96-bit code of a record's position: bit k of x at 3k, of y at 3k+1, of z at 3k+2.
+fn morton_bit_by_bit(record: &[u8]) -> u128 {
+    let axis = |a: usize| u32::from_le_bytes(record[4 * a..4 * a + 4].try_into().unwrap());
+    let bit = |a: usize, k: usize| u128::from(axis(a) >> k & 1) << (3 * k + a);
+    (0..32).flat_map(|k| (0..3).map(move |a| bit(a, k))).sum()
+}
+
+#[test]
+fn attributes_and_lengths_that_cannot_be_encoded_are_refused() {
+    let encode = |attributes: &[_], records: &[u8], quality| {
+        encode_brotli(attributes, records, quality, &mut BrotliScratch::default(), &mut Vec::new())
+            .map_err(|e| e.to_string())
+    };
+    let all = attributes();
+    assert!(encode(&all, &[], 4).is_ok());
+    assert!(encode(&all[1..], &[], 4).is_err(), "no position");
+    assert!(encode(&[], &[], 4).is_err(), "no attributes");
+    assert!(encode(&all, &[0; 13], 4).is_err(), "half a record");
+    assert!(encode(&all, &[], 12).is_err(), "quality");
+}

@@ -1,0 +1,95 @@
+//! What the tests share.
+
+use std::path::PathBuf;
+
+use pointmill_format::potree2::{
+    AttributeStats, Dataset, DatasetFile, Encoding, Memory, Metadata, NodeEntry, encode_hierarchy,
+};
+use pointmill_format::{Aabb, Attribute, AttributeType, Lattice, NodeKey, ReadError};
+
+/// The folder of the golden dataset in that encoding.
+pub(crate) fn golden(encoding: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/potree2").join(encoding)
+}
+
+/// A folder of the corpus of real files, which lies beside the project where it is at hand.
+pub(crate) fn corpus(path: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/corpus").join(path);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("skipped: {} is not there", path.display());
+    None
+}
+
+/// A dataset's files in memory, to be changed.
+pub(crate) fn load(folder: &std::path::Path) -> Memory {
+    let [metadata, hierarchy, octree] = DatasetFile::ALL.map(|f| std::fs::read(folder.join(f.name())).unwrap());
+    Memory { metadata, hierarchy, octree }
+}
+
+/// A small generator of pseudo-random numbers (SplitMix64): same seed, same numbers, everywhere.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// A number below `end`.
+    pub(crate) fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+}
+
+/// `position`, `rgb` and one attribute of every other kind of size.
+pub(crate) fn attributes() -> Vec<Attribute> {
+    use AttributeType as T;
+    vec![
+        Attribute::new("position", T::Int32, 3),
+        Attribute::new("rgb", T::UInt16, 3),
+        Attribute::new("classification", T::UInt8, 1),
+        Attribute::new("scan angle", T::Int16, 1),
+        Attribute::new("gps-time", T::Float64, 1),
+        Attribute::new("normal", T::Float32, 3),
+        Attribute::new("id", T::UInt32, 1),
+    ]
+}
+
+/// Metadata for files that a test makes: a cube of 2^31 units.
+pub(crate) fn metadata(encoding: Encoding, first_chunk_size: u64, attributes: Vec<Attribute>) -> Metadata {
+    let stats = |attribute: Attribute| {
+        let range = vec![0.0; attribute.elements];
+        AttributeStats { attribute, min: range.clone(), max: range, histogram: None }
+    };
+    Metadata {
+        name: "made".into(),
+        description: String::new(),
+        points: 0,
+        projection: String::new(),
+        first_chunk_size,
+        step_size: 4,
+        depth: 0,
+        lattice: Lattice { scale: [0.001; 3], offset: [0.0; 3] },
+        spacing: 1.0,
+        cube: Aabb { min: [0.0; 3], max: [2_147_483.648; 3] },
+        encoding,
+        attributes: attributes.into_iter().map(stats).collect(),
+        extra: serde_json::Map::new(),
+    }
+}
+
+/// A dataset of a root alone with that payload.
+pub(crate) fn one_node(encoding: Encoding, attributes: Vec<Attribute>, points: u32, octree: Vec<u8>) -> Memory {
+    let root = NodeEntry { key: NodeKey::ROOT, points, byte_offset: 0, byte_size: octree.len() as u64 };
+    let hierarchy = encode_hierarchy(&mut [root], 4).bytes;
+    Memory { metadata: metadata(encoding, 22, attributes).to_json().into_bytes(), hierarchy, octree }
+}
+
+pub(crate) fn open(files: &Memory) -> Result<Dataset, ReadError> {
+    Dataset::from_source(Box::new(files.clone()))
+}
