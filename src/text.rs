@@ -216,7 +216,7 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
             l.spacing,
             ratio(l.nearest_min),
             ratio(l.nearest_mean),
-            ratio(l.largest_hole),
+            if l.largest_hole.is_some_and(|hole| hole >= 4.0) { "≥ 4".to_owned() } else { ratio(l.largest_hole) },
             ratio(l.seam_min),
             count(l.seam_close)
         );
