@@ -81,7 +81,9 @@ impl Check {
     pub const fn promise(self) -> &'static str {
         match self {
             Self::Metadata => "metadata.json is complete, in range and consistent",
-            Self::Hierarchy => "every hierarchy chunk holds exactly its records; chunks are disjoint and none is orphaned",
+            Self::Hierarchy => {
+                "every hierarchy chunk holds exactly its records; chunks are disjoint and none is orphaned"
+            }
             Self::NodeTypes => "a node is of type 0 exactly if it has children",
             Self::EmptyNodes => "no node is empty",
             Self::Depth => "hierarchy.depth is the deepest level that has a node",
@@ -293,6 +295,16 @@ impl Findings {
         if slot.kept.len() > 2 * self.cap + 16 {
             shorten(&mut slot.kept, self.cap);
         }
+    }
+
+    /// Counts `n` more errors of a check without listing them.
+    pub(crate) fn more(&self, check: Check, n: u64) {
+        self.slot(check).found += n;
+    }
+
+    /// How many findings of a check a report lists.
+    pub(crate) fn cap(&self) -> usize {
+        self.cap
     }
 
     /// Counts `n` more things that `check` looked at.

@@ -54,7 +54,11 @@ const POSITION_RULES: [PositionRule; 4] = [
     PositionRule { truncated: false, shift: 0, words: "rounded to the nearest step" },
     PositionRule { truncated: true, shift: 0, words: "truncated instead of rounded" },
     PositionRule { truncated: false, shift: 1, words: "shifted by +1 step on every axis" },
-    PositionRule { truncated: true, shift: 1, words: "truncated instead of rounded, and shifted by +1 step on every axis" },
+    PositionRule {
+        truncated: true,
+        shift: 1,
+        words: "truncated instead of rounded, and shifted by +1 step on every axis",
+    },
 ];
 
 /// How colours are stored.
@@ -277,16 +281,18 @@ impl Against {
         positions: &[PositionRule],
     ) -> Vec<(PositionRule, Colour, Sum)> {
         let mut candidates = Vec::new();
-        let scaled: Vec<Colour> = files
-            .iter()
-            .map(|f| if f.wide.load(Relaxed) { Colour::AsIs } else { Colour::Times257 })
-            .collect();
+        let scaled: Vec<Colour> =
+            files.iter().map(|f| if f.wide.load(Relaxed) { Colour::AsIs } else { Colour::Times257 }).collect();
         let choices = if self.sums.rules.foreign { vec![colours, &scaled[..]] } else { vec![colours] };
         for (p, rule) in positions.iter().enumerate() {
             for choice in &choices {
                 let mut sum = Sum::default();
                 for (file, colour) in files.iter().zip(*choice) {
-                    sum.add(file.sums.lock().map_or_else(|e| e.into_inner()[*colour as usize][p], |s| s[*colour as usize][p]));
+                    sum.add(
+                        file.sums
+                            .lock()
+                            .map_or_else(|e| e.into_inner()[*colour as usize][p], |s| s[*colour as usize][p]),
+                    );
                 }
                 candidates.push((*rule, choice.first().copied().unwrap_or(Colour::AsIs), sum));
             }

@@ -163,7 +163,15 @@ impl Source {
         }
     }
 
-    fn fill_axis(&self, batch: &PointBatch, start: usize, points: usize, axis: usize, rules: &Rules, block: &mut Block) {
+    fn fill_axis(
+        &self,
+        batch: &PointBatch,
+        start: usize,
+        points: usize,
+        axis: usize,
+        rules: &Rules,
+        block: &mut Block,
+    ) {
         let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
         let mut take = |i: usize, world: f64| {
             let (rounded, truncated) = rules.quantize(axis, world);

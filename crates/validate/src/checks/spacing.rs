@@ -63,8 +63,7 @@ pub(crate) fn pairs(key: NodeKey, grid: &Grid, geometry: &Geometry, tally: &Tall
 pub(crate) fn cells(key: NodeKey, positions: &[[i32; 3]], geometry: &Geometry, findings: &Findings) {
     findings.checked(Check::Spacing, positions.len() as u64);
     let node = geometry.node_box(key);
-    let mut cells: Vec<u32> =
-        positions.iter().filter_map(|p| geometry.sample_cell(key.level, &node, *p)).collect();
+    let mut cells: Vec<u32> = positions.iter().filter_map(|p| geometry.sample_cell(key.level, &node, *p)).collect();
     cells.sort_unstable();
     let surplus = cells.windows(2).filter(|w| w[0] == w[1]).count() as u64;
     if surplus > 0 {
