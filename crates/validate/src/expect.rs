@@ -155,10 +155,8 @@ mod tests {
             })
         }
         let values = [0, 1, 2, 3, 7, 8, 65_535, 65_536, 1 << 27, i32::MAX, -1];
-        let points: Vec<[i32; 3]> = values
-            .iter()
-            .flat_map(|&x| values.iter().flat_map(move |&y| values.iter().map(move |&z| [x, y, z])))
-            .collect();
+        let n = values.len();
+        let points: Vec<[i32; 3]> = (0..n.pow(3)).map(|i| [i, i / n, i / n / n].map(|i| values[i % n])).collect();
         for a in &points {
             for b in points.iter().step_by(7) {
                 assert_eq!(morton_cmp(*a, *b), code(*a).cmp(&code(*b)), "{a:?} {b:?}");

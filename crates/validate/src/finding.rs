@@ -297,6 +297,16 @@ impl Findings {
         }
     }
 
+    /// Counts `n` more errors of a check without listing them.
+    pub(crate) fn more(&self, check: Check, n: u64) {
+        self.slot(check).found += n;
+    }
+
+    /// How many findings of a check a report lists.
+    pub(crate) fn cap(&self) -> usize {
+        self.cap
+    }
+
     /// Counts `n` more things that `check` looked at.
     pub(crate) fn checked(&self, check: Check, n: u64) {
         self.checked[check as usize].fetch_add(n, Ordering::Relaxed);

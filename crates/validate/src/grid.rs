@@ -100,7 +100,7 @@ impl Grid {
         best
     }
 
-    /// Squares of the distances from site `of` to the nearest other [`Origin::Own`] site and the nearest
+    /// Squares of the distances from site `of`, an [`Origin::Own`] one, to the nearest other [`Origin::Own`] site and the nearest
     /// [`Origin::Neighbour`]: exact for the first up to `rings` ≥ 1 cell sides, for the second up to one.
     pub(crate) fn nearest_by_origin(&self, of: usize, rings: i32) -> (f64, f64) {
         let (mut own, mut neighbour) = (f64::INFINITY, f64::INFINITY);
@@ -206,7 +206,7 @@ mod tests {
             assert_eq!(grid.nearest_squared(p, 20), best);
             assert_eq!(grid.any_within(p, 64.0), best <= 64.0);
         }
-        for (i, site) in grid.sites().iter().enumerate() {
+        for (i, site) in grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own) {
             let nearest = |origin| {
                 let others = grid.sites().iter().enumerate().filter(|(j, s)| *j != i && s.origin == origin);
                 others.map(|(_, s)| grid.distance_squared(site.position, s.position)).fold(f64::INFINITY, f64::min)

@@ -124,7 +124,9 @@ impl Walk<'_> {
             children.into_par_iter().for_each(|child| self.visit(child, None));
             return;
         }
-        if let Some(positions) = &positions {
+        // An inner node keeps one point even where its parent would have taken all: no node is empty.
+        let kept_for_form = !children.is_empty() && node.record.points == 1;
+        if let (Some(positions), false) = (&positions, kept_for_form) {
             self.check_coverage(node, positions, above);
         }
         if children.is_empty() {
@@ -147,7 +149,7 @@ impl Walk<'_> {
             let (key, findings) = (node.key, task.findings);
             findings.checked(Check::Payloads, 1);
             node_points::coordinates(key, &points.positions, findings);
-            node_points::boxes(key, &points.positions, &task.geometry, findings);
+            let all_inside = node_points::boxes(key, &points.positions, &task.geometry, findings);
             if task.dataset.metadata().encoding == Encoding::Brotli {
                 node_points::order(key, &points.positions, findings);
             }
@@ -157,7 +159,16 @@ impl Walk<'_> {
             if let Some(sums) = task.sums {
                 sums.add_node(points);
             }
-            task.neighbourhoods.then(|| transpose(points))
+            task.neighbourhoods.then(|| {
+                let mut positions = transpose(points);
+                if !all_inside {
+                    // a stray point has its finding; judged by the neighbourhood of this node it would get more
+                    let limits = task.geometry.node_limits(key);
+                    let inside = |p: &[i32; 3]| (0..3).all(|a| (limits[a].0..=limits[a].1).contains(&i64::from(p[a])));
+                    positions.retain(inside);
+                }
+                Arc::new(positions)
+            })
         });
         let done = self.done.fetch_add(u64::from(node.record.points), Relaxed) + u64::from(node.record.points);
         (task.progress)(Progress { phase: "points", done, total: self.total });
@@ -206,7 +217,7 @@ impl Walk<'_> {
         if let Some(positions) = self.cache.get(index) {
             return Some(positions);
         }
-        let positions = self.with_points(&self.task.tree.nodes[index], transpose).ok()?;
+        let positions = Arc::new(self.with_points(&self.task.tree.nodes[index], transpose).ok()?);
         self.cache.put(index, positions.clone());
         Some(positions)
     }
@@ -252,7 +263,7 @@ impl Walk<'_> {
     }
 }
 
-fn transpose(points: &NodePoints) -> Positions {
+fn transpose(points: &NodePoints) -> Vec<[i32; 3]> {
     let [xs, ys, zs] = &points.positions;
-    Arc::new(xs.iter().zip(ys).zip(zs).map(|((x, y), z)| [*x, *y, *z]).collect())
+    xs.iter().zip(ys).zip(zs).map(|((x, y), z)| [*x, *y, *z]).collect()
 }

@@ -4,7 +4,7 @@
 //! Second pass: the whole records of as many differing buckets as memory allows, from both sides; what is left after
 //! equal ones cancel is missing, surplus, or has another attribute.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Mutex;
 
 use pointmill_format::potree2::{Node, NodePoints};
@@ -131,41 +131,50 @@ impl Pass<'_> {
             }
         })?;
         let balances = balances.into_inner().unwrap_or_default();
-        let mut by_position: HashMap<[u64; 3], (Vec<Row>, Vec<Row>)> = HashMap::new();
+        let mut by_position: BTreeMap<[u64; 3], (Vec<Row>, Vec<Row>)> = BTreeMap::new();
         for (row, balance) in balances {
             let expected = if rules.drop_duplicates { balance.sources.min(1) } else { balance.sources };
             let surplus = balance.dataset - expected;
+            if surplus == 0 {
+                continue;
+            }
             let lists = by_position.entry([row[0], row[1], row[2]]).or_default();
             let list = if surplus > 0 { &mut lists.1 } else { &mut lists.0 };
             list.extend((0..surplus.unsigned_abs()).map(|_| (row.clone(), balance.node)));
         }
+        let mut listed = 0;
         for (mut missing, mut surplus) in by_position.into_values() {
             missing.sort_unstable();
             surplus.sort_unstable();
-            self.report(&missing, &surplus);
+            let findings = self.report(&missing, &surplus);
+            // positions come in order, so the same ones are listed every time
+            let left = self.context.findings.cap().saturating_sub(listed).min(findings.len());
+            listed += left;
+            self.context.findings.more(Check::Against, (findings.len() - left) as u64);
+            findings.into_iter().take(left).for_each(|f| self.context.findings.push(f));
         }
         Ok(())
     }
 
     /// Differences at one position: what is there on both sides has other attributes, the rest is missing or surplus.
-    fn report(&self, missing: &[Row], surplus: &[Row]) {
+    fn report(&self, missing: &[Row], surplus: &[Row]) -> Vec<Finding> {
         let attributes = &self.against.sums.rules.attributes;
-        let findings = self.context.findings;
         let both = missing.len().min(surplus.len());
-        for ((expected, _), (found, node)) in missing.iter().zip(surplus).take(both) {
+        let mut findings = Vec::new();
+        for ((expected, _), (found, node)) in missing.iter().zip(surplus) {
             for (name, expected, found) in differing_attributes(attributes, expected, found) {
                 let finding = Finding::new(Check::Against, format!("{name} of a point"), expected, found);
                 findings.push(blame(finding, *node).points(1));
             }
         }
         for (row, _) in &missing[both..] {
-            let finding = Finding::new(Check::Against, "missing point", self.describe(row), Value::Null);
-            findings.push(finding.points(1));
+            findings.push(Finding::new(Check::Against, "missing point", self.describe(row), Value::Null).points(1));
         }
         for (row, node) in &surplus[both..] {
             let finding = Finding::new(Check::Against, "surplus point", Value::Null, self.describe(row));
             findings.push(blame(finding, *node).points(1));
         }
+        findings
     }
 
     /// World position and attributes of a record.

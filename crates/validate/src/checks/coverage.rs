@@ -1,4 +1,7 @@
 //! No holes: whatever the level at which a viewer stops, something is drawn near every point of the cloud.
+//!
+//! The only point of an inner node is exempt. Where points lie farther apart than the spacing, an inner node would hand
+//! all of its points to its parent; but nodes must not be empty, so it keeps one, which is then missing above.
 
 use pointmill_format::NodeKey;
 use serde_json::json;

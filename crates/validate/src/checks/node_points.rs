@@ -22,8 +22,9 @@ pub(crate) fn coordinates(key: NodeKey, positions: &[Vec<i32>; 3], findings: &Fi
     }
 }
 
-/// Dequantised points in the closed box of their node, within [`Geometry::tolerance`].
-pub(crate) fn boxes(key: NodeKey, positions: &[Vec<i32>; 3], geometry: &Geometry, findings: &Findings) {
+/// Dequantised points in the closed box of their node, within [`Geometry::tolerance`]. Negative coordinates are
+/// [`coordinates`]'s business. True if all are inside.
+pub(crate) fn boxes(key: NodeKey, positions: &[Vec<i32>; 3], geometry: &Geometry, findings: &Findings) -> bool {
     let [xs, ys, zs] = positions;
     findings.checked(Check::Boxes, xs.len() as u64);
     // Limits beyond 32 bits cannot be exceeded by what is stored in 32.
@@ -31,10 +32,11 @@ pub(crate) fn boxes(key: NodeKey, positions: &[Vec<i32>; 3], geometry: &Geometry
         (first.clamp(i64::from(i32::MIN), i64::from(i32::MAX)), last.clamp(i64::from(i32::MIN), i64::from(i32::MAX)))
     });
     let [x, y, z] = limits.map(|(first, last)| first as i32..=last as i32);
-    let outside = |x_: i32, y_: i32, z_: i32| !(x.contains(&x_) & y.contains(&y_) & z.contains(&z_));
+    let outside =
+        |px: i32, py: i32, pz: i32| (px | py | pz) >= 0 && !(x.contains(&px) & y.contains(&py) & z.contains(&pz));
     let count: u64 = xs.iter().zip(ys).zip(zs).map(|((x, y), z)| u64::from(outside(*x, *y, *z))).sum();
     if count == 0 {
-        return;
+        return true;
     }
     let node = geometry.node_box(key);
     let example = xs.iter().zip(ys).zip(zs).find(|((x, y), z)| outside(**x, **y, **z));
@@ -42,6 +44,7 @@ pub(crate) fn boxes(key: NodeKey, positions: &[Vec<i32>; 3], geometry: &Geometry
     let world = world.map(|q| [0, 1, 2].map(|axis| geometry.world(axis, q[axis])));
     let expected = json!({ "min": node.min, "max": node.max });
     findings.push(Finding::new(Check::Boxes, "position", expected, json!(world)).at(key).points(count));
+    false
 }
 
 /// Ascending Morton codes, which BROTLI promises.
