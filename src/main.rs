@@ -1,2 +1,44 @@
-//! The command line of pointmill.
-fn main() {}
+//! The command line of pointmill: what was typed becomes a `Plan`, a run, and an exit code.
+//!
+//! Results go to standard output, everything else to standard error; a failure is one line there. `README.md` has the
+//! table of exit codes, `exit.rs` is where they come from.
+
+mod args;
+mod convert;
+mod exit;
+mod info;
+mod inputs;
+mod interrupt;
+mod measure;
+mod progress;
+mod quantities;
+mod text;
+mod validate;
+
+use std::process::ExitCode;
+
+use args::{Args, Command};
+use clap::Parser as _;
+use exit::Failure;
+
+fn main() -> ExitCode {
+    exit::remember_panics();
+    interrupt::watch();
+    let args = Args::parse(); // a mistake ends the process here, with exit code 2
+    let result = std::panic::catch_unwind(|| run(&args)).unwrap_or_else(|_| Err(exit::last_panic()));
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.tell();
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<(), Failure> {
+    match &args.command {
+        Command::Convert(convert) => convert::run(convert),
+        Command::Validate(validate) => validate::run(validate),
+        Command::Info(info) => info::run(info),
+    }
+}

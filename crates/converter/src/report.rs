@@ -1,6 +1,6 @@
 //! The account of a run: what went in, what came out, what it cost. Serialises to the JSON of `--report`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -46,7 +46,8 @@ pub struct Report {
 /// One input.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct InputReport {
-    /// The file.
+    /// The file; serialised as text, with U+FFFD for what is no Unicode in its name.
+    #[serde(serialize_with = "lossy")]
     pub path: PathBuf,
     /// Its kind, for people.
     pub format: String,
@@ -62,6 +63,11 @@ pub struct InputReport {
     pub crs: String,
     /// 8 or 16 where the file has colour.
     pub rgb_depth: Option<u8>,
+}
+
+/// File names need not be Unicode, JSON must be.
+fn lossy<S: serde::Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
 }
 
 /// The lattice and the cube.

@@ -26,3 +26,8 @@ pub use lattice::Lattice;
 pub use node_key::NodeKey;
 pub use points::{Column, PointBatch, Positions};
 pub use scan::{Crs, MAX_BATCH_POINTS, Piece, Scan, ScanInfo, Scratch, Wanted};
+
+/// The example in the README compiles, or the tests fail.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

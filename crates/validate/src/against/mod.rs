@@ -1,0 +1,302 @@
+//! Is every point of the sources in the dataset exactly once?
+//!
+//! Both sides are sums, modulo 2¹²⁸, of a hash of each record: integer position on the dataset's lattice, then the
+//! bits of every attribute of the dataset. Equal sums and counts mean equal multisets, in any order, whatever the
+//! size, in constant memory; an accident has a chance of about 2⁻¹²⁸ (the hash does not withstand someone who builds
+//! collisions on purpose). Unequal sums are narrowed down in further passes ([`narrow`]).
+
+pub(crate) mod block;
+mod narrow;
+mod rules;
+mod sources;
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use pointmill_format::ReadError;
+use pointmill_format::potree2::{Dataset, Metadata, NodePoints};
+use serde::Serialize;
+
+use crate::ProgressFn;
+use crate::finding::{Check, Finding, Findings};
+use crate::tree::Tree;
+use block::{BLOCK_POINTS, Block, append_words};
+use rules::{RgbDepth, Rules};
+use sources::Sources;
+
+/// What the comparison with the sources found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AgainstSummary {
+    /// Files compared with.
+    pub sources: usize,
+    /// Points that the sources hold after the filters recorded in the dataset.
+    pub points_expected: u64,
+    /// Points of the dataset.
+    pub points_found: u64,
+    /// Sum of the hashes of the expected records, hexadecimal; the set's under `duplicates: drop`.
+    pub sum_expected: String,
+    /// Sum of the hashes of the dataset's records, hexadecimal.
+    pub sum_found: String,
+    /// Attributes of the sources that the dataset does not have, so they were not compared.
+    pub attributes_not_in_dataset: Vec<String>,
+}
+
+/// How positions become integers; the first is right, the others are known faults of other converters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct PositionRule {
+    truncated: bool,
+    shift: i64,
+    words: &'static str,
+}
+
+const POSITION_RULES: [PositionRule; 4] = [
+    PositionRule { truncated: false, shift: 0, words: "rounded to the nearest step" },
+    PositionRule { truncated: true, shift: 0, words: "truncated instead of rounded" },
+    PositionRule { truncated: false, shift: 1, words: "shifted by +1 step on every axis" },
+    PositionRule {
+        truncated: true,
+        shift: 1,
+        words: "truncated instead of rounded, and shifted by +1 step on every axis",
+    },
+];
+
+/// How colours are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Colour {
+    AsIs,
+    Times257,
+}
+
+const COLOURS: [Colour; 2] = [Colour::AsIs, Colour::Times257];
+
+impl Colour {
+    #[inline]
+    fn apply(self, rgb: [u64; 3]) -> [u64; 3] {
+        match self {
+            Self::AsIs => rgb,
+            Self::Times257 => rgb.map(|v| v.min(255) * 257),
+        }
+    }
+}
+
+/// Count and sum of hashes of records.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Sum {
+    count: u64,
+    hash: u128,
+}
+
+impl Sum {
+    fn add(&mut self, other: Self) {
+        self.count += other.count;
+        self.hash = self.hash.wrapping_add(other.hash);
+    }
+}
+
+/// The side of the dataset, filled while its nodes are walked.
+pub(crate) struct Sums {
+    rules: Rules,
+    total: Mutex<(Sum, Block)>,
+    blocks: Mutex<Vec<Block>>,
+}
+
+impl Sums {
+    /// The sum so far.
+    fn total(&self) -> Sum {
+        self.total.lock().map_or_else(|e| e.into_inner().0, |t| t.0)
+    }
+
+    /// Takes in the records of a node.
+    pub(crate) fn add_node(&self, points: &NodePoints) {
+        let mut block = self.blocks.lock().map_or(None, |mut b| b.pop()).unwrap_or_default();
+        let mut sum = Sum::default();
+        each_block_of_node(points, &self.rules, &mut block, |block| {
+            block.start_hashes(&self.rules.attributes, self.rules.rgb);
+            for i in 0..block.len() {
+                let hash = block.hash(i, rgb_of(block, &self.rules, i), block.position(i));
+                sum.add(Sum { count: 1, hash });
+            }
+        });
+        if let Ok(mut total) = self.total.lock() {
+            total.0.add(sum);
+        }
+        if let Ok(mut blocks) = self.blocks.lock() {
+            blocks.push(block);
+        }
+    }
+}
+
+/// The colour of a record, if the dataset has one.
+#[inline]
+fn rgb_of(block: &Block, rules: &Rules, i: usize) -> Option<[u64; 3]> {
+    let words = &block.words[rules.rgb?];
+    words.get(3 * i..3 * i + 3)?.try_into().ok()
+}
+
+/// Hands over a node's records in blocks.
+fn each_block_of_node(points: &NodePoints, rules: &Rules, block: &mut Block, mut work: impl FnMut(&mut Block)) {
+    for start in (0..points.len()).step_by(BLOCK_POINTS) {
+        let n = (points.len() - start).min(BLOCK_POINTS);
+        block.reset(rules.attributes.len());
+        block.keep.resize(n, true);
+        for (to, from) in block.positions.iter_mut().zip(&points.positions) {
+            to.extend(from[start..start + n].iter().map(|v| i64::from(*v)));
+        }
+        for (i, attribute) in rules.attributes.iter().enumerate() {
+            let column = points.columns.get(i).map(|c| (c, attribute.elements));
+            append_words(column, start, n, attribute, &mut block.words[i]);
+        }
+        work(block);
+    }
+}
+
+/// Both sides, ready to be compared.
+pub(crate) struct Against {
+    sources: Sources,
+    pub(crate) sums: Sums,
+}
+
+/// What one file adds up to, by colour and position rule.
+struct FileSums {
+    sums: Mutex<[[Sum; POSITION_RULES.len()]; COLOURS.len()]>,
+    /// A colour value above 255 was seen.
+    wide: AtomicBool,
+}
+
+/// Where the comparison reads the dataset again.
+pub(crate) struct Context<'a> {
+    pub(crate) dataset: &'a Dataset,
+    pub(crate) tree: &'a Tree,
+    pub(crate) findings: &'a Findings,
+    pub(crate) progress: &'a ProgressFn<'a>,
+    /// What later passes may use.
+    pub(crate) memory_bytes: u64,
+}
+
+impl Against {
+    /// Opens the sources.
+    ///
+    /// # Errors
+    /// A file that cannot be opened or is not a scan.
+    pub(crate) fn open(paths: &[PathBuf], metadata: &Metadata) -> Result<Self, ReadError> {
+        let rules = Rules::new(metadata);
+        let sources = Sources::open(paths, &rules)?;
+        Ok(Self { sources, sums: Sums { rules, total: Mutex::default(), blocks: Mutex::default() } })
+    }
+
+    /// Decodes the sources and compares. The dataset's side must be complete.
+    ///
+    /// # Errors
+    /// A source that cannot be decoded to its end: nothing can be proven then.
+    pub(crate) fn compare(&self, context: &Context<'_>) -> Result<AgainstSummary, ReadError> {
+        let rules = &self.sums.rules;
+        let position_rules = if rules.foreign { &POSITION_RULES[..] } else { &POSITION_RULES[..1] };
+        let files = self.sum_sources(position_rules, context)?;
+        let found = self.sums.total();
+        let colours = self.colour_rules(&files);
+        let candidates = self.candidates(&files, &colours, position_rules);
+        let expected = candidates[0].2;
+        context.findings.checked(Check::Against, found.count);
+        let matching = candidates.iter().find(|(_, _, sum)| *sum == found);
+        match matching {
+            Some((rule, _, _)) if !rules.drop_duplicates => {
+                if *rule != POSITION_RULES[0] {
+                    let (right, is) = (POSITION_RULES[0].words, rule.words);
+                    let finding = Finding::new(Check::Against, "positions", right, is);
+                    context.findings.push(finding.points(found.count));
+                }
+            }
+            _ => narrow::narrow(self, &colours, context)?,
+        }
+        for (name, count) in self.sources.deviating() {
+            let expected = "one value throughout, as attributesDropped says";
+            let finding = Finding::new(Check::Against, format!("dropped attribute {name}"), expected, "other values");
+            context.findings.push(finding.points(count));
+        }
+        Ok(AgainstSummary {
+            sources: self.sources.list.len(),
+            points_expected: expected.count,
+            points_found: found.count,
+            sum_expected: format!("{:032x}", expected.hash),
+            sum_found: format!("{:032x}", found.hash),
+            attributes_not_in_dataset: self.sources.not_in_dataset(rules),
+        })
+    }
+
+    /// One pass over the sources: sums by file, for every colour and position rule in question.
+    fn sum_sources(&self, positions: &[PositionRule], context: &Context<'_>) -> Result<Vec<FileSums>, ReadError> {
+        let rules = &self.sums.rules;
+        let files: Vec<FileSums> = self
+            .sources
+            .list
+            .iter()
+            .map(|_| FileSums { sums: Mutex::default(), wide: AtomicBool::new(rules.rgb.is_none()) })
+            .collect();
+        self.sources.each_block(rules, context.progress, "sources", |block, at| {
+            let file = &files[at];
+            if let Some(rgb) = rules.rgb
+                && block.words[rgb].iter().any(|v| *v > 255)
+            {
+                file.wide.store(true, Relaxed);
+            }
+            block.start_hashes(&rules.attributes, rules.rgb);
+            // once a wide value was seen, the other reading of this file's colours is out of the question
+            let both = !file.wide.load(Relaxed) || rules.rgb_depth == RgbDepth::Eight;
+            let colours = &COLOURS[..if both { 2 } else { 1 }];
+            let mut sums = [[Sum::default(); POSITION_RULES.len()]; COLOURS.len()];
+            for i in (0..block.len()).filter(|i| block.keep[*i]) {
+                let rgb = rgb_of(block, rules, i);
+                for (colour, sums) in colours.iter().zip(&mut sums) {
+                    let rgb = rgb.map(|v| colour.apply(v));
+                    for (rule, sum) in positions.iter().zip(sums) {
+                        let from = if rule.truncated { &block.truncated } else { &block.positions };
+                        let position = [0, 1, 2].map(|axis| from[axis][i] + rule.shift);
+                        sum.add(Sum { count: 1, hash: block.hash(i, rgb, position) });
+                    }
+                }
+            }
+            if let Ok(mut total) = file.sums.lock() {
+                total.iter_mut().flatten().zip(sums.iter().flatten()).for_each(|(a, b)| a.add(*b));
+            }
+        })?;
+        Ok(files)
+    }
+
+    /// How the colours of each file are expected to be stored.
+    fn colour_rules(&self, files: &[FileSums]) -> Vec<Colour> {
+        let rule = |file: &FileSums| match self.sums.rules.rgb_depth {
+            RgbDepth::Eight => Colour::Times257,
+            RgbDepth::Auto if !file.wide.load(Relaxed) && !self.sums.rules.foreign => Colour::Times257,
+            _ => Colour::AsIs,
+        };
+        files.iter().map(rule).collect()
+    }
+
+    /// What the dataset may add up to; the first is right. Foreign datasets may have 8-bit colours either way.
+    fn candidates(
+        &self,
+        files: &[FileSums],
+        colours: &[Colour],
+        positions: &[PositionRule],
+    ) -> Vec<(PositionRule, Colour, Sum)> {
+        let mut candidates = Vec::new();
+        let scaled: Vec<Colour> =
+            files.iter().map(|f| if f.wide.load(Relaxed) { Colour::AsIs } else { Colour::Times257 }).collect();
+        let choices = if self.sums.rules.foreign { vec![colours, &scaled[..]] } else { vec![colours] };
+        for (p, rule) in positions.iter().enumerate() {
+            for choice in &choices {
+                let mut sum = Sum::default();
+                for (file, colour) in files.iter().zip(*choice) {
+                    sum.add(
+                        file.sums
+                            .lock()
+                            .map_or_else(|e| e.into_inner()[*colour as usize][p], |s| s[*colour as usize][p]),
+                    );
+                }
+                candidates.push((*rule, choice.first().copied().unwrap_or(Colour::AsIs), sum));
+            }
+        }
+        candidates
+    }
+}

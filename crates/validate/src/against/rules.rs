@@ -1,0 +1,100 @@
+//! What was asked of the conversion, as the dataset's metadata records it, applied by own code.
+
+use pointmill_format::potree2::Metadata;
+use pointmill_format::{Aabb, Attribute};
+use serde_json::Value;
+
+/// Meaning of 16-bit colours of the sources.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RgbDepth {
+    /// A file whose values are all ≤ 255 has them stored times 257.
+    Auto,
+    /// Stored times 257.
+    Eight,
+    /// Stored as they are.
+    Sixteen,
+}
+
+/// How the records of the sources become those of the dataset.
+#[derive(Debug, Clone)]
+pub(crate) struct Rules {
+    /// The dataset's attributes beside the position, in order.
+    pub(crate) attributes: Vec<Attribute>,
+    /// Where `rgb` (uint16 × 3) stands among them.
+    pub(crate) rgb: Option<usize>,
+    /// World coordinate of the job lattice's integer 0.
+    pub(crate) lattice_offset: [f64; 3],
+    pub(crate) scale: [f64; 3],
+    /// The job lattice's coordinate of the dataset's integer 0.
+    pub(crate) shift: [i64; 3],
+    pub(crate) rgb_depth: RgbDepth,
+    /// Source coordinates, closed.
+    pub(crate) bounds: Option<Aabb>,
+    pub(crate) classes: Option<Vec<u8>>,
+    /// Indices in the file that are multiples of it; 1: all.
+    pub(crate) every: u64,
+    /// Equal records count once.
+    pub(crate) drop_duplicates: bool,
+    /// Not written by pointmill: known deviations of other converters are tried too.
+    pub(crate) foreign: bool,
+    /// Attributes that were left out because they have one value throughout: name and that value.
+    pub(crate) constants: Vec<(String, Vec<f64>)>,
+}
+
+impl Rules {
+    /// Reads the key `pointmill` of the metadata, if it is there.
+    pub(crate) fn new(metadata: &Metadata) -> Self {
+        let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
+        let attributes: Vec<Attribute> =
+            metadata.attributes.iter().map(|a| a.attribute.clone()).filter(|a| a.name != "position").collect();
+        let rgb = attributes.iter().position(|a| a.name == "rgb" && a.elements == 3);
+        let lattice_offset = vector(&own["latticeOffset"]).unwrap_or(metadata.lattice.offset);
+        let scale = metadata.lattice.scale;
+        let shift =
+            std::array::from_fn(|a| ((metadata.lattice.offset[a] - lattice_offset[a]) / scale[a]).round() as i64);
+        let bounds = match numbers(&own["filter"]["bounds"]).as_deref() {
+            Some(&[x0, y0, z0, x1, y1, z1]) => Some(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] }),
+            _ => None,
+        };
+        let classes = numbers(&own["filter"]["classes"]).map(|c| c.iter().map(|v| *v as u8).collect());
+        Self {
+            attributes,
+            rgb,
+            lattice_offset,
+            scale,
+            shift,
+            rgb_depth: match own["rgbDepth"].as_str() {
+                Some("8") => RgbDepth::Eight,
+                Some("16") => RgbDepth::Sixteen,
+                _ => RgbDepth::Auto,
+            },
+            bounds,
+            classes,
+            every: own["filter"]["every"].as_u64().unwrap_or(1).max(1),
+            drop_duplicates: own["duplicates"] == "drop",
+            foreign: own.is_null(),
+            constants: constants(&own["attributesDropped"]),
+        }
+    }
+
+    /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
+    #[inline]
+    pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
+        let steps = (world - self.lattice_offset[axis]) / self.scale[axis];
+        (steps.round() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
+    }
+}
+
+fn constants(dropped: &Value) -> Vec<(String, Vec<f64>)> {
+    let Some(map) = dropped.as_object() else { return Vec::new() };
+    let values = |v: &Value| v.as_f64().map(|v| vec![v]).or_else(|| numbers(v));
+    map.iter().filter_map(|(name, value)| Some((name.clone(), values(value)?))).collect()
+}
+
+fn numbers(value: &Value) -> Option<Vec<f64>> {
+    value.as_array()?.iter().map(Value::as_f64).collect()
+}
+
+fn vector(value: &Value) -> Option<[f64; 3]> {
+    numbers(value)?.try_into().ok()
+}

@@ -1,0 +1,207 @@
+//! The scans a dataset was made from, read as blocks of records in the dataset's terms.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+
+use pointmill_format::{Column, PointBatch, Positions, ReadError, Scan, Scratch, Wanted, las, with_column};
+use rayon::prelude::*;
+
+use super::block::{BLOCK_POINTS, Block, append_words};
+use super::rules::Rules;
+use crate::{Progress, ProgressFn};
+
+/// A scan, and where its columns go.
+pub(crate) struct Source {
+    scan: Box<dyn Scan>,
+    /// For each attribute of the dataset: the column of the scan with its name, and its elements.
+    columns: Vec<Option<(usize, usize)>>,
+    /// The column that the filter by class looks at.
+    classification: Option<usize>,
+    /// Columns that must have one value, by the metadata: column, elements, value.
+    constants: Vec<(usize, Vec<f64>)>,
+    /// Points whose value differs from the constant, by entry of `constants`.
+    deviating: Vec<AtomicU64>,
+}
+
+/// All scans.
+pub(crate) struct Sources {
+    pub(crate) list: Vec<Source>,
+    /// (source, piece), all of them.
+    pieces: Vec<(usize, usize)>,
+    pub(crate) points: u64,
+}
+
+impl Sources {
+    /// Opens the files; decodes nothing.
+    pub(crate) fn open(paths: &[PathBuf], rules: &Rules) -> Result<Self, ReadError> {
+        let list = paths.iter().map(|p| Ok(Source::new(las::open(p)?, rules))).collect::<Result<Vec<_>, _>>()?;
+        let pieces = list.iter().enumerate();
+        let pieces = pieces.flat_map(|(i, s)| (0..s.scan.pieces().len()).map(move |piece| (i, piece))).collect();
+        let points = list.iter().flat_map(|s| s.scan.pieces()).map(|p| p.points).sum();
+        Ok(Self { list, pieces, points })
+    }
+
+    /// Names of columns of the scans that the dataset does not have, sorted.
+    pub(crate) fn not_in_dataset(&self, rules: &Rules) -> Vec<String> {
+        let names = self.list.iter().flat_map(|s| &s.scan.info().attributes).map(|a| &a.name);
+        let mut names: Vec<String> =
+            names.filter(|name| rules.attributes.iter().all(|a| a.name != **name)).cloned().collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// Attributes that were dropped as constant but are not: name, points that differ.
+    pub(crate) fn deviating(&self) -> Vec<(String, u64)> {
+        let mut all: Vec<(String, u64)> = Vec::new();
+        for source in &self.list {
+            for ((column, _), count) in source.constants.iter().zip(&source.deviating) {
+                let name = &source.scan.info().attributes[*column].name;
+                match all.iter_mut().find(|(n, _)| n == name) {
+                    Some((_, sum)) => *sum += count.load(Relaxed),
+                    None => all.push((name.clone(), count.load(Relaxed))),
+                }
+            }
+        }
+        all.retain(|(_, count)| *count > 0);
+        all
+    }
+
+    /// Decodes everything in parallel and hands it over in blocks, with the index of the source and whether the block
+    /// has a colour value above 255. `work` is called from many threads.
+    pub(crate) fn each_block(
+        &self,
+        rules: &Rules,
+        progress: &ProgressFn<'_>,
+        phase: &'static str,
+        work: impl Fn(&mut Block, usize) + Sync,
+    ) -> Result<(), ReadError> {
+        let idle: Mutex<Vec<(Scratch, Block)>> = Mutex::default();
+        let done = AtomicU64::new(0);
+        let failed = AtomicBool::new(false);
+        self.pieces.par_iter().with_max_len(1).try_for_each(|&(at, piece)| {
+            if failed.load(Relaxed) {
+                return Ok(()); // another piece brings the error
+            }
+            let source = &self.list[at];
+            let pop = idle.lock().map_or(None, |mut idle| idle.pop());
+            let (mut scratch, mut block) = pop.unwrap_or_default();
+            let wanted = source.wanted();
+            let result = source.scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
+                for start in (0..batch.len()).step_by(BLOCK_POINTS) {
+                    let points = (batch.len() - start).min(BLOCK_POINTS);
+                    source.fill(batch, start, points, rules, &mut block);
+                    work(&mut block, at);
+                }
+                let batch_points = batch.len() as u64;
+                let done = done.fetch_add(batch_points, Relaxed) + batch_points;
+                progress(Progress { phase, done, total: self.points });
+                true
+            });
+            if let Ok(mut idle) = idle.lock() {
+                idle.push((scratch, block));
+            }
+            if result.is_err() {
+                failed.store(true, Relaxed);
+            }
+            result
+        })
+    }
+}
+
+impl Source {
+    fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
+        let info = scan.info();
+        let find = |name: &str| info.attributes.iter().position(|a| a.name == name);
+        let columns =
+            rules.attributes.iter().map(|a| find(&a.name).map(|i| (i, info.attributes[i].elements))).collect();
+        let classification = rules.classes.is_some().then(|| find("classification")).flatten();
+        let constants: Vec<_> =
+            rules.constants.iter().filter_map(|(name, value)| Some((find(name)?, value.clone()))).collect();
+        let deviating = constants.iter().map(|_| AtomicU64::new(0)).collect();
+        Self { columns, classification, constants, deviating, scan }
+    }
+
+    fn wanted(&self) -> Wanted {
+        let mut wanted = Wanted::positions(self.scan.info());
+        let columns = self.columns.iter().flatten().map(|c| c.0);
+        for i in columns.chain(self.classification).chain(self.constants.iter().map(|c| c.0)) {
+            wanted.0[i] = true;
+        }
+        wanted
+    }
+
+    /// Brings points of a batch into the dataset's terms.
+    fn fill(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
+        block.reset(rules.attributes.len());
+        block.keep.resize(points, true);
+        for axis in 0..3 {
+            self.fill_axis(batch, start, points, axis, rules, block);
+        }
+        for (i, attribute) in rules.attributes.iter().enumerate() {
+            let column = self.columns[i].map(|(c, elements)| (&batch.columns[c], elements));
+            append_words(column, start, points, attribute, &mut block.words[i]);
+        }
+        if rules.every > 1 {
+            let first = batch.first_point + start as u64;
+            for (i, keep) in block.keep.iter_mut().enumerate() {
+                *keep &= (first + i as u64) % rules.every == 0;
+            }
+        }
+        if let Some(classes) = &rules.classes {
+            let column = self.classification.map(|i| &batch.columns[i]);
+            for (i, keep) in block.keep.iter_mut().enumerate() {
+                // a scan without classes has never been classified: class 0
+                let class = column.map_or(0, |c| with_column!(c, v => v[start + i] as u8));
+                *keep &= classes.contains(&class);
+            }
+        }
+        for ((column, value), deviating) in self.constants.iter().zip(&self.deviating) {
+            let count = count_deviating(&batch.columns[*column], start, value, &block.keep);
+            deviating.fetch_add(count, Relaxed);
+        }
+    }
+
+    fn fill_axis(
+        &self,
+        batch: &PointBatch,
+        start: usize,
+        points: usize,
+        axis: usize,
+        rules: &Rules,
+        block: &mut Block,
+    ) {
+        let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
+        let mut take = |i: usize, world: f64| {
+            let (rounded, truncated) = rules.quantize(axis, world);
+            block.positions[axis].push(rounded);
+            if rules.foreign {
+                block.truncated[axis].push(truncated);
+            }
+            block.keep[i] &= bounds.0 <= world && world <= bounds.1; // false for NaN
+        };
+        match (&batch.positions, self.scan.info().lattice) {
+            (Positions::Quantized(values), Some(lattice)) => {
+                let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
+                let values = values[axis][start..start + points].iter().enumerate();
+                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset));
+            }
+            (Positions::World(values), _) => {
+                values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v));
+            }
+            (Positions::Quantized(values), None) => {
+                let values = values[axis][start..start + points].iter().enumerate();
+                values.for_each(|(i, v)| take(i, f64::from(*v)));
+            }
+        }
+    }
+}
+
+fn count_deviating(column: &Column, start: usize, value: &[f64], keep: &[bool]) -> u64 {
+    let elements = value.len().max(1);
+    with_column!(column, values => {
+        let points = values.chunks_exact(elements).skip(start).zip(keep);
+        points.filter(|(v, keep)| **keep && v.iter().zip(value).any(|(v, c)| *v as f64 != *c)).count() as u64
+    })
+}

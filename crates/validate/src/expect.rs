@@ -1,0 +1,173 @@
+//! Boxes, spacing and order as the format defines them (`docs/formats/potree2.md`), worked out here.
+//!
+//! The format crate knows how to do some of this too. It is repeated on purpose: a validator that borrows the
+//! arithmetic of the program it checks agrees with its mistakes.
+
+use std::cmp::Ordering;
+
+use pointmill_format::{Aabb, Lattice, NodeKey};
+
+/// Cells a side of an inner node, at most one point each under grid and random sampling.
+pub(crate) const CELLS: f64 = 128.0;
+
+/// What the metadata says about space.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Geometry {
+    pub(crate) lattice: Lattice,
+    pub(crate) cube: Aabb,
+    pub(crate) spacing: f64,
+}
+
+impl Geometry {
+    /// World coordinate of a stored one, as renderers compute it.
+    pub(crate) fn world(&self, axis: usize, stored: i64) -> f64 {
+        stored as f64 * self.lattice.scale[axis] + self.lattice.offset[axis]
+    }
+
+    /// The coarsest step of the lattice, world units: the tolerance of distances.
+    pub(crate) fn step(&self) -> f64 {
+        self.lattice.scale.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Spacing of a level, world units.
+    pub(crate) fn spacing_at(&self, level: u8) -> f64 {
+        self.spacing / f64::from(level).exp2()
+    }
+
+    /// Rounding allowed when world coordinates are compared: 4 ulps of the cube's largest coordinate on that axis.
+    ///
+    /// A dequantised coordinate carries two roundings (product, sum), a box bound one a level in the worst case, of
+    /// which only those of the last, smallest, halvings can fall below one ulp of the corner.
+    pub(crate) fn tolerance(&self, axis: usize) -> f64 {
+        let largest = self.cube.min[axis].abs().max(self.cube.max[axis].abs());
+        4.0 * (largest.next_up() - largest)
+    }
+
+    /// The closed box of a node, by halving the cube.
+    pub(crate) fn node_box(&self, key: NodeKey) -> Aabb {
+        let Aabb { mut min, mut max } = self.cube;
+        for up in (0..key.level).rev() {
+            for (axis, cell) in [key.x, key.y, key.z].into_iter().enumerate() {
+                let mid = min[axis] + (max[axis] - min[axis]) / 2.0;
+                let bound = if cell >> up & 1 == 1 { &mut min } else { &mut max };
+                bound[axis] = mid;
+            }
+        }
+        Aabb { min, max }
+    }
+
+    /// The stored coordinates that lie in a node's box, within [`Self::tolerance`]: first and last per axis.
+    pub(crate) fn node_limits(&self, key: NodeKey) -> [(i64, i64); 3] {
+        let node = self.node_box(key);
+        std::array::from_fn(|axis| {
+            let tolerance = self.tolerance(axis);
+            (self.first_at(axis, node.min[axis] - tolerance), self.last_at(axis, node.max[axis] + tolerance))
+        })
+    }
+
+    /// The smallest stored coordinate whose world coordinate is at least `bound`.
+    fn first_at(&self, axis: usize, bound: f64) -> i64 {
+        let guess = ((bound - self.lattice.offset[axis]) / self.lattice.scale[axis]).floor() as i64;
+        // the quotient is rounded, so its neighbours are tried too
+        (-2..=2).map(|d| guess.saturating_add(d)).find(|q| self.world(axis, *q) >= bound).unwrap_or(guess)
+    }
+
+    /// The largest stored coordinate whose world coordinate is at most `bound`.
+    fn last_at(&self, axis: usize, bound: f64) -> i64 {
+        let guess = ((bound - self.lattice.offset[axis]) / self.lattice.scale[axis]).ceil() as i64;
+        (-2..=2).map(|d| guess.saturating_sub(d)).find(|q| self.world(axis, *q) <= bound).unwrap_or(guess)
+    }
+
+    /// The stored coordinates within `reach` (world units) of a node's box: first and last per axis.
+    pub(crate) fn around(&self, key: NodeKey, reach: f64) -> [(i64, i64); 3] {
+        let node = self.node_box(key);
+        std::array::from_fn(|axis| {
+            (self.first_at(axis, node.min[axis] - reach), self.last_at(axis, node.max[axis] + reach))
+        })
+    }
+
+    /// The cell of the node's 128³ grid that a stored position falls into, or `None` if it lies so close to the
+    /// border of a cell that rounding decides (within one lattice step, unless the cells are whole lattice steps).
+    pub(crate) fn sample_cell(&self, level: u8, node: &Aabb, stored: [i32; 3]) -> Option<u32> {
+        let mut cell = 0;
+        for axis in 0..3 {
+            let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / CELLS;
+            let in_steps = side / self.lattice.scale[axis];
+            let origin = (node.min[axis] - self.lattice.offset[axis]) / self.lattice.scale[axis];
+            let whole = (in_steps - in_steps.round()).abs() < 1e-6 && (origin - origin.round()).abs() < 1e-3;
+            let u = if whole && in_steps >= 0.5 {
+                (f64::from(stored[axis]) - origin.round()) / in_steps.round()
+            } else {
+                let u = (f64::from(stored[axis]) - origin) / in_steps;
+                if (u - u.round()).abs() * in_steps <= 1.0 {
+                    return None;
+                }
+                u
+            };
+            cell = cell << 8 | (u.floor().clamp(0.0, CELLS - 1.0) as u32);
+        }
+        Some(cell)
+    }
+}
+
+/// Compares Morton codes (bit k of x is bit 3k, of y 3k + 1, of z 3k + 2) without building them: the axis whose
+/// coordinates differ in the highest bit decides, z before y before x.
+///
+/// Source: T. M. Chan, "A minimalist's implementation of an approximate nearest neighbor algorithm in fixed
+/// dimensions", 2006.
+pub(crate) fn morton_cmp(a: [i32; 3], b: [i32; 3]) -> Ordering {
+    let difference = |axis: usize| (a[axis] ^ b[axis]) as u32;
+    let higher = |x: u32, y: u32| x < y && x < (x ^ y);
+    let mut decides = 2;
+    for axis in [1, 0] {
+        if higher(difference(decides), difference(axis)) {
+            decides = axis;
+        }
+    }
+    (a[decides] as u32).cmp(&(b[decides] as u32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn geometry() -> Geometry {
+        Geometry {
+            lattice: Lattice { scale: [0.001; 3], offset: [4_428_000.125, -7.3, 0.0] },
+            cube: Aabb { min: [4_428_000.125, -7.3, 0.0], max: [4_428_001.149, -6.276, 1.024] },
+            spacing: 0.008,
+        }
+    }
+
+    #[test]
+    fn limits_of_a_node_are_the_outermost_coordinates_inside_its_box() {
+        let geometry = geometry();
+        assert_eq!(geometry.node_limits(NodeKey::ROOT), [(0, 1024); 3]);
+        let key = NodeKey::from_name("r41").unwrap();
+        assert_eq!(geometry.node_limits(key), [(512, 768), (0, 256), (256, 512)]);
+    }
+
+    #[test]
+    fn morton_order_without_codes_equals_the_order_of_codes() {
+        fn code(p: [i32; 3]) -> u128 {
+            (0..32).fold(0, |code, k| {
+                (0..3).fold(code, |code, axis| code | u128::from(p[axis] as u32 >> k & 1) << (3 * k + axis))
+            })
+        }
+        let values = [0, 1, 2, 3, 7, 8, 65_535, 65_536, 1 << 27, i32::MAX, -1];
+        let n = values.len();
+        let points: Vec<[i32; 3]> = (0..n.pow(3)).map(|i| [i, i / n, i / n / n].map(|i| values[i % n])).collect();
+        for a in &points {
+            for b in points.iter().step_by(7) {
+                assert_eq!(morton_cmp(*a, *b), code(*a).cmp(&code(*b)), "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn sample_cells_of_whole_steps_are_exact() {
+        let geometry = geometry(); // 8 steps a cell at the root
+        let node = geometry.node_box(NodeKey::ROOT);
+        assert_eq!(geometry.sample_cell(0, &node, [8, 7, 1023]), Some(1 << 16 | 127));
+    }
+}

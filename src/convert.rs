@@ -1,0 +1,154 @@
+//! `pointmill convert`: what was typed becomes a `Plan`, a run and a summary.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pointmill_converter::{
+    AttributeChoice, Duplicates, Encoding, Filter, OnFault, Plan, Report, RgbDepth, Sampling, ScaleChoice,
+};
+
+use crate::args::{Attributes, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, RgbDepthArg, SamplingArg, Target};
+use crate::exit::{Failure, emit, tell, to_json};
+use crate::inputs::Inputs;
+use crate::interrupt::stop_flag;
+use crate::progress::Progress;
+use crate::text;
+
+/// Brotli's knee for node payloads: above it the time grows several times over for a few per cent.
+const BROTLI_QUALITY: u8 = 4;
+
+pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+    if let Some(other) = args.to.iter().find(|to| **to != Target::Potree2) {
+        let name = format!("{other:?}").to_lowercase();
+        return Err(Failure::Unsupported(format!(
+            "--to {name} is not supported yet by this version; it writes potree2"
+        )));
+    }
+    let inputs = args.inputs.expand()?;
+    if !args.talk.quiet {
+        inputs.notes.iter().for_each(|note| tell(note));
+    }
+    let plan = plan(args, inputs)?;
+    if args.dry_run {
+        let estimate = pointmill_converter::estimate(&plan)?;
+        return emit(&if args.json { to_json(&estimate)? } else { text::estimate(&estimate, &plan) });
+    }
+    protect_inputs(&plan)?;
+    if let Some(file) = &args.report {
+        require_folder(file, &plan.output)?;
+    }
+    let progress = Progress::new(&args.talk, Some(stop_flag()));
+    let result = pointmill_converter::convert(&plan, &progress);
+    let for_people = progress.end();
+    let report = result?;
+    if let Some(file) = &args.report {
+        fs::write(file, to_json(&report)?).map_err(|e| Failure::io(file, "writing the report", &e))?;
+    }
+    if args.json {
+        emit(&to_json(&report)?)?;
+    }
+    if for_people {
+        text::report(&report, &plan, args.talk.verbose).iter().for_each(|line| tell(line));
+    }
+    Ok(())
+}
+
+fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
+    let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
+    let mut plan = Plan::new(inputs.files, args.output.clone());
+    plan.name = name;
+    plan.sampling = match (args.sampling, args.seed) {
+        (SamplingArg::Random, seed) => Sampling::Random { seed: seed.unwrap_or(0) },
+        (_, Some(_)) => return Err(Failure::Usage("--seed is for --sampling random".to_owned())),
+        (SamplingArg::Poisson, None) => Sampling::Poisson,
+        (SamplingArg::Grid, None) => Sampling::Grid,
+    };
+    plan.encoding = match (args.encoding, args.brotli_quality) {
+        (EncodingArg::Brotli, quality) => Encoding::Brotli { quality: quality.unwrap_or(BROTLI_QUALITY) },
+        (EncodingArg::Default, Some(_)) => {
+            return Err(Failure::Usage("--brotli-quality is for --encoding brotli".to_owned()));
+        }
+        (EncodingArg::Default, None) => Encoding::Default,
+    };
+    plan.leaf_capacity = args.leaf_capacity;
+    plan.attributes = match &args.attributes {
+        Attributes::All => AttributeChoice::All,
+        Attributes::Scene => AttributeChoice::Scene,
+        Attributes::List(names) => AttributeChoice::List(names.clone()),
+    };
+    plan.scale = args.scale.0.map_or(ScaleChoice::Auto, ScaleChoice::Fixed);
+    plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every };
+    plan.duplicates = match args.duplicates {
+        DuplicatesArg::Keep => Duplicates::Keep,
+        DuplicatesArg::Drop => Duplicates::Drop,
+    };
+    plan.invalid = on_fault(args.invalid);
+    plan.unreadable = on_fault(args.unreadable);
+    plan.rgb_depth = match args.rgb_depth {
+        RgbDepthArg::Auto => RgbDepth::Auto,
+        RgbDepthArg::Eight => RgbDepth::Eight,
+        RgbDepthArg::Sixteen => RgbDepth::Sixteen,
+    };
+    plan.crs.clone_from(&args.crs);
+    plan.overwrite = args.overwrite;
+    if let Some(bytes) = args.memory {
+        plan.memory_bytes = bytes;
+    }
+    if let Some(threads) = args.threads {
+        plan.threads = usize::from(threads.get());
+    }
+    if let Some(dir) = &args.temp_dir {
+        if !dir.is_dir() {
+            return Err(Failure::Usage(format!("{}: --temp-dir is no folder", dir.display())));
+        }
+        plan.temp_dir = Some(dir.clone());
+    }
+    Ok(plan)
+}
+
+fn on_fault(arg: FaultArg) -> OnFault {
+    match arg {
+        FaultArg::Skip => OnFault::Skip,
+        FaultArg::Fail => OnFault::Fail,
+    }
+}
+
+/// The folder's name if one folder was named, else that of the first scan in order of path, whatever was typed first.
+fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
+    let folder = typed.first().filter(|path| typed.len() == 1 && path.is_dir());
+    let full = folder.map(|path| path.canonicalize().unwrap_or_else(|_| path.clone()));
+    let name = match &full {
+        Some(folder) => folder.file_name(),
+        None => files.first().and_then(|file| file.file_stem()),
+    };
+    name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// The scans that are being read are never replaced. What else may be, the converter judges.
+fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
+    let Ok(output) = plan.output.canonicalize() else {
+        return Ok(()); // not there: nothing to protect
+    };
+    let inside = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file.starts_with(&output));
+    let Some(scan) = plan.inputs.iter().find(inside) else { return Ok(()) };
+    let (output, scan) = (plan.output.display(), scan.display());
+    Err(Failure::Usage(format!("{output}: the output would replace the input {scan}; choose another folder")))
+}
+
+/// Better to learn before the run than after it that the report has no place to go.
+fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty() && *folder != output);
+    if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
+        return Err(Failure::Usage(format!(
+            "{}: the report cannot be written there: no such folder, or a folder itself",
+            file.display()
+        )));
+    }
+    Ok(())
+}
+
+/// What a report says besides figures: true if every point read is in the dataset or accounted for.
+pub(crate) fn points_left_out(report: &Report) -> u64 {
+    let p = &report.points;
+    p.outside_bounds + p.other_class + p.thinned + p.duplicates_dropped + p.invalid + p.unreadable
+}

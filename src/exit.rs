@@ -1,0 +1,180 @@
+//! From faults to exit codes, and the one line that tells of them.
+
+use std::io::{self, Write as _};
+use std::panic::PanicHookInfo;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use pointmill_converter::ConvertError;
+use pointmill_format::{ErrorKind, ReadError};
+
+/// Why the program ends without success.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// 1: a promise of our own code did not hold.
+    Internal(String),
+    /// 2: what was typed makes no sense.
+    Usage(String),
+    /// 3: an input is broken, or there is none.
+    Input(String),
+    /// 4: an input or a request that this version does not serve.
+    Unsupported(String),
+    /// 5: disk full, no permission, …
+    Io(String),
+    /// 6: the memory ceiling is too small.
+    Memory(String),
+    /// 7: a dataset breaks its format's promises; the findings are on standard output.
+    Faults(String),
+    /// 130: Ctrl-C, or asked to end.
+    Interrupted(String),
+}
+
+impl Failure {
+    /// The exit code that scripts rely on.
+    pub(crate) fn code(&self) -> u8 {
+        match self {
+            Self::Internal(_) => 1,
+            Self::Usage(_) => 2,
+            Self::Input(_) => 3,
+            Self::Unsupported(_) => 4,
+            Self::Io(_) => 5,
+            Self::Memory(_) => 6,
+            Self::Faults(_) => 7,
+            Self::Interrupted(_) => 130,
+        }
+    }
+
+    /// Prints the one line.
+    pub(crate) fn tell(&self) {
+        let (Self::Internal(line)
+        | Self::Usage(line)
+        | Self::Input(line)
+        | Self::Unsupported(line)
+        | Self::Io(line)
+        | Self::Memory(line)
+        | Self::Faults(line)
+        | Self::Interrupted(line)) = self;
+        tell(line);
+    }
+
+    /// The operating system refused; `doing` names the attempt ("writing the report").
+    pub(crate) fn io(path: &Path, doing: &str, error: &io::Error) -> Self {
+        Self::Io(format!("{}: {doing}: {error}", path.display()))
+    }
+}
+
+/// One line for people, on standard error. Line breaks inside (a file name may hold them) become spaces.
+pub(crate) fn tell(line: &str) {
+    let line = line.replace(['\n', '\r'], " ");
+    // Nobody is left to tell when standard error is closed.
+    let _ = writeln!(io::stderr().lock(), "pointmill: {line}");
+}
+
+/// Writes a result to standard output. A reader that has seen enough (`| head`) is no fault.
+pub(crate) fn emit(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(e) => Err(Failure::Io(format!("writing to standard output: {e}"))),
+        Ok(()) => Ok(()),
+    }
+}
+
+/// Pretty JSON and a line break.
+pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Internal(format!("internal fault: {e}")))?;
+    Ok(text + "\n")
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        let line = error.to_string();
+        match error.kind {
+            ErrorKind::Broken => Self::Input(line),
+            ErrorKind::Unsupported => Self::Unsupported(line),
+            ErrorKind::Io(_) => Self::Io(line),
+        }
+    }
+}
+
+impl From<ConvertError> for Failure {
+    fn from(error: ConvertError) -> Self {
+        let line = error.to_string();
+        match error {
+            ConvertError::Read(read) => read.into(),
+            ConvertError::Usage(_) | ConvertError::OutputExists(_) => Self::Usage(line),
+            ConvertError::Unsupported(_) => Self::Unsupported(line),
+            ConvertError::Input(_) => Self::Input(line),
+            ConvertError::Io { .. } => Self::Io(line),
+            ConvertError::Memory { .. } => Self::Memory(line),
+            ConvertError::Interrupted => Self::Interrupted(line),
+            ConvertError::Internal(_) => Self::Internal(line),
+        }
+    }
+}
+
+static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
+
+/// Keeps panics silent and remembers the last one. A decompressor that panics on corrupt bytes is caught by the reader
+/// and told as a broken input, so nothing may be printed here; `main` tells of those that nobody caught.
+pub(crate) fn remember_panics() {
+    let backtrace_wanted = std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0");
+    let default_hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) = describe(panic);
+        if backtrace_wanted {
+            default_hook(panic);
+        }
+    }));
+}
+
+fn describe(panic: &PanicHookInfo<'_>) -> String {
+    let payload = panic.payload();
+    let message = payload.downcast_ref::<&str>().copied();
+    let message = message.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("panic");
+    match panic.location() {
+        Some(place) => format!("{message} ({}:{})", place.file(), place.line()),
+        None => message.to_owned(),
+    }
+}
+
+/// The panic that just ended a run.
+pub(crate) fn last_panic() -> Failure {
+    let what = LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    Failure::Internal(format!("internal fault: {what}; please report it with the command line and the input"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whose_fault_it_is_decides_the_code() {
+        let io_error = || io::Error::from(io::ErrorKind::StorageFull);
+        let table: [(Failure, u8); 10] = [
+            (ConvertError::Internal("x".into()).into(), 1),
+            (ConvertError::Usage("x".into()).into(), 2),
+            (ConvertError::OutputExists("x".into()).into(), 2),
+            (ReadError::broken("a.las", None, "x").into(), 3),
+            (ConvertError::Read(ReadError::broken("a.las", None, "x")).into(), 3),
+            (ReadError::unsupported("a.las", "x").into(), 4),
+            (ReadError::io("a.las", "x", io_error()).into(), 5),
+            (ConvertError::io("a", "x", io_error()).into(), 5),
+            (ConvertError::Memory { ceiling: 1, needed: 2, why: "x".into() }.into(), 6),
+            (ConvertError::Interrupted.into(), 130),
+        ];
+        for (failure, code) in table {
+            assert_eq!(failure.code(), code, "{failure:?}");
+        }
+    }
+
+    #[test]
+    fn a_panic_becomes_one_line_with_its_place() {
+        remember_panics();
+        let caught = std::panic::catch_unwind(|| panic!("seven"));
+        drop(std::panic::take_hook()); // other tests shall be heard
+        assert!(caught.is_err());
+        let Failure::Internal(line) = last_panic() else { unreachable!() };
+        assert!(line.contains("seven") && line.contains("exit.rs:"), "{line}");
+    }
+}

@@ -1,0 +1,326 @@
+//! Which scans are meant: files, folders, globs and lists become one sorted list of files.
+//!
+//! What a file is, its content says first and its ending second. A file that was named must be a scan; in a folder or
+//! a glob other files are left out, and said to be: nothing is skipped in silence.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+
+use crate::args::InputArgs;
+use crate::exit::Failure;
+use crate::quantities::plural;
+
+/// The scans to read, and what the user should know about the search for them.
+#[derive(Debug, Default)]
+pub(crate) struct Inputs {
+    /// Sorted by path, each file once.
+    pub(crate) files: Vec<PathBuf>,
+    /// A line each.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What a file is, as far as this program is concerned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// LAS or LAZ.
+    Las,
+    /// A scan of a kind that this version does not read.
+    OtherScan(&'static str),
+    /// Anything else.
+    NoScan,
+}
+
+impl InputArgs {
+    /// Finds the scans that are meant.
+    pub(crate) fn expand(&self) -> Result<Inputs, Failure> {
+        let mut typed = self.inputs.clone();
+        if let Some(list) = &self.files_from {
+            typed.extend(read_list(list)?);
+        }
+        expand(&typed)
+    }
+}
+
+/// Finds the scans that `typed` means: files, folders (recursive), globs where no such path exists.
+pub(crate) fn expand(typed: &[PathBuf]) -> Result<Inputs, Failure> {
+    if typed.is_empty() {
+        return Err(Failure::Usage("no input: name scans, folders or globs, or pass --files-from LIST".to_owned()));
+    }
+    let mut search = Search::default();
+    for path in typed {
+        search.add_typed(path)?;
+    }
+    search.finish(typed)
+}
+
+#[derive(Default)]
+struct Search {
+    /// By canonical path, so that a file counts once however it is spelt.
+    found: BTreeMap<PathBuf, PathBuf>,
+    repeated: Vec<PathBuf>,
+    no_scans: Vec<PathBuf>,
+    other_scans: Vec<(PathBuf, &'static str)>,
+}
+
+impl Search {
+    fn add_typed(&mut self, path: &Path) -> Result<(), Failure> {
+        match fs::metadata(path) {
+            Ok(meta) if meta.is_dir() => self.add_folder(path),
+            Ok(_) => self.add_named_file(path),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => self.add_glob(path),
+            Err(e) => Err(Failure::io(path, "looking at the input", &e)),
+        }
+    }
+
+    /// A file that was named must be a scan.
+    fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
+        match kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? {
+            Kind::Las => self.add_scan(path),
+            Kind::OtherScan(name) => {
+                let line =
+                    format!("{}: {name} is not supported yet by this version; it reads LAS and LAZ", path.display());
+                return Err(Failure::Unsupported(line));
+            }
+            Kind::NoScan => {
+                let line = format!("{}: this is no scan that is known here; supported are LAS and LAZ", path.display());
+                return Err(Failure::Unsupported(line));
+            }
+        }
+        Ok(())
+    }
+
+    /// A file that a folder or a glob brought along.
+    fn add_met_file(&mut self, path: &Path) {
+        // A file that cannot be opened but is called a scan goes on: the reader says why, and --unreadable decides.
+        match kind(path).unwrap_or_else(|_| kind_by_ending(path)) {
+            Kind::Las => self.add_scan(path),
+            Kind::OtherScan(name) => self.other_scans.push((path.to_path_buf(), name)),
+            Kind::NoScan => self.no_scans.push(path.to_path_buf()),
+        }
+    }
+
+    fn add_folder(&mut self, folder: &Path) -> Result<(), Failure> {
+        for entry in walkdir::WalkDir::new(folder).follow_links(true).sort_by_file_name() {
+            match entry {
+                Ok(entry) if entry.file_type().is_dir() => {}
+                Ok(entry) => self.add_met_file(entry.path()),
+                Err(e) => match (e.path(), e.io_error()) {
+                    (Some(path), Some(error)) if error.kind() == io::ErrorKind::NotFound => self.add_met_file(path),
+                    (Some(path), Some(error)) => return Err(Failure::io(path, "searching the folder", error)),
+                    // A link that leads back to a folder above it: what is there is found anyway.
+                    _ => {}
+                },
+            }
+        }
+        Ok(())
+    }
+
+    fn add_glob(&mut self, path: &Path) -> Result<(), Failure> {
+        let pattern = path.to_str().filter(|p| p.contains(['*', '?', '[']));
+        let Some(pattern) = pattern else {
+            return Err(Failure::Usage(format!("{}: there is no such file or folder", path.display())));
+        };
+        let matches = glob::glob(pattern).map_err(|e| Failure::Usage(format!("{pattern}: {e}")))?;
+        let mut any = false;
+        for found in matches {
+            let found = found.map_err(|e| Failure::io(e.path(), "searching the folder", e.error()))?;
+            any = true;
+            if found.is_dir() { self.add_folder(&found)? } else { self.add_met_file(&found) }
+        }
+        if any { Ok(()) } else { Err(Failure::Usage(format!("{pattern}: nothing matches"))) }
+    }
+
+    fn add_scan(&mut self, path: &Path) {
+        match self.found.entry(identity(path)) {
+            Entry::Vacant(entry) => drop(entry.insert(path.to_path_buf())),
+            Entry::Occupied(mut kept) => {
+                self.repeated.push(path.to_path_buf());
+                // The least spelling stands for the file, so that the order of typing does not show.
+                if path < kept.get() {
+                    kept.insert(path.to_path_buf());
+                }
+            }
+        }
+    }
+
+    fn finish(self, typed: &[PathBuf]) -> Result<Inputs, Failure> {
+        let mut notes = Vec::new();
+        let mut note = |count: usize, noun: &str, what: &str, examples: Vec<String>| {
+            if count > 0 {
+                let more = if count > examples.len() { ", …" } else { "" };
+                notes.push(format!("{} {what} ({}{more})", plural(count as u64, noun), examples.join(", ")));
+            }
+        };
+        let name = |path: &PathBuf| path.display().to_string();
+        let examples = |paths: &[PathBuf]| paths.iter().take(3).map(name).collect();
+        note(self.no_scans.len(), "other file", "left out, no scans", examples(&self.no_scans));
+        let others = self.other_scans.iter().take(3).map(|(path, kind)| format!("{}: {kind}", path.display()));
+        note(self.other_scans.len(), "scan", "left out, of kinds that this version does not read", others.collect());
+        note(self.repeated.len(), "input", "named more than once, read once", examples(&self.repeated));
+
+        let mut files: Vec<PathBuf> = self.found.into_values().collect();
+        files.sort();
+        if files.is_empty() {
+            let places: Vec<String> = typed.iter().take(3).map(name).collect();
+            let left_out = if notes.is_empty() { String::new() } else { format!("; {}", notes.join("; ")) };
+            return Err(Failure::Input(format!("{}: no scan there (LAS or LAZ){left_out}", places.join(", "))));
+        }
+        Ok(Inputs { files, notes })
+    }
+}
+
+/// One path for all spellings of a file; for a broken link its own place in its folder's.
+fn identity(path: &Path) -> PathBuf {
+    let in_folder = || Some(fs::canonicalize(path.parent()?).ok()?.join(path.file_name()?));
+    fs::canonicalize(path).ok().or_else(in_folder).unwrap_or_else(|| path.to_path_buf())
+}
+
+/// Says what a file is, by its first bytes, else by its ending.
+pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
+    let mut first = Vec::with_capacity(16);
+    File::open(path)?.take(16).read_to_end(&mut first)?;
+    Ok(kind_by_content(&first).unwrap_or_else(|| kind_by_ending(path)))
+}
+
+fn kind_by_content(first: &[u8]) -> Option<Kind> {
+    match first {
+        _ if pointmill_format::las::is_las(first) => Some(Kind::Las),
+        [b'A', b'S', b'T', b'M', b'-', b'E', b'5', b'7', ..] => Some(Kind::OtherScan("E57")),
+        [b'p', b'l', b'y', b'\n' | b'\r', ..] => Some(Kind::OtherScan("PLY")),
+        [b'#', b' ', b'.', b'P', b'C', b'D', ..] => Some(Kind::OtherScan("PCD")),
+        _ => None,
+    }
+}
+
+fn kind_by_ending(path: &Path) -> Kind {
+    // macOS leaves `._tile.laz` beside `tile.laz` on foreign disks: notes of the Finder, no points.
+    if path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with("._")) {
+        return Kind::NoScan;
+    }
+    let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+    match ending.as_deref() {
+        Some("las" | "laz") => Kind::Las,
+        Some("e57") => Kind::OtherScan("E57"),
+        Some("ply") => Kind::OtherScan("PLY"),
+        Some("pcd") => Kind::OtherScan("PCD"),
+        Some("pts" | "ptx" | "xyz") => Kind::OtherScan("a text scan"),
+        _ => Kind::NoScan,
+    }
+}
+
+/// The paths in `list`, one a line; `-` is standard input.
+fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let mut bytes = Vec::new();
+    let read = if list.as_os_str() == "-" {
+        io::stdin().lock().read_to_end(&mut bytes).map(|_| ())
+    } else {
+        fs::read(list).map(|b| bytes = b)
+    };
+    match read {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            return Err(Failure::Usage(format!("{}: there is no such list", list.display())));
+        }
+        Err(e) => return Err(Failure::io(list, "reading the list of inputs", &e)),
+        Ok(()) => {}
+    }
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
+    let lines = bytes.split(|b| *b == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line));
+    Ok(lines.filter(|line| !line.is_empty() && line[0] != b'#').map(path_from_bytes).collect())
+}
+
+/// File names are bytes on Unix: they need not be UTF-8.
+#[cfg(unix)]
+fn path_from_bytes(bytes: &[u8]) -> PathBuf {
+    use std::os::unix::ffi::OsStrExt as _;
+    PathBuf::from(OsStr::from_bytes(bytes))
+}
+
+#[cfg(not(unix))]
+fn path_from_bytes(bytes: &[u8]) -> PathBuf {
+    PathBuf::from(String::from_utf8_lossy(bytes).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder with two scans (one of them by ending alone), a PLY and a text.
+    fn folder() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("süd")).unwrap();
+        for (name, bytes) in [
+            ("b.dat", &b"LASF and more"[..]),
+            ("süd/a.LAZ", b""),
+            ("c.ply", b"ply\nformat ascii 1.0\n"),
+            ("notes.txt", b"hello"),
+            ("._b.laz", b"Finder"),
+        ] {
+            fs::write(dir.path().join(name), bytes).unwrap();
+        }
+        dir
+    }
+
+    fn names(inputs: &Inputs) -> Vec<&str> {
+        inputs.files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_folder_gives_its_scans_sorted_and_says_what_it_left_out() {
+        let dir = folder();
+        let inputs = expand(&[dir.path().to_path_buf()]).unwrap();
+        assert_eq!(names(&inputs), ["b.dat", "a.LAZ"]);
+        assert_eq!(inputs.notes.len(), 2, "{:?}", inputs.notes);
+        assert!(inputs.notes[0].starts_with("2 other files left out") && inputs.notes[0].contains("notes.txt"));
+        assert!(inputs.notes[1].contains("c.ply: PLY"));
+    }
+
+    #[test]
+    fn globs_are_tried_only_where_no_such_path_exists() {
+        let dir = folder();
+        assert_eq!(names(&expand(&[dir.path().join("**/*.LAZ")]).unwrap()), ["a.LAZ"]);
+        fs::write(dir.path().join("x[1].las"), "LASF").unwrap();
+        fs::write(dir.path().join("x1.las"), "LASF").unwrap();
+        assert_eq!(names(&expand(&[dir.path().join("x[1].las")]).unwrap()), ["x[1].las"]);
+        assert_eq!(expand(&[dir.path().join("*.nothing")]).unwrap_err().code(), 2);
+    }
+
+    #[test]
+    fn a_file_counts_once_however_it_is_spelt() {
+        let dir = folder();
+        let again = dir.path().join("süd/../b.dat");
+        let inputs = expand(&[dir.path().join("b.dat"), again, dir.path().to_path_buf()]).unwrap();
+        assert_eq!(inputs.files.len(), 2);
+        assert!(inputs.notes.iter().any(|n| n.starts_with("2 inputs named more than once")), "{:?}", inputs.notes);
+    }
+
+    #[test]
+    fn what_was_named_must_be_a_scan() {
+        let dir = folder();
+        let code = |name: &str| expand(&[dir.path().join(name)]).unwrap_err().code();
+        assert_eq!([code("notes.txt"), code("c.ply"), code("missing.las")], [4, 4, 2]);
+        fs::create_dir(dir.path().join("empty")).unwrap();
+        assert_eq!(code("empty"), 3);
+    }
+
+    #[test]
+    fn a_list_has_one_path_a_line() {
+        let dir = folder();
+        let list = dir.path().join("list");
+        fs::write(&list, format!("\u{feff}# scans\r\n\n{}\r\n", dir.path().join("b.dat").display())).unwrap();
+        let args = InputArgs { inputs: Vec::new(), files_from: Some(list) };
+        assert_eq!(names(&args.expand().unwrap()), ["b.dat"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_broken_link_called_a_scan_is_not_lost() {
+        let dir = folder();
+        std::os::unix::fs::symlink("nowhere", dir.path().join("süd/z.las")).unwrap();
+        std::os::unix::fs::symlink(".", dir.path().join("süd/loop")).unwrap();
+        assert_eq!(names(&expand(&[dir.path().join("süd")]).unwrap()), ["a.LAZ", "z.las"]);
+    }
+}

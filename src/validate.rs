@@ -1,0 +1,75 @@
+//! `pointmill validate`: does a dataset keep the promises of its format?
+
+use std::path::Path;
+
+use pointmill_format::ReadError;
+use pointmill_validate::{Options, Outcome};
+
+use crate::args::ValidateArgs;
+use crate::exit::{Failure, emit, tell, to_json};
+use crate::inputs;
+use crate::progress::Progress;
+use crate::quantities::plural;
+use crate::text;
+
+pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
+    require_dataset(&args.dataset)?;
+    let mut options = Options { neighbourhoods: !args.fast, ..Options::default() };
+    if !args.against.is_empty() {
+        let found = inputs::expand(&args.against)?;
+        if !args.talk.quiet {
+            found.notes.iter().for_each(|note| tell(note));
+        }
+        options.against = found.files;
+    }
+    if let Some(threads) = args.threads {
+        options.threads = usize::from(threads.get());
+    }
+    let progress = Progress::new(&args.talk, None);
+    let result = pointmill_validate::validate(&args.dataset, &options, &|p| progress.at(p.phase, p.done, p.total));
+    progress.end();
+    let outcome = result.map_err(|e| failure(e, args))?;
+    if args.json {
+        emit(&to_json(&outcome)?)?;
+    } else if args.talk.quiet {
+        emit(&text::problems(&outcome))?;
+    } else {
+        emit(&text::outcome(&args.dataset, &outcome, args.talk.verbose))?;
+    }
+    verdict(&args.dataset, &outcome)
+}
+
+fn verdict(dataset: &Path, outcome: &Outcome) -> Result<(), Failure> {
+    if outcome.ok {
+        return Ok(());
+    }
+    let broken: Vec<&str> = outcome.checks.iter().filter(|check| !check.ok).map(|check| check.name.name()).collect();
+    let faults = plural(outcome.checks.iter().map(|check| check.found).sum(), "fault");
+    Err(Failure::Faults(format!("{}: {faults} found by: {}", dataset.display(), broken.join(", "))))
+}
+
+/// A path that leads to no dataset at all was mistyped; a file that is missing from one is a fault of the dataset.
+fn require_dataset(dataset: &Path) -> Result<(), Failure> {
+    let path = dataset.display();
+    let folder = if dataset.is_dir() { dataset } else { dataset.parent().unwrap_or(dataset) };
+    let metadata = folder.join("metadata.json");
+    match () {
+        () if !dataset.exists() => Err(Failure::Usage(format!("{path}: there is no such dataset"))),
+        () if !metadata.is_file() || dataset.is_file() && !dataset.ends_with("metadata.json") => {
+            Err(Failure::Usage(format!("{path}: this is no Potree 2.0 dataset: a folder with metadata.json")))
+        }
+        () => match ["hierarchy.bin", "octree.bin"].into_iter().find(|name| !folder.join(name).exists()) {
+            Some(name) => Err(Failure::Faults(format!("{path}: {name} is missing; convert or copy the dataset again"))),
+            None => Ok(()),
+        },
+    }
+}
+
+/// What is broken in the dataset itself is what a validation looks for, however it comes to light.
+fn failure(error: ReadError, args: &ValidateArgs) -> Failure {
+    let in_dataset = error.path.starts_with(&args.dataset);
+    match Failure::from(error) {
+        Failure::Input(line) if in_dataset => Failure::Faults(line),
+        other => other,
+    }
+}

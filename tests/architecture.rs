@@ -1,0 +1,51 @@
+//! The arrows between the crates: `pointmill → converter → format ← validate ← pointmill`, and none back.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// What each crate of the workspace may depend on, for whatever purpose, among the crates of the workspace.
+const ALLOWED: [(&str, &[&str]); 4] = [
+    ("pointmill", &["pointmill-converter", "pointmill-format", "pointmill-validate"]),
+    ("pointmill-converter", &["pointmill-format"]),
+    ("pointmill-validate", &["pointmill-format"]),
+    ("pointmill-format", &[]),
+];
+
+fn packages() -> Vec<Value> {
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    let args = ["metadata", "--format-version", "1", "--no-deps", "--offline", "--manifest-path", manifest];
+    let output = Command::new(env!("CARGO")).args(args).output().unwrap();
+    let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    metadata["packages"].as_array().unwrap().clone()
+}
+
+fn dependencies(package: &Value) -> BTreeSet<&str> {
+    package["dependencies"].as_array().unwrap().iter().map(|d| d["name"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn crates_depend_in_one_direction() {
+    for package in packages() {
+        let name = package["name"].as_str().unwrap();
+        let Some((_, allowed)) = ALLOWED.iter().find(|(n, _)| *n == name) else { continue };
+        for dependency in dependencies(&package).into_iter().filter(|d| d.starts_with("pointmill")) {
+            assert!(allowed.contains(&dependency), "{name} must not depend on {dependency}");
+        }
+    }
+}
+
+/// A renderer that loads datasets pays for neither threads nor temporary files nor LAZ.
+#[test]
+fn the_format_crate_stays_light() {
+    let packages = packages();
+    let format = packages.iter().find(|p| p["name"] == "pointmill-format").unwrap();
+    let required = format["dependencies"].as_array().unwrap().iter();
+    let required: BTreeSet<&str> = required
+        .filter(|d| d["kind"].is_null() && d["optional"] == false)
+        .map(|d| d["name"].as_str().unwrap())
+        .collect();
+    let light = BTreeSet::from(["brotlic", "serde", "serde_json", "thiserror"]);
+    assert!(required.is_subset(&light), "new dependencies of the format crate: {:?}", &required - &light);
+}

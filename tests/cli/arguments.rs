@@ -1,0 +1,94 @@
+//! What can be typed, and what is said to what cannot.
+
+use crate::support::{Dir, Las};
+
+#[test]
+fn nothing_typed_is_a_mistake_and_help_is_none() {
+    let dir = Dir::new();
+    assert_eq!(dir.run([""; 0]).code(), 2);
+    let help = dir.succeed(["convert", "--help"]);
+    for option in ["--memory", "--threads", "--overwrite", "--dry-run", "--attributes", "--bounds", "--sampling"] {
+        assert!(help.stdout().contains(option), "{option}");
+    }
+    assert!(dir.succeed(["--version"]).stdout().starts_with("pointmill "));
+}
+
+#[test]
+fn mistakes_end_with_code_2_and_leave_nothing_behind() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(10, 1).bytes());
+    let table: [(&[&str], &str); 10] = [
+        (&["a.las"], "--output"),
+        (&["-o", "out"], "no input"),
+        (&["b.las", "-o", "out"], "b.las"),
+        (&["a.las", "-o", "out", "--memory", "some"], "size"),
+        (&["a.las", "-o", "out", "--seed", "1"], "--seed"),
+        (&["a.las", "-o", "out", "--brotli-quality", "5"], "--brotli-quality"),
+        (&["a.las", "-o", "out", "--bounds", "5,0,0..1,1,1"], "empty"),
+        (&["a.las", "-o", "out", "--temp-dir", "nowhere"], "nowhere"),
+        (&["a.las", "-o", "out", "--report", "nowhere/r.json"], "nowhere"),
+        (&["a.las", "-o", "out", "--attributes", "colour of the sky"], "colour of the sky"),
+    ];
+    for (args, word) in table {
+        let ended = dir.run(["convert"].iter().chain(args));
+        assert_eq!(ended.code(), 2, "{args:?}: {}", ended.stderr());
+        assert!(ended.stderr().contains(word), "{args:?}: {}", ended.stderr());
+        assert_eq!(dir.names(), ["a.las"], "{args:?}");
+    }
+}
+
+#[test]
+fn formats_to_come_are_not_supported_yet() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(10, 1).bytes());
+    for format in ["potree1", "bintree", "batches"] {
+        dir.run(["convert", "a.las", "-o", "out", "--to", format]).failed_with(4, &[format, "potree2"]);
+    }
+    dir.succeed(["convert", "a.las", "-o", "out", "--to", "potree2"]);
+}
+
+#[test]
+fn a_dry_run_tells_and_writes_nothing() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(12_345, 1).bytes());
+    let text = dir.succeed(["convert", "a.las", "-o", "out", "--dry-run"]).stdout();
+    assert!(text.contains("12,345"), "{text}");
+    let json = dir.succeed(["convert", "a.las", "-o", "out", "--dry-run", "--json"]).stdout();
+    let estimate: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(estimate["points"], 12_345);
+    assert!(estimate["output_bytes"].as_u64().unwrap() >= 12_345 * 35);
+    assert_eq!(dir.names(), ["a.las"]);
+}
+
+#[test]
+fn filters_keep_what_was_asked_for_and_account_for_the_rest() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(3000, 1).bytes());
+    let box_ = "500000,5400000,-100..500005,5400005,100";
+    dir.succeed(["convert", "a.las", "-o", "out", "--class", "2,6", "--every", "2", "--bounds", box_, "-q"]);
+    let report = dir.report("out");
+    let n = |name: &str| report["points"][name].as_u64().unwrap();
+    assert_eq!(n("read"), 3000);
+    assert!(n("written") > 0 && n("outside_bounds") > 0 && n("other_class") > 0 && n("thinned") > 0, "{report}");
+    assert_eq!(n("written") + n("outside_bounds") + n("other_class") + n("thinned"), 3000);
+    dir.validate("out", &["a.las"]);
+}
+
+#[test]
+fn every_sampling_and_encoding_holds_every_point() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(40_000, 3).bytes());
+    for (i, options) in [
+        ["--sampling", "poisson", "--encoding", "brotli"],
+        ["--sampling", "grid", "--encoding", "default"],
+        ["--sampling", "random", "--seed", "7"],
+        ["--attributes", "scene", "--leaf-capacity", "500"],
+    ]
+    .iter()
+    .enumerate()
+    {
+        let out = format!("out{i}");
+        dir.succeed(["convert", "a.las", "-q", "-o", &out].iter().chain(options));
+        dir.validate(&out, &["a.las"]);
+    }
+}

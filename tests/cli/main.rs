@@ -1,0 +1,9 @@
+//! The program as a user meets it: commands, exit codes, what is written and, above all, what is left alone.
+
+mod arguments;
+mod bad_input;
+mod bad_output;
+mod interrupted;
+mod sameness;
+mod support;
+mod telling;

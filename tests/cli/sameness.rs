@@ -1,0 +1,48 @@
+//! The same points give the same bytes, whatever the machine has to offer and in whatever order they come.
+
+use crate::support::{Dir, Las, dataset_bytes};
+
+fn two_scans(points: usize) -> Dir {
+    let dir = Dir::new();
+    dir.write("scans/a.las", &Las::terrain(points, 1).bytes());
+    let mut b = Las::terrain(points / 2, 2);
+    b.offset[0] += 300.0;
+    dir.write("scans/b.las", &b.bytes());
+    dir
+}
+
+/// Converts with `options` and returns the bytes of the dataset.
+fn bytes(dir: &Dir, options: &[&str]) -> [Vec<u8>; 3] {
+    let args = ["convert", "-o", "out", "--overwrite", "-q", "--name", "same"];
+    dir.succeed(args.iter().chain(options));
+    dataset_bytes(&dir.path("out"))
+}
+
+#[test]
+fn one_thread_or_four() {
+    let dir = two_scans(60_000);
+    let one = bytes(&dir, &["scans", "--threads", "1"]);
+    assert_eq!(bytes(&dir, &["scans", "--threads", "4"]), one);
+    assert_eq!(bytes(&dir, &["scans", "--threads", "4"]), one, "a second time");
+}
+
+#[test]
+fn in_memory_or_through_temporary_files() {
+    let dir = two_scans(400_000);
+    let ample = bytes(&dir, &["scans", "--memory", "4GiB"]);
+    assert_eq!(dir.report("out")["temp_bytes"], 0);
+    let scarce = bytes(&dir, &["scans", "--memory", "92MiB", "--threads", "1"]);
+    assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "92 MiB hold 600,000 points?");
+    assert!(ample == scarce, "the datasets differ");
+    dir.validate("out", &["scans"]);
+}
+
+#[test]
+fn whatever_order_the_inputs_come_in() {
+    let dir = two_scans(20_000);
+    let forth = bytes(&dir, &["scans/a.las", "scans/b.las"]);
+    assert_eq!(bytes(&dir, &["scans/b.las", "scans/a.las"]), forth);
+    assert_eq!(bytes(&dir, &["scans/*.las", "scans/a.las"]), forth, "named twice, read once");
+    dir.write("list", b"scans/b.las\nscans/a.las\n");
+    assert_eq!(bytes(&dir, &["--files-from", "list"]), forth);
+}
