@@ -1,0 +1,246 @@
+//! Puts built chunks behind one another in the output, in Morton order, and builds the nodes above them.
+
+use std::collections::{HashMap, VecDeque};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::{Condvar, Mutex, MutexGuard};
+
+use pointmill_format::NodeKey;
+use pointmill_format::potree2::NodeEntry;
+
+use super::chunk::{Accounts, BuiltChunk};
+use super::tree::{Nodes, Pending};
+use crate::checksum::Checksum;
+use crate::error::ConvertError;
+use crate::file_at::write_all_at;
+use crate::sample::Sampler;
+use crate::write::payload::PayloadWriter;
+
+/// Where workers hand in their chunks. A worker may be a few chunks ahead of the oldest unfinished one, no more: that
+/// bounds the memory.
+pub(crate) struct Committer<'a> {
+    file: &'a File,
+    path: PathBuf,
+    window: usize,
+    /// Keys of all chunks, in Morton order.
+    keys: Vec<NodeKey>,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+struct State {
+    /// The next chunk to put behind the others.
+    next: usize,
+    waiting: HashMap<usize, BuiltChunk>,
+    stack: Vec<Pending<TopPoint>>,
+    sampler: Sampler,
+    top: TopNodes,
+    cursor: u64,
+    nodes: Vec<NodeEntry>,
+    accounts: Accounts,
+    spare: Vec<Vec<u8>>,
+    stopped: bool,
+}
+
+/// What the whole tree came to.
+pub(crate) struct Built {
+    pub(crate) nodes: Vec<NodeEntry>,
+    pub(crate) bytes: u64,
+    pub(crate) accounts: Accounts,
+}
+
+/// A point above the chunks.
+#[derive(Debug, Clone, Copy)]
+struct TopPoint {
+    t: [u32; 3],
+    chunk: u32,
+    record: u32,
+}
+
+/// Pending records by chunk, dropped once all of a chunk's are written.
+struct TopNodes {
+    stride: usize,
+    slabs: HashMap<u32, Slab>,
+    writer: PayloadWriter,
+    payloads: Vec<u8>,
+    nodes: Vec<NodeEntry>,
+    written: Checksum,
+}
+
+struct Slab {
+    records: Vec<u8>,
+    remaining: usize,
+}
+
+impl Nodes<TopPoint> for TopNodes {
+    fn tree(&self, point: TopPoint) -> [u32; 3] {
+        point.t
+    }
+
+    fn write(&mut self, key: NodeKey, points: &[TopPoint]) -> Result<(), ConvertError> {
+        let record = |p: &TopPoint| {
+            let at = p.record as usize * self.stride;
+            self.slabs.get(&p.chunk).map_or(&[][..], |slab| &slab.records[at..at + self.stride])
+        };
+        let records = points.iter().map(record);
+        let entry = self.writer.write(key, records, &mut self.payloads, &mut self.written)?;
+        self.nodes.push(entry);
+        for p in points {
+            if let Some(slab) = self.slabs.get_mut(&p.chunk) {
+                slab.remaining -= 1;
+                if slab.remaining == 0 {
+                    self.slabs.remove(&p.chunk);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<'a> Committer<'a> {
+    pub(crate) fn new(
+        file: &'a File,
+        path: &Path,
+        keys: Vec<NodeKey>,
+        window: usize,
+        stride: usize,
+        sampler: Sampler,
+        writer: PayloadWriter,
+    ) -> Self {
+        let top = TopNodes {
+            stride,
+            slabs: HashMap::new(),
+            writer,
+            payloads: Vec::new(),
+            nodes: Vec::new(),
+            written: Checksum::default(),
+        };
+        let state = State {
+            next: 0,
+            waiting: HashMap::new(),
+            stack: Vec::new(),
+            sampler,
+            top,
+            cursor: 0,
+            nodes: Vec::new(),
+            accounts: Accounts::default(),
+            spare: Vec::new(),
+            stopped: false,
+        };
+        Self { file, path: path.to_path_buf(), window, keys, state: Mutex::new(state), changed: Condvar::new() }
+    }
+
+    /// Waits until chunk `index` may be begun and returns a buffer for its payloads; `None` if the run was stopped.
+    pub(crate) fn admit(&self, index: usize) -> Option<Vec<u8>> {
+        let mut state = self.lock();
+        while !state.stopped && index >= state.next + self.window {
+            state = self.changed.wait(state).unwrap_or_else(std::sync::PoisonError::into_inner);
+        }
+        (!state.stopped).then(|| state.spare.pop().unwrap_or_default())
+    }
+
+    /// Ends the run early; workers that wait are let go.
+    pub(crate) fn stop(&self) {
+        self.lock().stopped = true;
+        self.changed.notify_all();
+    }
+
+    /// Takes a chunk; whatever has become next in order gets its place in the file, and is written.
+    pub(crate) fn submit(&self, index: usize, chunk: BuiltChunk) -> Result<(), ConvertError> {
+        let mut ready: VecDeque<(u64, Vec<u8>)> = VecDeque::new();
+        {
+            let mut state = self.lock();
+            state.waiting.insert(index, chunk);
+            loop {
+                let next = state.next;
+                let Some(chunk) = state.waiting.remove(&next) else { break };
+                let following = self.keys.get(next + 1).copied();
+                state.append(next, chunk, following, &mut ready)?;
+                state.next += 1;
+            }
+        }
+        self.changed.notify_all();
+        for (offset, bytes) in ready {
+            write_all_at(self.file, &bytes, offset)
+                .map_err(|e| ConvertError::io(&self.path, "writing node payloads", e))?;
+            let mut state = self.lock();
+            if state.spare.len() < self.window {
+                state.spare.push(bytes);
+            }
+        }
+        Ok(())
+    }
+
+    /// The tree, once all chunks were handed in.
+    pub(crate) fn finish(self) -> Result<Built, ConvertError> {
+        let mut state = self.state.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if state.next != self.keys.len() || !state.stack.is_empty() {
+            return Err(ConvertError::Internal("the tree was not finished".into()));
+        }
+        state.accounts.written.merge(&state.top.written);
+        Ok(Built { nodes: state.nodes, bytes: state.cursor, accounts: state.accounts })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn append(
+        &mut self,
+        index: usize,
+        chunk: BuiltChunk,
+        following: Option<NodeKey>,
+        ready: &mut VecDeque<(u64, Vec<u8>)>,
+    ) -> Result<(), ConvertError> {
+        let BuiltChunk { payloads, nodes, root, pending_trees, pending_records, accounts } = chunk;
+        self.accounts.merge(&accounts);
+        self.place(nodes, payloads, ready);
+        let index = index as u32;
+        let remaining = pending_trees.len();
+        self.top.slabs.insert(index, Slab { records: pending_records, remaining });
+        self.stack.push(lift(root, index, &pending_trees));
+        self.climb(following)?;
+        if !self.top.payloads.is_empty() {
+            let payloads = std::mem::take(&mut self.top.payloads);
+            let nodes = std::mem::take(&mut self.top.nodes);
+            self.place(nodes, payloads, ready);
+        }
+        Ok(())
+    }
+
+    /// Gives payloads the next place in the file.
+    fn place(&mut self, nodes: Vec<NodeEntry>, payloads: Vec<u8>, ready: &mut VecDeque<(u64, Vec<u8>)>) {
+        let cursor = self.cursor;
+        self.nodes.extend(nodes.into_iter().map(|n| NodeEntry { byte_offset: n.byte_offset + cursor, ..n }));
+        self.cursor += payloads.len() as u64;
+        ready.push_back((cursor, payloads));
+    }
+
+    /// Builds every node all of whose chunks are in; at the root writes what is left.
+    fn climb(&mut self, following: Option<NodeKey>) -> Result<(), ConvertError> {
+        while let Some(last) = self.stack.last() {
+            let Some(parent) = last.key.parent() else {
+                let Some(mut root) = self.stack.pop() else { break };
+                root.write_children(&mut self.top)?;
+                return self.top.write(root.key, &root.points);
+            };
+            if following.is_some_and(|f| f.ancestor(parent.level) == Some(parent)) {
+                break;
+            }
+            let first = self.stack.iter().rposition(|n| n.key.parent() != Some(parent)).map_or(0, |i| i + 1);
+            let children = self.stack.split_off(first);
+            let node = Pending::above(parent, children, &mut self.sampler, &mut self.top)?;
+            self.stack.push(node);
+        }
+        Ok(())
+    }
+}
+
+/// From points of a chunk to points above the chunks.
+fn lift(node: Pending<u32>, chunk: u32, trees: &[[u32; 3]]) -> Pending<TopPoint> {
+    let points = node.points.iter().map(|&record| TopPoint { t: trees[record as usize], chunk, record }).collect();
+    let children = node.children.into_iter().map(|c| lift(c, chunk, trees)).collect();
+    Pending { key: node.key, points, is_inner: node.is_inner, children }
+}

@@ -1,0 +1,113 @@
+//! The rule by which points move up the tree, the same inside a chunk and above the chunks.
+//!
+//! A node is a leaf if it holds no more points than the capacity, or if all of them share one place. An inner node
+//! takes a sample of what its children hold; they keep the rest. A leaf that loses everything is left out. An inner
+//! node that loses everything takes one point back from below, so that no inner node is empty and yet no sample has a
+//! hole. That is why nodes stay *pending* until nothing above can ask them any more.
+
+use pointmill_format::NodeKey;
+
+use crate::error::ConvertError;
+use crate::sample::Sampler;
+
+/// An inner node that keeps at least this many points after its parent took its share can serve every ancestor that
+/// may still ask (one point each, at most 31 of them); everything below it is then final.
+const ENOUGH_FOR_ALL_ANCESTORS: usize = 32;
+
+/// A node whose points are not final.
+#[derive(Debug)]
+pub(crate) struct Pending<P> {
+    pub(crate) key: NodeKey,
+    /// In Morton order.
+    pub(crate) points: Vec<P>,
+    pub(crate) is_inner: bool,
+    /// Children that were not written yet; empty once they are.
+    pub(crate) children: Vec<Pending<P>>,
+}
+
+/// What the rule needs from its surroundings.
+pub(crate) trait Nodes<P> {
+    /// Tree coordinates of a point.
+    fn tree(&self, point: P) -> [u32; 3];
+    /// Writes a final node.
+    fn write(&mut self, key: NodeKey, points: &[P]) -> Result<(), ConvertError>;
+}
+
+impl<P: Copy> Pending<P> {
+    /// A leaf.
+    pub(crate) fn leaf(key: NodeKey, points: Vec<P>) -> Self {
+        Self { key, points, is_inner: false, children: Vec::new() }
+    }
+
+    /// The node above `children` (at least one, in order): takes its sample from them, and writes what became final.
+    pub(crate) fn above(
+        key: NodeKey,
+        mut children: Vec<Self>,
+        sampler: &mut Sampler,
+        nodes: &mut impl Nodes<P>,
+    ) -> Result<Self, ConvertError> {
+        sampler.begin();
+        for child in &children {
+            sampler.offer(child.points.iter().map(|p| nodes.tree(*p)));
+        }
+        let accepted = sampler.choose(key);
+        let mut points = Vec::with_capacity(accepted.iter().map(|b| usize::from(*b)).sum());
+        let mut rest = accepted;
+        for child in &mut children {
+            let (mine, others) = rest.split_at(child.points.len());
+            rest = others;
+            let mut flags = mine.iter();
+            child.points.retain(|p| {
+                let taken = flags.next().is_some_and(|f| *f);
+                if taken {
+                    points.push(*p);
+                }
+                !taken
+            });
+        }
+        for child in &mut children {
+            child.refill();
+        }
+        children.retain(|c| !c.points.is_empty());
+        for child in &mut children {
+            if child.points.len() >= ENOUGH_FOR_ALL_ANCESTORS {
+                child.write_children(nodes)?;
+            }
+        }
+        let is_inner = !children.is_empty();
+        Ok(Self { key, points, is_inner, children })
+    }
+
+    /// If an inner node has no point left, takes one from the child that has most.
+    fn refill(&mut self) {
+        if !self.is_inner || !self.points.is_empty() {
+            return;
+        }
+        let Some(most) = self.children.iter().map(|c| c.points.len()).max() else { return };
+        if let Some(at) = self.children.iter().position(|c| c.points.len() == most) {
+            let donor = &mut self.children[at];
+            // The middle one in Morton order: any is right, this one is most likely near the others.
+            let middle = donor.points.len() / 2;
+            if middle < donor.points.len() {
+                self.points.push(donor.points.remove(middle));
+            }
+            donor.refill();
+            if donor.points.is_empty() {
+                self.children.remove(at);
+            }
+        }
+        self.is_inner = !self.children.is_empty();
+    }
+
+    /// Writes everything below that is still pending; the node's own points stay.
+    pub(crate) fn write_children(&mut self, nodes: &mut impl Nodes<P>) -> Result<(), ConvertError> {
+        let mut children = std::mem::take(&mut self.children);
+        for child in &mut children {
+            child.write_children(nodes)?;
+        }
+        for child in &children {
+            nodes.write(child.key, &child.points)?;
+        }
+        Ok(())
+    }
+}

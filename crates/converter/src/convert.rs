@@ -1,0 +1,268 @@
+//! A run, all passes in order.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use pointmill_format::potree2::encode_hierarchy;
+
+use crate::budget::Budget;
+use crate::build::chunk::{BuiltChunk, ChunkBuilder, ChunkPlan};
+use crate::build::commit::{Built, Committer};
+use crate::chunks::{self, Chunk};
+use crate::describe::{Description, HIERARCHY_STEP};
+use crate::error::ConvertError;
+use crate::events::{Events, Phase};
+use crate::gather::{Gathered, Outcome, Stats, gather};
+use crate::grid::{Cube, LatticeBounds};
+use crate::job::Job;
+use crate::plan::Plan;
+use crate::records::{OutputLayout, RecordFrame};
+use crate::report::{PhaseReport, Report};
+use crate::sample::Sampler;
+use crate::write::dataset::StagedFolder;
+use crate::write::payload::PayloadWriter;
+
+/// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
+const MAX_PASSES: usize = 3;
+
+/// Converts the inputs of `plan` to one dataset.
+///
+/// # Errors
+/// See [`ConvertError`]; the output folder is then as it was before.
+pub fn convert(plan: &Plan, events: &dyn Events) -> Result<Report, ConvertError> {
+    let mut clock = Clock::start(events);
+    clock.phase(Phase::Probe, 0);
+    check(plan)?;
+    let staged = StagedFolder::new(&plan.output, plan.overwrite)?;
+    let mut job = Job::open(plan, events)?;
+    let budget = Budget::new(plan, job.schema.stride)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(plan.threads.max(1))
+        .thread_name(|i| format!("pointmill-{i}"))
+        .build()
+        .map_err(|e| ConvertError::Internal(format!("starting threads: {e}")))?;
+    let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
+
+    let mut gathered = read(plan, &mut job, &budget, &temp_dir, &pool, events, &mut clock)?;
+
+    clock.phase(Phase::Build, gathered.stats.points);
+    let description = Description::new(plan, &job, &gathered.stats, &gathered.cube)?;
+    let frame = RecordFrame { stride: job.schema.stride, cube: gathered.cube, base: gathered.base };
+    let layout = OutputLayout::new(&job.schema, &description.kept, &frame);
+    let chunks = chunks::plan(&mut gathered, &frame, budget.chunk_points)?;
+    for chunk in &chunks {
+        budget.check_chunk(chunk.points)?;
+    }
+    let built = build(plan, &gathered, &frame, &layout, &description, &chunks, &budget, &staged, &pool, events)?;
+    account(&gathered.stats, &built)?;
+
+    clock.phase(Phase::Finish, 0);
+    let mut nodes = built.nodes;
+    let hierarchy = encode_hierarchy(&mut nodes, HIERARCHY_STEP);
+    let metadata = description.metadata(plan, &gathered, &built.accounts, &hierarchy, &job);
+    staged.write("hierarchy.bin", &hierarchy.bytes)?;
+    let json = metadata.to_json();
+    staged.write("metadata.json", json.as_bytes())?;
+    let mut report = description.report(plan, &job, &gathered, &built.accounts, &nodes);
+    report.output_bytes = built.bytes + (hierarchy.bytes.len() + json.len()) as u64;
+    report.phases = clock.finish(gathered.stats.points);
+    report.seconds = clock.seconds();
+    report.peak_memory_bytes = crate::memory::peak_resident_bytes();
+    let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
+    staged.write("report.json", text.as_bytes())?;
+    if events.stop_requested() {
+        return Err(ConvertError::Interrupted);
+    }
+    staged.finish()?;
+    Ok(report)
+}
+
+fn check(plan: &Plan) -> Result<(), ConvertError> {
+    let bad = |text: &str| Err(ConvertError::Usage(text.into()));
+    if plan.leaf_capacity == 0 {
+        return bad("--leaf-capacity: must be at least 1");
+    }
+    match plan.scale {
+        crate::ScaleChoice::Fixed(s) if !(s.is_finite() && s > 0.0) => return bad("--scale: must be a number above 0"),
+        _ => {}
+    }
+    match plan.encoding {
+        crate::Encoding::Brotli { quality } if quality > 11 => return bad("--brotli-quality: must be 0 to 11"),
+        _ => {}
+    }
+    if plan.filter.bounds.is_some_and(|b| b.is_empty()) {
+        return bad("--bounds: the minimum lies above the maximum");
+    }
+    if let Some(dir) = &plan.temp_dir
+        && !dir.is_dir()
+    {
+        return bad(&format!("--temp-dir: {} is not a folder", dir.display()));
+    }
+    Ok(())
+}
+
+/// Reads every point once; again only if the headers were wrong about the bounds.
+fn read(
+    plan: &Plan,
+    job: &mut Job,
+    budget: &Budget,
+    temp_dir: &PathBuf,
+    pool: &rayon::ThreadPool,
+    events: &dyn Events,
+    clock: &mut Clock<'_>,
+) -> Result<Box<Gathered>, ConvertError> {
+    let mut hint = job.bounds_hint.map(|b| LatticeBounds {
+        min: std::array::from_fn(|a| job.lattice.quantize(a, b.min[a])),
+        max: std::array::from_fn(|a| job.lattice.quantize(a, b.max[a])),
+    });
+    for _ in 0..MAX_PASSES {
+        clock.phase(Phase::Read, job.points_declared);
+        match gather(plan, job, hint, temp_dir, budget.store_bytes, pool, events)? {
+            Outcome::Complete(gathered) => return Ok(gathered),
+            Outcome::Empty(stats) => return Err(nothing_to_convert(job, &stats)),
+            Outcome::Retry(bounds) => {
+                let line = "the bounds in the headers are wrong; reading again with the true ones";
+                job.warnings.push(line.into());
+                events.warning(line);
+                hint = Some(bounds);
+                if let Err(too_fine) = Cube::around(&bounds, &job.lattice) {
+                    job.coarsen(too_fine.coarser_by);
+                    let line = format!("coordinate step {:?}: {}", job.lattice.scale, job.lattice_reason);
+                    events.warning(&line);
+                    job.warnings.push(line);
+                    let rescale = |v: i64| v >> too_fine.coarser_by;
+                    hint = Some(LatticeBounds { min: bounds.min.map(rescale), max: bounds.max.map(|v| rescale(v) + 1) });
+                }
+            }
+        }
+    }
+    Err(ConvertError::Internal("the bounds of the inputs change from pass to pass".into()))
+}
+
+fn nothing_to_convert(job: &Job, stats: &Stats) -> ConvertError {
+    let read: u64 = stats.sources.iter().map(|s| s.read).sum();
+    if read > 0 {
+        return ConvertError::Input(format!(
+            "no point is left: of {read} points {} lie outside --bounds, {} have other classes, {} are thinned out, {} have \
+             no valid position",
+            stats.outside_bounds, stats.other_class, stats.thinned, stats.invalid
+        ));
+    }
+    let first = job.sources.first().map(|s| s.scan.info().path.display().to_string()).unwrap_or_default();
+    match job.sources.len() {
+        1 => ConvertError::Input(format!("{first}: holds no points; there is nothing to convert")),
+        n => ConvertError::Input(format!("{first} and {} more inputs hold no points; there is nothing to convert", n - 1)),
+    }
+}
+
+#[allow(clippy::too_many_arguments)] // the parts of one pass, each used once
+fn build(
+    plan: &Plan,
+    gathered: &Gathered,
+    frame: &RecordFrame,
+    layout: &OutputLayout,
+    description: &Description,
+    chunks: &[Chunk],
+    budget: &Budget,
+    staged: &StagedFolder,
+    pool: &rayon::ThreadPool,
+    events: &dyn Events,
+) -> Result<Built, ConvertError> {
+    let (file, path) = staged.create("octree.bin")?;
+    let writer = || PayloadWriter::new(layout.clone(), plan.encoding);
+    let keys = chunks.iter().map(|c| c.key).collect();
+    let sampler = Sampler::new(plan.sampling);
+    let committer = Committer::new(&file, &path, keys, budget.window, frame.stride, sampler, writer());
+    let chunk_plan = ChunkPlan {
+        frame,
+        store: &gathered.store,
+        leaf_capacity: plan.leaf_capacity,
+        duplicates: plan.duplicates,
+        widen_rgb: &description.widen_rgb,
+    };
+    let next = AtomicUsize::new(0);
+    let failed: Mutex<Option<(usize, ConvertError)>> = Mutex::new(None);
+    pool.broadcast(|_| {
+        let mut builder = ChunkBuilder::new(&chunk_plan, Sampler::new(plan.sampling), writer());
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(chunk) = chunks.get(index) else { break };
+            let Some(buffer) = committer.admit(index) else { break };
+            let result = if events.stop_requested() {
+                Err(ConvertError::Interrupted)
+            } else {
+                builder.build(chunk, buffer).and_then(|built: BuiltChunk| committer.submit(index, built))
+            };
+            events.advance(chunk.points);
+            if let Err(error) = result {
+                committer.stop();
+                if let Ok(mut failed) = failed.lock()
+                    && failed.as_ref().is_none_or(|(i, _)| index < *i)
+                {
+                    *failed = Some((index, error));
+                }
+                break;
+            }
+        }
+    });
+    if let Ok(Some((_, error))) = failed.into_inner() {
+        return Err(error);
+    }
+    let built = committer.finish()?;
+    file.sync_all().map_err(|e| ConvertError::io(&path, "syncing the payloads", e))?;
+    Ok(built)
+}
+
+/// Every point that was decoded must have been written, with the bytes that it had.
+fn account(stats: &Stats, built: &Built) -> Result<(), ConvertError> {
+    let written = built.accounts.unaltered();
+    if stats.checksum == written {
+        return Ok(());
+    }
+    Err(ConvertError::Internal(format!("points were lost on the way: read {:?}, written {written:?}", stats.checksum)))
+}
+
+/// Wall time by phase.
+struct Clock<'a> {
+    events: &'a dyn Events,
+    start: Instant,
+    phase_start: Instant,
+    phase: Option<Phase>,
+    done: Vec<(Phase, f64)>,
+}
+
+impl<'a> Clock<'a> {
+    fn start(events: &'a dyn Events) -> Self {
+        let now = Instant::now();
+        Self { events, start: now, phase_start: now, phase: None, done: Vec::new() }
+    }
+
+    fn phase(&mut self, phase: Phase, total: u64) {
+        self.close();
+        self.phase = Some(phase);
+        self.events.phase(phase, total);
+    }
+
+    fn close(&mut self) {
+        if let Some(phase) = self.phase.take() {
+            self.done.push((phase, self.phase_start.elapsed().as_secs_f64()));
+        }
+        self.phase_start = Instant::now();
+    }
+
+    fn finish(&mut self, points: u64) -> Vec<PhaseReport> {
+        self.close();
+        let report = |(phase, seconds): &(Phase, f64)| {
+            let points = if matches!(phase, Phase::Read | Phase::Build) { points } else { 0 };
+            let points_per_second = if *seconds > 0.0 { points as f64 / seconds } else { 0.0 };
+            PhaseReport { name: phase.name().into(), seconds: *seconds, points, points_per_second }
+        };
+        self.done.iter().map(report).collect()
+    }
+
+    fn seconds(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+}

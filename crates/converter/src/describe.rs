@@ -1,0 +1,410 @@
+//! What is told of a run: the metadata of the dataset and the report.
+
+use pointmill_format::potree2::{AttributeStats, Encoding as StoredEncoding, HierarchyBytes, Metadata, NodeEntry};
+use pointmill_format::{Aabb, Attribute, AttributeType, Crs, Lattice};
+use serde_json::{Map, Value, json};
+
+use crate::build::chunk::Accounts;
+use crate::crs::{self, ResolvedCrs};
+use crate::error::ConvertError;
+use crate::gather::{Gathered, Range, Stats, is_eight_bit};
+use crate::grid::{Cube, tidy_world};
+use crate::job::Job;
+use crate::plan::{AttributeChoice, Duplicates, Encoding, Plan, RgbDepth, Sampling};
+use crate::report::{
+    CoordinateChange, DroppedAttribute, GridReport, InputReport, PointsReport, Report, TreeReport,
+};
+use crate::sample::SPACING_BITS;
+
+/// Levels a hierarchy chunk, as the reference converter has it.
+pub(crate) const HIERARCHY_STEP: u32 = 4;
+
+/// What is known once every point was read.
+pub(crate) struct Description {
+    /// Attributes of the schema that go into the output, in output order.
+    pub(crate) kept: Vec<usize>,
+    /// For each source: byte offset in a stored record of a colour that is 8 bits deep.
+    pub(crate) widen_rgb: Vec<Option<usize>>,
+    dropped: Vec<DroppedAttribute>,
+    /// Ranges of the output, by index of the schema.
+    ranges: Vec<Range>,
+    crs: ResolvedCrs,
+    grid: GridReport,
+    warnings: Vec<String>,
+}
+
+impl Description {
+    pub(crate) fn new(plan: &Plan, job: &Job, stats: &Stats, cube: &Cube) -> Result<Self, ConvertError> {
+        let mut warnings = job.warnings.clone();
+        warnings.extend_from_slice(&stats.warnings);
+        let rgb = job.schema.rgb();
+        let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, &s.rgb)).collect();
+        let mut ranges = stats.ranges.clone();
+        let mut widen_rgb = vec![None; job.sources.len()];
+        if let Some(rgb) = rgb {
+            for (i, source) in stats.sources.iter().enumerate().filter(|(_, s)| s.kept > 0) {
+                let mut range = source.rgb.clone();
+                let has_colour = job.sources[i].columns.contains(&rgb);
+                if has_colour && depths[i] {
+                    if plan.rgb_depth == RgbDepth::Eight && range.max.iter().any(|v| *v > 255.0) {
+                        let path = job.sources[i].scan.info().path.display();
+                        return Err(ConvertError::Input(format!(
+                            "{path}: has colour values above 255, so they cannot be 8 bits deep; leave out --rgb-depth 8"
+                        )));
+                    }
+                    widen_rgb[i] = Some(job.schema.offsets[rgb]);
+                    range.min.iter_mut().chain(&mut range.max).for_each(|v| *v *= 257.0);
+                }
+                ranges[rgb].merge(&range);
+            }
+            warnings.extend(mixed_depths(job, stats, &depths, rgb));
+        }
+        let (kept, dropped) = choose_attributes(&plan.attributes, job, &ranges)?;
+        let crs = resolve_crs(plan, job, &mut warnings)?;
+        let grid = grid_report(job, cube);
+        Ok(Self { kept, widen_rgb, dropped, ranges, crs, grid, warnings })
+    }
+
+    pub(crate) fn metadata(
+        &self,
+        plan: &Plan,
+        gathered: &Gathered,
+        accounts: &Accounts,
+        hierarchy: &HierarchyBytes,
+        job: &Job,
+    ) -> Metadata {
+        let offset = self.grid.offset;
+        let side = gathered.cube.side;
+        let lattice = Lattice { scale: self.grid.scale, offset };
+        let stats = &gathered.stats;
+        let stored = |q: [i64; 3]| std::array::from_fn(|a| q[a] - gathered.cube.min[a]);
+        let mut position = AttributeStats {
+            attribute: Attribute::new("position", AttributeType::Int32, 3),
+            min: lattice.world(stored(stats.bounds.min)).to_vec(),
+            max: lattice.world(stored(stats.bounds.max)).to_vec(),
+            histogram: None,
+        };
+        position.attribute.description = String::new();
+        let mut attributes = vec![position];
+        attributes.extend(self.kept.iter().map(|&i| {
+            let attribute = job.schema.attributes[i].clone();
+            let range = &self.ranges[i];
+            // A range must be there and finite; a column of NaN has none.
+            let finite = |v: &[f64]| v.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect::<Vec<_>>();
+            let histogram = (attribute.name == "classification" && attribute.ty == AttributeType::UInt8)
+                .then(|| stats.classes.clone());
+            AttributeStats { attribute, min: finite(&range.min), max: finite(&range.max), histogram }
+        }));
+        let name = if plan.name.is_empty() { default_name(plan) } else { plan.name.clone() };
+        Metadata {
+            name,
+            description: String::new(),
+            points: stats.points - accounts.duplicates_dropped,
+            projection: self.crs.projection.clone(),
+            first_chunk_size: hierarchy.first_chunk_size,
+            step_size: HIERARCHY_STEP,
+            depth: hierarchy.depth,
+            lattice,
+            spacing: side / f64::from(1 << SPACING_BITS),
+            cube: Aabb { min: offset, max: offset.map(|v| v + side) },
+            encoding: match plan.encoding {
+                Encoding::Default => StoredEncoding::Default,
+                Encoding::Brotli { .. } => StoredEncoding::Brotli,
+            },
+            attributes,
+            extra: Map::from_iter([("pointmill".to_owned(), self.own_key(plan, job))]),
+        }
+    }
+
+    /// What a validator or a later run needs to know, and no viewer reads.
+    fn own_key(&self, plan: &Plan, job: &Job) -> Value {
+        let mut own = Map::new();
+        own.insert("version".into(), env!("CARGO_PKG_VERSION").into());
+        own.insert("latticeOffset".into(), json!(job.lattice.offset));
+        own.insert("sampling".into(), sampling_name(plan.sampling).into());
+        own.insert("leafCapacity".into(), plan.leaf_capacity.into());
+        own.insert("rgbDepth".into(), rgb_depth_name(plan.rgb_depth).into());
+        own.insert("duplicates".into(), duplicates_name(plan.duplicates).into());
+        let filter = filter_json(plan);
+        if !filter.is_empty() {
+            own.insert("filter".into(), filter.into());
+        }
+        if let Some(wkt) = &self.crs.wkt {
+            own.insert("wkt".into(), wkt.clone().into());
+        }
+        if !self.dropped.is_empty() {
+            let dropped = self.dropped.iter().map(|d| (d.name.clone(), d.why.clone().into()));
+            own.insert("attributesDropped".into(), Map::from_iter(dropped).into());
+        }
+        own.into()
+    }
+
+    pub(crate) fn report(
+        &self,
+        plan: &Plan,
+        job: &Job,
+        gathered: &Gathered,
+        accounts: &Accounts,
+        nodes: &[NodeEntry],
+    ) -> Report {
+        let stats = &gathered.stats;
+        let count = stats.points.max(1) as f64;
+        Report {
+            version: env!("CARGO_PKG_VERSION").into(),
+            options: options_json(plan),
+            inputs: input_reports(job, Some((stats, &self.widen_rgb))),
+            grid: self.grid.clone(),
+            points: PointsReport {
+                read: stats.sources.iter().map(|s| s.read).sum(),
+                written: stats.points - accounts.duplicates_dropped,
+                outside_bounds: stats.outside_bounds,
+                other_class: stats.other_class,
+                thinned: stats.thinned,
+                duplicates_dropped: accounts.duplicates_dropped,
+                invalid: stats.invalid,
+                unreadable: stats.unreadable.saturating_add(job.points_missing),
+            },
+            coordinate_change: CoordinateChange {
+                max: stats.change.max,
+                rms: stats.change.sum_of_squares.map(|s| (s / count).sqrt()),
+            },
+            attributes: std::iter::once("position".to_owned())
+                .chain(self.kept.iter().map(|&i| job.schema.attributes[i].name.clone()))
+                .collect(),
+            attributes_dropped: self.dropped.clone(),
+            tree: tree_report(nodes, accounts),
+            checksum_in: stats.checksum.to_string(),
+            checksum_out: accounts.unaltered().to_string(),
+            temp_bytes: gathered.store.spilled_bytes(),
+            warnings: self.warnings.clone(),
+            ..Report::default()
+        }
+    }
+}
+
+/// The inputs as the headers (and, once they were read, the points) tell them.
+pub(crate) fn input_reports(job: &Job, read: Option<(&Stats, &[Option<usize>])>) -> Vec<InputReport> {
+    let flat = |b: Aabb| [b.min[0], b.min[1], b.min[2], b.max[0], b.max[1], b.max[2]];
+    let rgb = job.schema.rgb();
+    let report = |(i, source): (usize, &crate::job::Source)| {
+        let info = source.scan.info();
+        let seen = read.map(|(stats, _)| &stats.sources[i]);
+        let has_rgb = rgb.is_some_and(|rgb| source.columns.contains(&rgb));
+        InputReport {
+            path: info.path.clone(),
+            format: info.format.clone(),
+            points_declared: info.points_declared,
+            points_read: seen.map_or(0, |s| s.read),
+            bounds_declared: info.bounds_declared.map(flat),
+            bounds_measured: seen.map(|s| s.bounds).filter(|b| !b.is_empty()).map(flat),
+            crs: crs::resolve(&info.crs, None).map(|c| c.label).unwrap_or_default(),
+            rgb_depth: read.filter(|_| has_rgb).map(|(_, widen)| if widen[i].is_some() { 8 } else { 16 }),
+        }
+    };
+    job.sources.iter().enumerate().map(report).collect()
+}
+
+/// The coordinate reference system of all inputs together.
+pub(crate) fn resolve_crs(plan: &Plan, job: &Job, warnings: &mut Vec<String>) -> Result<ResolvedCrs, ConvertError> {
+    if plan.crs.is_some() {
+        let resolved = crs::resolve(&Crs::default(), plan.crs.as_deref())?;
+        warnings.extend(resolved.note.clone());
+        return Ok(resolved);
+    }
+    let mut found: Vec<&Crs> = Vec::new();
+    for source in &job.sources {
+        let crs = &source.scan.info().crs;
+        if *crs != Crs::default() && !found.contains(&crs) {
+            found.push(crs);
+        }
+    }
+    let mut resolved = Vec::new();
+    for crs in found {
+        let one = crs::resolve(crs, None)?;
+        if !resolved.iter().any(|r: &ResolvedCrs| r.projection == one.projection && r.label == one.label) {
+            resolved.push(one);
+        }
+    }
+    match resolved.len() {
+        0 => Ok(ResolvedCrs::default()),
+        1 => {
+            let one = resolved.swap_remove(0);
+            warnings.extend(one.note.clone());
+            Ok(one)
+        }
+        _ => {
+            let labels: Vec<&str> = resolved.iter().map(|r| r.label.as_str()).collect();
+            warnings.push(format!(
+                "the inputs have different coordinate reference systems ({}); coordinates are taken as they are and the \
+                 projection stays empty; reproject the inputs, or name the system with --crs",
+                labels.join("; ")
+            ));
+            Ok(ResolvedCrs::default())
+        }
+    }
+}
+
+pub(crate) fn grid_report(job: &Job, cube: &Cube) -> GridReport {
+    let mut why = job.lattice_reason.clone();
+    if !job.is_lossless() {
+        why.push_str("; some inputs do not lie on it, their coordinates are rounded");
+    }
+    GridReport { scale: job.lattice.scale, offset: cube.offset(&job.lattice), cube_side: cube.side, why }
+}
+
+/// Attributes that go into the output: all, those that vary, or those that were named.
+pub(crate) fn choose_attributes(
+    choice: &AttributeChoice,
+    job: &Job,
+    ranges: &[Range],
+) -> Result<(Vec<usize>, Vec<DroppedAttribute>), ConvertError> {
+    let all = || 0..job.schema.attributes.len();
+    let drop = |i: usize, why: String| DroppedAttribute { name: job.schema.attributes[i].name.clone(), why };
+    match choice {
+        AttributeChoice::All => Ok((all().collect(), Vec::new())),
+        AttributeChoice::Scene => {
+            let (mut kept, mut dropped) = (Vec::new(), Vec::new());
+            for i in all() {
+                match ranges[i].constant() {
+                    Some(values) => {
+                        let text: Vec<String> = values.iter().map(f64::to_string).collect();
+                        dropped.push(drop(i, format!("constant {}", text.join(" "))));
+                    }
+                    None => kept.push(i),
+                }
+            }
+            Ok((kept, dropped))
+        }
+        AttributeChoice::List(names) => {
+            let mut kept = Vec::new();
+            for name in names.iter().filter(|n| *n != "position") {
+                let Some(i) = job.schema.find(name) else {
+                    let known: Vec<&str> = job.schema.attributes.iter().map(|a| a.name.as_str()).collect();
+                    return Err(ConvertError::Usage(format!(
+                        "--attributes: no input has \"{name}\"; there are: {}",
+                        known.join(", ")
+                    )));
+                };
+                if !kept.contains(&i) {
+                    kept.push(i);
+                }
+            }
+            let dropped = all().filter(|i| !kept.contains(i)).map(|i| drop(i, "not asked for".into())).collect();
+            Ok((kept, dropped))
+        }
+    }
+}
+
+fn mixed_depths(job: &Job, stats: &Stats, eight: &[bool], rgb: usize) -> Option<String> {
+    let coloured = |i: &usize| job.sources[*i].columns.contains(&rgb) && stats.sources[*i].kept > 0;
+    // A file without any colour value above 0 is no sign of anything.
+    let lit = |i: &usize| stats.sources[*i].rgb.max.iter().any(|v| *v > 0.0);
+    let coloured: Vec<usize> = (0..job.sources.len()).filter(coloured).filter(lit).collect();
+    let narrow = coloured.iter().filter(|i| eight[**i]).count();
+    if narrow == 0 || narrow == coloured.len() {
+        return None;
+    }
+    let first = coloured.iter().find(|i| eight[**i]).map(|i| job.sources[*i].scan.info().path.display().to_string());
+    Some(format!(
+        "{narrow} of {} inputs with colour hold no value above 255 and are taken as 8 bits deep, the others as 16 ({} is \
+         the first); --rgb-depth overrides",
+        coloured.len(),
+        first.unwrap_or_default()
+    ))
+}
+
+fn tree_report(nodes: &[NodeEntry], accounts: &Accounts) -> TreeReport {
+    let depth = nodes.iter().map(|n| usize::from(n.key.level)).max().unwrap_or(0);
+    let mut report = TreeReport {
+        nodes: nodes.len() as u64,
+        depth: depth as u32,
+        points_per_level: vec![0; depth + 1],
+        nodes_per_level: vec![0; depth + 1],
+        overfull_leaves: accounts.overfull_leaves,
+        largest_leaf: 0,
+    };
+    let parents: std::collections::HashSet<_> = nodes.iter().filter_map(|n| n.key.parent()).collect();
+    for n in nodes {
+        report.points_per_level[usize::from(n.key.level)] += u64::from(n.points);
+        report.nodes_per_level[usize::from(n.key.level)] += 1;
+        if !parents.contains(&n.key) {
+            report.largest_leaf = report.largest_leaf.max(u64::from(n.points));
+        }
+    }
+    report
+}
+
+fn default_name(plan: &Plan) -> String {
+    let stem = plan.output.file_name().map(|n| n.to_string_lossy().into_owned());
+    stem.filter(|s| !s.is_empty()).unwrap_or_else(|| "cloud".into())
+}
+
+fn sampling_name(sampling: Sampling) -> &'static str {
+    match sampling {
+        Sampling::Poisson => "poisson",
+        Sampling::Grid => "grid",
+        Sampling::Random { .. } => "random",
+    }
+}
+
+fn rgb_depth_name(depth: RgbDepth) -> &'static str {
+    match depth {
+        RgbDepth::Auto => "auto",
+        RgbDepth::Eight => "8",
+        RgbDepth::Sixteen => "16",
+    }
+}
+
+fn duplicates_name(duplicates: Duplicates) -> &'static str {
+    match duplicates {
+        Duplicates::Keep => "keep",
+        Duplicates::Drop => "drop",
+    }
+}
+
+fn filter_json(plan: &Plan) -> Map<String, Value> {
+    let mut filter = Map::new();
+    if let Some(b) = &plan.filter.bounds {
+        filter.insert("bounds".into(), json!([b.min[0], b.min[1], b.min[2], b.max[0], b.max[1], b.max[2]]));
+    }
+    if let Some(classes) = &plan.filter.classes {
+        filter.insert("classes".into(), json!(classes));
+    }
+    if plan.filter.every > 1 {
+        filter.insert("every".into(), plan.filter.every.into());
+    }
+    filter
+}
+
+fn options_json(plan: &Plan) -> Map<String, Value> {
+    let mut options = filter_json(plan);
+    options.insert("sampling".into(), sampling_name(plan.sampling).into());
+    if let Sampling::Random { seed } = plan.sampling {
+        options.insert("seed".into(), seed.into());
+    }
+    match plan.encoding {
+        Encoding::Default => options.insert("encoding".into(), "default".into()),
+        Encoding::Brotli { quality } => {
+            options.insert("brotli-quality".into(), quality.into());
+            options.insert("encoding".into(), "brotli".into())
+        }
+    };
+    let attributes = match &plan.attributes {
+        AttributeChoice::All => json!("all"),
+        AttributeChoice::Scene => json!("scene"),
+        AttributeChoice::List(names) => json!(names),
+    };
+    options.insert("attributes".into(), attributes);
+    options.insert("leaf-capacity".into(), plan.leaf_capacity.into());
+    options.insert("memory".into(), plan.memory_bytes.into());
+    options.insert("threads".into(), plan.threads.into());
+    options.insert("duplicates".into(), duplicates_name(plan.duplicates).into());
+    options.insert("rgb-depth".into(), rgb_depth_name(plan.rgb_depth).into());
+    options
+}
+
+/// World coordinates of the bounds that the headers declare, on the job lattice.
+pub(crate) fn tidy_bounds(job: &Job, min: [i64; 3], max: [i64; 3]) -> [f64; 6] {
+    let at = |q: [i64; 3], a: usize| tidy_world(q[a], job.lattice.scale[a], job.lattice.offset[a]);
+    [at(min, 0), at(min, 1), at(min, 2), at(max, 0), at(max, 1), at(max, 2)]
+}

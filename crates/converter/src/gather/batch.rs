@@ -1,0 +1,372 @@
+//! From a batch of columns to a block of records grouped by cell.
+
+use std::collections::HashMap;
+use std::sync::atomic::Ordering;
+
+use pointmill_format::{Aabb, Column, PointBatch, Positions, with_column};
+
+use super::{Pass, Segment, Segments, Stats};
+use crate::axis::SourceMap;
+use crate::error::ConvertError;
+use crate::grid::LatticeBounds;
+use crate::plan::{OnFault, RgbDepth};
+use crate::schema::POSITION_BYTES;
+
+/// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
+const TILE_POINTS: usize = 512;
+
+/// One thread's part of the pass.
+pub(crate) struct Worker<'a> {
+    pass: &'a Pass<'a>,
+    pub(crate) stats: Stats,
+    segments: Segments,
+    q: [Vec<i64>; 3],
+    selection: Vec<u32>,
+    cells: Vec<u64>,
+    grouping: Grouping,
+    records: Vec<u8>,
+}
+
+impl<'a> Worker<'a> {
+    pub(crate) fn new(pass: &'a Pass<'a>) -> Self {
+        Self {
+            pass,
+            stats: Stats::new(&pass.job.schema, pass.job.sources.len()),
+            segments: Segments::new(),
+            q: Default::default(),
+            selection: Vec::new(),
+            cells: Vec::new(),
+            grouping: Grouping::default(),
+            records: Vec::new(),
+        }
+    }
+
+    pub(crate) fn finish(self) -> (Stats, Segments) {
+        (self.stats, self.segments)
+    }
+
+    /// Takes one batch of `source`: filter, lattice, ranges, cells, records.
+    pub(crate) fn take(&mut self, source: usize, batch: &PointBatch) -> Result<(), ConvertError> {
+        let filtered = self.select(source, batch)?;
+        self.stats.sources[source].read += batch.len() as u64;
+        let kept = if filtered { self.selection.len() } else { batch.len() };
+        if kept == 0 {
+            return Ok(());
+        }
+        let selection = filtered.then_some(&self.selection[..]);
+        let bounds = quantize(&self.pass.job.sources[source].map, batch, selection, &mut self.q, &mut self.stats);
+        self.stats.bounds.union(&bounds);
+        if !self.pass.partition.holds(&bounds) {
+            self.pass.misled.store(true, Ordering::Relaxed);
+        }
+        if self.pass.misled.load(Ordering::Relaxed) {
+            return Ok(()); // the pass will be repeated with the bounds that this one finds
+        }
+        self.stats.points += kept as u64;
+        self.stats.sources[source].kept += kept as u64;
+        self.ranges(source, batch, filtered);
+        self.pass.partition.cells(&self.q, &mut self.cells);
+        self.grouping.group(&self.cells);
+        self.assemble(source, batch, filtered);
+        self.store(source)
+    }
+
+    /// Fills `selection` with the points that pass the filter; false if all do.
+    fn select(&mut self, source: usize, batch: &PointBatch) -> Result<bool, ConvertError> {
+        let scan = &self.pass.job.sources[source].scan;
+        let filter = &self.pass.plan.filter;
+        let stats = &mut self.stats;
+        let bounds = world_bounds(scan.info().lattice.as_ref(), &batch.positions);
+        stats.sources[source].bounds = stats.sources[source].bounds.union(&bounds);
+        let all_inside = filter.bounds.is_none_or(|b| b.contains(bounds.min) && b.contains(bounds.max));
+        let all_finite = match &batch.positions {
+            Positions::Quantized(_) => true,
+            Positions::World(p) => p.iter().all(|axis| axis.iter().all(|v| v.is_finite())),
+        };
+        if filter.every < 2 && all_inside && filter.classes.is_none() && all_finite {
+            return Ok(false);
+        }
+        let class_column = scan.info().attributes.iter().position(|a| a.name == "classification");
+        let classes = class_column.and_then(|c| match &batch.columns[c] {
+            Column::UInt8(v) => Some(v),
+            _ => None,
+        });
+        let world = |i: usize| -> [f64; 3] {
+            match (&batch.positions, scan.info().lattice.as_ref()) {
+                (Positions::Quantized(p), Some(l)) => {
+                    std::array::from_fn(|a| f64::from(p[a][i]) * l.scale[a] + l.offset[a])
+                }
+                (Positions::Quantized(p), None) => std::array::from_fn(|a| f64::from(p[a][i])),
+                (Positions::World(p), _) => std::array::from_fn(|a| p[a][i]),
+            }
+        };
+        self.selection.clear();
+        for i in 0..batch.len() {
+            if filter.every > 1 && !(batch.first_point + i as u64).is_multiple_of(filter.every) {
+                stats.thinned += 1;
+                continue;
+            }
+            let p = world(i);
+            if !p.iter().all(|v| v.is_finite()) {
+                if self.pass.plan.invalid == OnFault::Fail {
+                    return Err(ConvertError::Input(format!(
+                        "{}: point {} has no finite position; pass --invalid skip to leave such points out",
+                        scan.info().path.display(),
+                        batch.first_point + i as u64
+                    )));
+                }
+                stats.invalid += 1;
+            } else if filter.bounds.is_some_and(|b| !b.contains(p)) {
+                stats.outside_bounds += 1;
+            } else if filter.classes.as_ref().is_some_and(|c| !c.contains(&classes.map_or(0, |v| v[i]))) {
+                stats.other_class += 1;
+            } else {
+                self.selection.push(i as u32);
+            }
+        }
+        Ok(self.selection.len() < batch.len())
+    }
+
+    fn ranges(&mut self, source: usize, batch: &PointBatch, filtered: bool) {
+        let selection = filtered.then_some(&self.selection[..]);
+        let job = self.pass.job;
+        let rgb = job.schema.rgb();
+        let columns = &job.sources[source].columns;
+        for (column, &place) in batch.columns.iter().zip(columns) {
+            if Some(place) == rgb {
+                self.stats.sources[source].rgb.include(column, selection);
+            } else {
+                self.stats.ranges[place].include(column, selection);
+            }
+            if job.schema.attributes[place].name == "classification"
+                && let Column::UInt8(values) = column
+            {
+                match selection {
+                    Some(s) => s.iter().for_each(|i| self.stats.classes[usize::from(values[*i as usize])] += 1),
+                    None => count_classes(values, &mut self.stats.classes),
+                }
+            }
+        }
+        for place in (0..job.schema.attributes.len()).filter(|p| !columns.contains(p)) {
+            // What this source does not have is stored as zeros.
+            if Some(place) == rgb {
+                self.stats.sources[source].rgb.add(0.0);
+            } else {
+                self.stats.ranges[place].add(0.0);
+            }
+            if job.schema.attributes[place].name == "classification" {
+                let kept = selection.map_or(batch.len(), <[u32]>::len);
+                self.stats.classes[0] += kept as u64;
+            }
+        }
+    }
+
+    /// Builds the records in the order of their cells.
+    fn assemble(&mut self, source: usize, batch: &PointBatch, filtered: bool) {
+        let schema = &self.pass.job.schema;
+        let stride = schema.stride;
+        let order = &self.grouping.order;
+        let base = self.pass.partition.base();
+        self.records.clear();
+        self.records.resize(order.len() * stride, 0);
+        let mut rows = [0u32; TILE_POINTS];
+        for (tile, order) in self.records.chunks_mut(TILE_POINTS * stride).zip(order.chunks(TILE_POINTS)) {
+            for (record, &i) in tile.chunks_exact_mut(stride).zip(order) {
+                let i = i as usize;
+                let x = (self.q[0][i] - base[0]) as i32;
+                let y = (self.q[1][i] - base[1]) as i32;
+                let z = (self.q[2][i] - base[2]) as i32;
+                if let Some(position) = record.first_chunk_mut::<POSITION_BYTES>() {
+                    position[..4].copy_from_slice(&x.to_le_bytes());
+                    position[4..8].copy_from_slice(&y.to_le_bytes());
+                    position[8..].copy_from_slice(&z.to_le_bytes());
+                }
+            }
+            let rows = &mut rows[..order.len()];
+            for (row, &i) in rows.iter_mut().zip(order) {
+                *row = if filtered { self.selection[i as usize] } else { i };
+            }
+            for (column, &place) in batch.columns.iter().zip(&self.pass.job.sources[source].columns) {
+                put_column(tile, stride, schema.offsets[place], rows, column, schema.attributes[place].elements);
+            }
+            self.stats.checksum.add_all(tile, stride);
+        }
+    }
+
+    fn store(&mut self, source: usize) -> Result<(), ConvertError> {
+        let block = self.pass.store.add(source as u32, &mut self.records)?;
+        let mut start = 0;
+        for &(cell, count) in &self.grouping.groups {
+            self.segments.entry(cell).or_default().push(Segment { block, start, count });
+            start += count;
+        }
+        Ok(())
+    }
+}
+
+/// Writes one column into the records of a tile.
+fn put_column(tile: &mut [u8], stride: usize, offset: usize, rows: &[u32], column: &Column, elements: usize) {
+    let records = tile.chunks_exact_mut(stride).zip(rows);
+    with_column!(column, v => match elements {
+        1 => for (record, &i) in records {
+            let bytes = v[i as usize].to_le_bytes();
+            record[offset..offset + bytes.len()].copy_from_slice(&bytes);
+        },
+        _ => for (record, &i) in records {
+            let mut at = offset;
+            for value in &v[i as usize * elements..(i as usize + 1) * elements] {
+                let bytes = value.to_le_bytes();
+                record[at..at + bytes.len()].copy_from_slice(&bytes);
+                at += bytes.len();
+            }
+        },
+    });
+}
+
+/// Four tables, so that runs of one class do not wait for the same counter.
+fn count_classes(values: &[u8], into: &mut [u64]) {
+    let mut tables = [[0u32; 256]; 4];
+    let (quads, rest) = values.as_chunks::<4>();
+    for quad in quads {
+        for (table, v) in tables.iter_mut().zip(quad) {
+            table[usize::from(*v)] += 1;
+        }
+    }
+    rest.iter().for_each(|v| tables[0][usize::from(*v)] += 1);
+    for (class, count) in into.iter_mut().enumerate() {
+        *count += tables.iter().map(|t| u64::from(t[class])).sum::<u64>();
+    }
+}
+
+/// Puts the selected positions on the job lattice and returns their bounds there.
+fn quantize(
+    map: &SourceMap,
+    batch: &PointBatch,
+    selection: Option<&[u32]>,
+    q: &mut [Vec<i64>; 3],
+    stats: &mut Stats,
+) -> LatticeBounds {
+    let mut bounds = LatticeBounds::EMPTY;
+    for a in 0..3 {
+        q[a].clear();
+        let (max, squares) = match (&batch.positions, selection) {
+            (Positions::Quantized(p), None) => map.axes[a].map_integers(&p[a], &mut q[a]),
+            (Positions::World(p), None) => map.axes[a].map_world(&p[a], &mut q[a]),
+            (Positions::Quantized(p), Some(s)) => {
+                let chosen: Vec<i32> = s.iter().map(|i| p[a][*i as usize]).collect();
+                map.axes[a].map_integers(&chosen, &mut q[a])
+            }
+            (Positions::World(p), Some(s)) => {
+                let chosen: Vec<f64> = s.iter().map(|i| p[a][*i as usize]).collect();
+                map.axes[a].map_world(&chosen, &mut q[a])
+            }
+        };
+        stats.change.max[a] = stats.change.max[a].max(max);
+        stats.change.sum_of_squares[a] += squares;
+        bounds.min[a] = q[a].iter().copied().min().unwrap_or(i64::MAX);
+        bounds.max[a] = q[a].iter().copied().max().unwrap_or(i64::MIN);
+    }
+    bounds
+}
+
+fn world_bounds(lattice: Option<&pointmill_format::Lattice>, positions: &Positions) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
+    for a in 0..3 {
+        let (min, max) = match positions {
+            Positions::Quantized(p) => {
+                let (scale, offset) = lattice.map_or((1.0, 0.0), |l| (l.scale[a], l.offset[a]));
+                let (Some(min), Some(max)) = (p[a].iter().min(), p[a].iter().max()) else { continue };
+                (f64::from(*min) * scale + offset, f64::from(*max) * scale + offset)
+            }
+            Positions::World(p) => p[a]
+                .iter()
+                .filter(|v| v.is_finite())
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v))),
+        };
+        bounds.min[a] = min;
+        bounds.max[a] = max;
+    }
+    bounds
+}
+
+/// Groups points by cell: a counting sort over the few cells that a batch touches.
+#[derive(Default)]
+pub(crate) struct Grouping {
+    /// Indices of the points, cell by cell.
+    pub(crate) order: Vec<u32>,
+    /// Packed cell and number of points, in the order of `order`.
+    pub(crate) groups: Vec<(u64, u32)>,
+    local: HashMap<u64, u32>,
+    ids: Vec<u32>,
+    seen: Vec<(u64, u32)>,
+    starts: Vec<u32>,
+}
+
+impl Grouping {
+    pub(crate) fn group(&mut self, cells: &[u64]) {
+        self.local.clear();
+        self.seen.clear();
+        self.ids.clear();
+        let (mut last, mut id) = (None, 0);
+        for &cell in cells {
+            // Neighbours in a scan mostly share their cell.
+            if last != Some(cell) {
+                last = Some(cell);
+                id = *self.local.entry(cell).or_insert_with(|| {
+                    self.seen.push((cell, 0));
+                    (self.seen.len() - 1) as u32
+                });
+            }
+            self.ids.push(id);
+            self.seen[id as usize].1 += 1;
+        }
+        // Cells next to each other in space lie next to each other in the block.
+        let mut by_cell: Vec<u32> = (0..self.seen.len() as u32).collect();
+        by_cell.sort_unstable_by_key(|&id| super::partition::morton_of(self.seen[id as usize].0));
+        self.starts.clear();
+        self.starts.resize(self.seen.len(), 0);
+        self.groups.clear();
+        let mut start = 0;
+        for &id in &by_cell {
+            self.starts[id as usize] = start;
+            self.groups.push(self.seen[id as usize]);
+            start += self.seen[id as usize].1;
+        }
+        self.order.clear();
+        self.order.resize(cells.len(), 0);
+        for (i, &id) in self.ids.iter().enumerate() {
+            let at = &mut self.starts[id as usize];
+            self.order[*at as usize] = i as u32;
+            *at += 1;
+        }
+    }
+}
+
+/// Says what the colour values of a source mean.
+pub(crate) fn is_eight_bit(policy: RgbDepth, rgb: &super::stats::Range) -> bool {
+    match policy {
+        RgbDepth::Eight => true,
+        RgbDepth::Sixteen => false,
+        RgbDepth::Auto => !rgb.is_empty() && rgb.max.iter().all(|v| *v <= 255.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grouping_keeps_every_point_once_and_cells_together_in_input_order() {
+        let mut g = Grouping::default();
+        g.group(&[7, 7, 3, 7, 1, 3]);
+        let mut seen = 0;
+        for &(cell, count) in &g.groups {
+            let members = &g.order[seen..seen + count as usize];
+            assert!(members.is_sorted());
+            assert!(members.iter().all(|i| [7, 7, 3, 7, 1, 3][*i as usize] == cell));
+            seen += count as usize;
+        }
+        assert_eq!(seen, 6);
+        assert_eq!(g.groups.len(), 3);
+    }
+}

@@ -1,0 +1,165 @@
+//! The coarse grid by which records are grouped while they are read, before the exact bounds are known.
+
+use pointmill_format::{Lattice, NodeKey};
+
+use crate::grid::{ANCHOR_BITS, Cube, LatticeBounds, TREE_BITS};
+
+/// Bits of a packed cell coordinate, per axis.
+const CELL_BITS: u32 = 21;
+
+/// Aim of the grid: points in an occupied cell of a surface-like cloud.
+const POINTS_PER_CELL: u64 = 32_768;
+
+/// Cells of the grid, and the frame in which records keep their integers.
+#[derive(Debug, Clone)]
+pub(crate) struct Partition {
+    /// Subtracted from job lattice coordinates to store them as `i32`.
+    base: [i64; 3],
+    grid: Grid,
+}
+
+#[derive(Debug, Clone)]
+enum Grid {
+    /// Equal scales: cells of `2^shift` lattice steps on the absolute lattice. They are octree nodes of any cube whose
+    /// anchor is at least that coarse, so the bounds need not be known: `cell = (q >> shift) - first`.
+    Absolute { shift: u32, first: [i64; 3] },
+    /// Different scales: cells of a cube that is believed until the bounds are known.
+    OfCube { cube: Box<Cube>, level: u32 },
+}
+
+impl Partition {
+    /// A grid for about `points` points inside `hint`.
+    pub(crate) fn choose(hint: Option<LatticeBounds>, lattice: &Lattice, points: u64) -> Self {
+        let hint = hint.unwrap_or(LatticeBounds { min: [0; 3], max: [1 << 20; 3] });
+        let center: [i64; 3] = std::array::from_fn(|a| hint.min[a] / 2 + hint.max[a] / 2);
+        // Integers of a single LAS file fit as they are; only far-apart lattices need another zero.
+        let fits = |v: i64| i32::try_from(v).is_ok();
+        let base = if hint.min.iter().chain(&hint.max).all(|v| fits(*v)) { [0; 3] } else { center };
+        // Surfaces: cells quadruple with each level.
+        let level = (points / POINTS_PER_CELL).max(1).ilog2().div_ceil(2).clamp(ANCHOR_BITS + 2, 8);
+        let cube = Cube::around(&hint, lattice);
+        let grid = match cube {
+            Ok(cube) if !cube.is_aligned() => Grid::OfCube { cube: Box::new(cube), level },
+            cube => {
+                let bits = cube.map_or(TREE_BITS, |c| c.bits);
+                let shift = bits.saturating_sub(level);
+                Grid::Absolute { shift, first: center.map(|c| (c >> shift) - (1 << (CELL_BITS - 1))) }
+            }
+        };
+        Self { base, grid }
+    }
+
+    pub(crate) fn base(&self) -> [i64; 3] {
+        self.base
+    }
+
+    /// True if every point within `bounds` can be stored and has a cell.
+    pub(crate) fn holds(&self, bounds: &LatticeBounds) -> bool {
+        let stored = (0..3).all(|a| {
+            let fits = |q: i64| q.checked_sub(self.base[a]).is_some_and(|v| i32::try_from(v).is_ok());
+            fits(bounds.min[a]) && fits(bounds.max[a])
+        });
+        stored
+            && match &self.grid {
+                Grid::Absolute { shift, first } => (0..3).all(|a| {
+                    (bounds.min[a] >> shift) >= first[a] && (bounds.max[a] >> shift) - first[a] < 1 << CELL_BITS
+                }),
+                Grid::OfCube { .. } => true,
+            }
+    }
+
+    /// Packed cells of points that the partition holds.
+    pub(crate) fn cells(&self, q: &[Vec<i64>; 3], out: &mut Vec<u64>) {
+        out.clear();
+        let points = q[0].iter().zip(&q[1]).zip(&q[2]);
+        match &self.grid {
+            Grid::Absolute { shift, first } => out.extend(points.map(|((x, y), z)| {
+                pack([
+                    ((x >> shift) - first[0]) as u64,
+                    ((y >> shift) - first[1]) as u64,
+                    ((z >> shift) - first[2]) as u64,
+                ])
+            })),
+            Grid::OfCube { cube, level } => out.extend(points.map(|((x, y), z)| {
+                // Points outside the believed cube get some cell: the pass is then repeated anyway.
+                pack(cube.tree([*x, *y, *z]).map(|t| u64::from(t) >> (TREE_BITS - level)))
+            })),
+        }
+    }
+
+    /// True if the cells are octree nodes of the final cube.
+    pub(crate) fn fits(&self, cube: &Cube, bounds: &LatticeBounds) -> bool {
+        match &self.grid {
+            Grid::Absolute { shift, .. } => self.holds(bounds) && *shift <= cube.bits - ANCHOR_BITS,
+            Grid::OfCube { cube: believed, .. } => self.holds(bounds) && **believed == *cube,
+        }
+    }
+
+    /// The octree node of a packed cell.
+    pub(crate) fn node(&self, packed: u64, cube: &Cube) -> NodeKey {
+        let cell = unpack(packed);
+        match &self.grid {
+            Grid::Absolute { shift, first } => {
+                let [x, y, z] = std::array::from_fn(|a| (cell[a] as i64 + first[a] - (cube.min[a] >> shift)) as u32);
+                NodeKey { level: (cube.bits - shift) as u8, x, y, z }
+            }
+            Grid::OfCube { level, .. } => {
+                let [x, y, z] = cell.map(|c| c as u32);
+                NodeKey { level: *level as u8, x, y, z }
+            }
+        }
+    }
+}
+
+fn pack(cell: [u64; 3]) -> u64 {
+    let mask = (1 << CELL_BITS) - 1;
+    (cell[0] & mask) << (2 * CELL_BITS) | (cell[1] & mask) << CELL_BITS | (cell[2] & mask)
+}
+
+/// Rank of a packed cell in Morton order.
+pub(crate) fn morton_of(packed: u64) -> u64 {
+    crate::morton::interleave(unpack(packed).map(|c| c as u32))
+}
+
+fn unpack(packed: u64) -> [u64; 3] {
+    let mask = (1 << CELL_BITS) - 1;
+    [packed >> (2 * CELL_BITS) & mask, packed >> CELL_BITS & mask, packed & mask]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(hint: LatticeBounds, actual: LatticeBounds, scale: [f64; 3]) -> bool {
+        let lattice = Lattice { scale, offset: [0.0; 3] };
+        let partition = Partition::choose(Some(hint), &lattice, 20_000_000);
+        let cube = Cube::around(&actual, &lattice).unwrap();
+        if !partition.fits(&cube, &actual) {
+            return false;
+        }
+        // Every corner lies in the node that the partition names.
+        let mut cells = Vec::new();
+        for corner in 0..8 {
+            let q: [i64; 3] = std::array::from_fn(|a| if corner >> a & 1 == 0 { actual.min[a] } else { actual.max[a] });
+            partition.cells(&q.map(|v| vec![v]), &mut cells);
+            let node = partition.node(cells[0], &cube);
+            let t = cube.tree(q);
+            assert_eq!([node.x, node.y, node.z], t.map(|t| t >> (31 - u32::from(node.level))));
+        }
+        true
+    }
+
+    #[test]
+    fn cells_are_octree_nodes_even_when_the_header_was_somewhat_wrong() {
+        let hint = LatticeBounds { min: [1000, -70_000, 5], max: [101_000, 30_123, 9_000] };
+        assert!(check(hint, hint, [0.01; 3]));
+        let slightly_larger = LatticeBounds { min: [900, -70_003, 5], max: [101_000, 31_123, 12_000] };
+        assert!(check(hint, slightly_larger, [0.01; 3]));
+        let half = LatticeBounds { min: [1000, -30_000, 5], max: [40_000, 123, 9_000] };
+        assert!(check(hint, half, [0.01; 3]));
+        let tiny = LatticeBounds { min: [1000; 3], max: [1300; 3] };
+        assert!(!check(hint, tiny, [0.01; 3]), "cells coarser than the anchor must be refused");
+        assert!(check(hint, hint, [0.01, 0.01, 0.001]));
+        assert!(!check(hint, slightly_larger, [0.01, 0.01, 0.001]));
+    }
+}

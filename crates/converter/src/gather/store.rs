@@ -1,0 +1,155 @@
+//! Where records wait between being read and being built into nodes: memory first, one spill file when it must.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
+
+use crate::error::ConvertError;
+use crate::file_at::{read_exact_at, write_all_at};
+
+/// A run of records of one block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Segment {
+    pub(crate) block: u32,
+    pub(crate) start: u32,
+    pub(crate) count: u32,
+}
+
+/// Blocks of records. A block holds records of one source and never changes; it is dropped once all of it was taken.
+pub(crate) struct Store {
+    stride: usize,
+    memory_limit: u64,
+    in_memory: AtomicU64,
+    blocks: Mutex<Vec<Block>>,
+    spill: OnceLock<Result<File, String>>,
+    spill_dir: PathBuf,
+    spilled: AtomicU64,
+}
+
+struct Block {
+    source: u32,
+    /// Records that were not taken yet.
+    remaining: u32,
+    place: Place,
+}
+
+#[derive(Clone)]
+enum Place {
+    Memory(Arc<Vec<u8>>),
+    Disk { offset: u64 },
+    Gone,
+}
+
+impl Store {
+    /// An empty store that keeps up to `memory_limit` bytes in memory and puts the rest into a file in `spill_dir`.
+    pub(crate) fn new(spill_dir: &Path, stride: usize, memory_limit: u64) -> Self {
+        Self {
+            stride,
+            memory_limit,
+            in_memory: AtomicU64::new(0),
+            blocks: Mutex::default(),
+            spill: OnceLock::new(),
+            spill_dir: spill_dir.to_path_buf(),
+            spilled: AtomicU64::new(0),
+        }
+    }
+
+    /// Bytes that went to the spill file.
+    pub(crate) fn spilled_bytes(&self) -> u64 {
+        self.spilled.load(Ordering::Relaxed)
+    }
+
+    /// Adds a block of records and returns its index; `records` comes back (emptied) when it went to disk.
+    pub(crate) fn add(&self, source: u32, records: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        let bytes = records.len() as u64;
+        let before = self.in_memory.fetch_add(bytes, Ordering::Relaxed);
+        let place = if before + bytes <= self.memory_limit {
+            Place::Memory(Arc::new(std::mem::take(records)))
+        } else {
+            self.in_memory.fetch_sub(bytes, Ordering::Relaxed);
+            let offset = self.spilled.fetch_add(bytes, Ordering::Relaxed);
+            let file = self.spill_file()?;
+            write_all_at(file, records, offset)
+                .map_err(|e| ConvertError::io(&self.spill_dir, "writing the spill file", e))?;
+            Place::Disk { offset }
+        };
+        let remaining = (bytes / self.stride as u64) as u32;
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        blocks.push(Block { source, remaining, place });
+        Ok((blocks.len() - 1) as u32)
+    }
+
+    /// Appends the records of a segment to `out` and returns its source. Each record may be taken once.
+    pub(crate) fn take(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        let (place, source) = {
+            let blocks = self.blocks.lock().map_err(|_| poisoned())?;
+            let block = &blocks[segment.block as usize];
+            (block.place.clone(), block.source)
+        };
+        let (start, len) = (segment.start as usize * self.stride, segment.count as usize * self.stride);
+        match place {
+            Place::Memory(bytes) => out.extend_from_slice(&bytes[start..start + len]),
+            Place::Disk { offset } => {
+                let at = out.len();
+                out.resize(at + len, 0);
+                read_exact_at(self.spill_file()?, &mut out[at..], offset + start as u64)
+                    .map_err(|e| ConvertError::io(&self.spill_dir, "reading the spill file", e))?;
+            }
+            Place::Gone => return Err(ConvertError::Internal("a record was taken twice".into())),
+        }
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let block = &mut blocks[segment.block as usize];
+        block.remaining = block.remaining.saturating_sub(segment.count);
+        if block.remaining == 0
+            && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
+        {
+            self.in_memory.fetch_sub(bytes.len() as u64, Ordering::Relaxed);
+        }
+        Ok(source)
+    }
+
+    /// The spill file: made when first needed, without a name, so that nothing is left behind however the run ends.
+    fn spill_file(&self) -> Result<&File, ConvertError> {
+        let made = self.spill.get_or_init(|| tempfile::tempfile_in(&self.spill_dir).map_err(|e| e.to_string()));
+        made.as_ref().map_err(|e| {
+            let error = std::io::Error::other(e.clone());
+            ConvertError::io(&self.spill_dir, "making the spill file", error)
+        })
+    }
+}
+
+fn poisoned() -> ConvertError {
+    ConvertError::Internal("a worker thread failed while it held the store".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_and_disk_give_back_the_same_records() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = Store::new(dir.path(), 4, 40);
+        let a = store.add(0, &mut (0..40u8).collect()).unwrap();
+        let b = store.add(1, &mut (100..140u8).collect()).unwrap();
+        assert_eq!(store.spilled_bytes(), 40);
+        let mut out = Vec::new();
+        assert_eq!(store.take(Segment { block: b, start: 2, count: 3 }, &mut out).unwrap(), 1);
+        assert_eq!(store.take(Segment { block: a, start: 9, count: 1 }, &mut out).unwrap(), 0);
+        assert_eq!(out, (108..120).chain(36..40).collect::<Vec<u8>>());
+    }
+
+    #[test]
+    fn a_block_leaves_memory_once_all_of_it_was_taken() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = Store::new(dir.path(), 4, 40);
+        let a = store.add(0, &mut vec![1; 40]).unwrap();
+        let mut out = Vec::new();
+        store.take(Segment { block: a, start: 0, count: 4 }, &mut out).unwrap();
+        assert_eq!(store.in_memory.load(Ordering::Relaxed), 40);
+        store.take(Segment { block: a, start: 4, count: 6 }, &mut out).unwrap();
+        assert_eq!(store.in_memory.load(Ordering::Relaxed), 0);
+        assert!(store.take(Segment { block: a, start: 0, count: 1 }, &mut out).is_err());
+    }
+}

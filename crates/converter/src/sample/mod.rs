@@ -1,0 +1,66 @@
+//! How an inner node chooses its points from those of its children.
+//!
+//! All samplers see the candidates in Morton order, in tree coordinates, and depend on nothing else: the same points,
+//! the same sample, whatever the threads, the budget and the order of the inputs.
+
+mod cells;
+mod poisson;
+
+use pointmill_format::NodeKey;
+
+use crate::grid::TREE_BITS;
+use crate::plan::Sampling;
+
+/// Spacing of a node is its side divided by `2^SPACING_BITS`.
+pub(crate) const SPACING_BITS: u32 = 7;
+
+/// Chooses samples; one for each thread.
+pub(crate) struct Sampler {
+    candidates: Vec<[u32; 3]>,
+    accepted: Vec<bool>,
+    method: Method,
+}
+
+enum Method {
+    Poisson(Box<poisson::Poisson>),
+    Cells(Sampling),
+}
+
+impl Sampler {
+    pub(crate) fn new(sampling: Sampling) -> Self {
+        let method = match sampling {
+            Sampling::Poisson => Method::Poisson(Box::default()),
+            other => Method::Cells(other),
+        };
+        Self { candidates: Vec::new(), accepted: Vec::new(), method }
+    }
+
+    /// Forgets the candidates of the last node.
+    pub(crate) fn begin(&mut self) {
+        self.candidates.clear();
+    }
+
+    /// Adds the points of the next child, in Morton order.
+    pub(crate) fn offer(&mut self, points: impl Iterator<Item = [u32; 3]>) {
+        self.candidates.extend(points);
+    }
+
+    /// One flag for each candidate: true if the node takes it. At least one is true if there are candidates.
+    pub(crate) fn choose(&mut self, node: NodeKey) -> &[bool] {
+        self.accepted.clear();
+        self.accepted.resize(self.candidates.len(), false);
+        match &mut self.method {
+            Method::Poisson(p) => p.choose(node.level, &self.candidates, &mut self.accepted),
+            Method::Cells(Sampling::Random { seed }) => {
+                cells::random(node, *seed, &self.candidates, &mut self.accepted);
+            }
+            Method::Cells(_) => cells::nearest_to_center(node.level, &self.candidates, &mut self.accepted),
+        }
+        &self.accepted
+    }
+}
+
+/// Bits below the spacing of a level: a cell as wide as the spacing is `t >> cell_shift(level)`.
+fn cell_shift(level: u8) -> u32 {
+    (TREE_BITS - SPACING_BITS).saturating_sub(u32::from(level))
+}

@@ -1,0 +1,163 @@
+//! A dataset is made beside its final name, synced and renamed: finished or not there.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use crate::error::ConvertError;
+
+/// A folder that becomes the output when all is well, and vanishes when not.
+pub(crate) struct StagedFolder {
+    staging: TempDir,
+    output: PathBuf,
+    overwrite: bool,
+}
+
+impl StagedFolder {
+    /// Checks that `output` may be made and makes the staging folder beside it.
+    pub(crate) fn new(output: &Path, overwrite: bool) -> Result<Self, ConvertError> {
+        check_output(output, overwrite)?;
+        let parent = parent_of(output);
+        fs::create_dir_all(&parent).map_err(|e| ConvertError::io(&parent, "making the folder of the output", e))?;
+        let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let staging = tempfile::Builder::new()
+            .prefix(&format!(".{name}.unfinished-"))
+            .tempdir_in(&parent)
+            .map_err(|e| ConvertError::io(&parent, "making a folder beside the output", e))?;
+        Ok(Self { staging, output: output.to_path_buf(), overwrite })
+    }
+
+    /// The folder that holds the output, on whose file system it is made.
+    pub(crate) fn parent(&self) -> PathBuf {
+        parent_of(&self.output)
+    }
+
+    /// Creates a file of the dataset.
+    pub(crate) fn create(&self, name: &str) -> Result<(File, PathBuf), ConvertError> {
+        let path = self.staging.path().join(name);
+        let file = File::create(&path).map_err(|e| ConvertError::io(&path, "making the file", e))?;
+        Ok((file, path))
+    }
+
+    /// Writes and syncs a small file of the dataset.
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ConvertError> {
+        let (mut file, path) = self.create(name)?;
+        file.write_all(bytes).and_then(|()| file.sync_all()).map_err(|e| ConvertError::io(&path, "writing the file", e))
+    }
+
+    /// Gives the folder its final name. What stood there before goes only when the new one is in place.
+    pub(crate) fn finish(self) -> Result<(), ConvertError> {
+        let output = self.output.as_path();
+        let fail = |doing| move |e| ConvertError::io(output, doing, e);
+        check_output(&self.output, self.overwrite)?;
+        make_readable(self.staging.path()).map_err(fail("setting permissions"))?;
+        sync_folder(self.staging.path()).map_err(fail("syncing the output"))?;
+        let old = if self.output.exists() {
+            let mut old = self.staging.path().as_os_str().to_owned();
+            old.push("-old");
+            let old = PathBuf::from(old);
+            fs::rename(&self.output, &old).map_err(fail("moving the old output aside"))?;
+            Some(old)
+        } else {
+            None
+        };
+        if let Err(error) = fs::rename(self.staging.path(), &self.output) {
+            if let Some(old) = &old {
+                fs::rename(old, &self.output).map_err(fail("moving the old output back"))?;
+            }
+            return Err(fail("giving the output its name")(error));
+        }
+        let _moved = self.staging.keep();
+        sync_folder(&parent_of(&self.output)).map_err(fail("syncing the folder of the output"))?;
+        if let Some(old) = old {
+            fs::remove_dir_all(&old).map_err(fail("removing the old output"))?;
+        }
+        Ok(())
+    }
+}
+
+/// An output may be replaced if it is a dataset or an empty folder; anything else is not ours to delete.
+fn check_output(output: &Path, overwrite: bool) -> Result<(), ConvertError> {
+    let Ok(meta) = fs::symlink_metadata(output) else { return Ok(()) };
+    let is_empty = meta.is_dir() && fs::read_dir(output).is_ok_and(|mut d| d.next().is_none());
+    if is_empty {
+        return Ok(());
+    }
+    if !overwrite {
+        return Err(ConvertError::OutputExists(output.to_path_buf()));
+    }
+    if !meta.is_dir() || !output.join("metadata.json").is_file() {
+        return Err(ConvertError::Usage(format!(
+            "{}: exists and is not a dataset, so --overwrite does not replace it; choose another output",
+            output.display()
+        )));
+    }
+    Ok(())
+}
+
+fn parent_of(output: &Path) -> PathBuf {
+    match output.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// Temporary folders are private; a dataset is as readable as any folder that the user makes.
+fn make_readable(folder: &Path) -> std::io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // A folder made the ordinary way tells what the user's mask allows.
+        let probe = folder.join("mask");
+        fs::create_dir(&probe)?;
+        let mode = fs::metadata(&probe)?.permissions().mode();
+        fs::remove_dir(&probe)?;
+        fs::set_permissions(folder, fs::Permissions::from_mode(mode))?;
+    }
+    let _ = folder;
+    Ok(())
+}
+
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_output_appears_whole_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("größe");
+        let staged = StagedFolder::new(&out, false).unwrap();
+        staged.write("metadata.json", b"{}").unwrap();
+        assert!(!out.exists());
+        drop(staged);
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0, "nothing is left behind");
+        let staged = StagedFolder::new(&out, false).unwrap();
+        staged.write("metadata.json", b"{}").unwrap();
+        staged.finish().unwrap();
+        assert_eq!(fs::read(out.join("metadata.json")).unwrap(), b"{}");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn only_datasets_are_replaced_and_only_when_asked() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        fs::create_dir(&out).unwrap();
+        fs::write(out.join("letter.txt"), "dear").unwrap();
+        assert!(matches!(StagedFolder::new(&out, false), Err(ConvertError::OutputExists(_))));
+        assert!(matches!(StagedFolder::new(&out, true), Err(ConvertError::Usage(_))));
+        fs::write(out.join("metadata.json"), "{}").unwrap();
+        let staged = StagedFolder::new(&out, true).unwrap();
+        staged.write("metadata.json", b"new").unwrap();
+        staged.finish().unwrap();
+        assert_eq!(fs::read(out.join("metadata.json")).unwrap(), b"new");
+        assert!(!out.join("letter.txt").exists());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+}
