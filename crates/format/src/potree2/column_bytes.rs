@@ -4,7 +4,7 @@ use crate::Column;
 use crate::with_column;
 
 /// A number stored little-endian.
-trait LittleEndian: Copy {
+trait LittleEndian: Copy + Default {
     /// Reads the number at `at`.
     fn read(bytes: &[u8], at: usize) -> Self;
 }
@@ -34,13 +34,20 @@ pub(super) fn append_i32(values: &mut Vec<i32>, records: &[u8], record_len: usiz
 
 fn append_typed<T: LittleEndian>(values: &mut Vec<T>, records: &[u8], record_len: usize, at: usize, elements: usize) {
     let records = records.chunks_exact(record_len);
-    match elements {
-        1 => values.extend(records.map(|r| T::read(r, at))),
-        n => {
-            values.reserve(records.len() * n);
-            for record in records {
-                values.extend((0..n).map(|e| T::read(record, at + e * size_of::<T>())));
-            }
+    if elements == 1 {
+        values.extend(records.map(|r| T::read(r, at)));
+        return;
+    }
+    let start = values.len();
+    values.resize(start + records.len() * elements, T::default());
+    let new = &mut values[start..];
+    if elements == 3 {
+        for (out, record) in new.as_chunks_mut::<3>().0.iter_mut().zip(records) {
+            *out = std::array::from_fn(|e| T::read(record, at + e * size_of::<T>()));
+        }
+    } else {
+        for (out, record) in new.chunks_exact_mut(elements).zip(records) {
+            out.iter_mut().enumerate().for_each(|(e, out)| *out = T::read(record, at + e * size_of::<T>()));
         }
     }
 }

@@ -10,8 +10,14 @@ use super::{brotli, morton};
 /// Memory that a thread reuses from node to node.
 #[derive(Debug, Default)]
 pub struct BrotliScratch {
-    /// Morton code (96 bits) and index (32 bits) of every point.
-    order: Vec<u128>,
+    /// Morton code of every point, 96 bits: the upper word from bit 48 on, then the lower one. Sorted in the end.
+    codes: Vec<u128>,
+    /// Codes without what all share, with the index of the point in the low bits.
+    keys: Vec<u64>,
+    /// The same where 64 bits are too few.
+    wide_keys: Vec<u128>,
+    /// Indices of the points in the order in which they are stored.
+    order: Vec<u32>,
     /// Records in that order.
     sorted: Vec<u8>,
     /// The planes before compression.
@@ -58,56 +64,93 @@ fn check(attributes: &[Attribute], len: usize, record_len: usize) -> io::Result<
 }
 
 impl BrotliScratch {
-    /// Fills `sorted` with `records` in canonical order.
+    /// Fills `order` and `sorted` with `records` in canonical order.
     fn sort(&mut self, records: &[u8], record_len: usize) {
-        let record = |code: u128| {
-            let at = (code as u32) as usize * record_len;
-            &records[at..at + record_len]
-        };
-        self.order.clear();
-        self.order.extend(records.chunks_exact(record_len).enumerate().map(|(index, r)| {
+        let record = |index: &u32| &records[*index as usize * record_len..][..record_len];
+        self.codes.clear();
+        self.codes.extend(records.chunks_exact(record_len).map(|r| {
             let (upper, lower) = morton::position_words(position(r));
-            u128::from(upper) << 80 | u128::from(lower) << 32 | index as u128
+            u128::from(upper) << 48 | u128::from(lower)
         }));
-        self.order.sort_unstable();
-        for run in self.order.chunk_by_mut(|a, b| a >> 32 == b >> 32).filter(|run| run.len() > 1) {
-            run.sort_unstable_by(|a, b| record(*a).cmp(record(*b)));
+        self.sort_codes();
+        let mut start = 0;
+        for run in self.codes.chunk_by(|a, b| a == b) {
+            let end = start + run.len();
+            if run.len() > 1 {
+                self.order[start..end].sort_unstable_by(|a, b| record(a).cmp(record(b)));
+            }
+            start = end;
         }
         self.sorted.clear();
         self.sorted.reserve(records.len());
-        for code in &self.order {
-            self.sorted.extend_from_slice(record(*code));
+        self.order.iter().for_each(|index| self.sorted.extend_from_slice(record(index)));
+    }
+
+    /// Sorts `codes` and fills `order` with the indices that they had. The points of a node share the high bits of
+    /// their codes, so what differs fits 64 bits together with the index, in all but very wide nodes: shorter keys sort
+    /// faster.
+    fn sort_codes(&mut self) {
+        let first = self.codes.first().copied().unwrap_or(0);
+        let differing = self.codes.iter().fold(0, |bits, code| bits | (code ^ first));
+        let code_bits = u128::BITS - differing.leading_zeros();
+        let index_bits = usize::BITS - self.codes.len().leading_zeros();
+        self.order.clear();
+        if code_bits + index_bits <= u64::BITS {
+            let mask = (1u128 << code_bits) - 1;
+            let key = |(index, code): (usize, &u128)| ((code & mask) as u64) << index_bits | index as u64;
+            self.keys.clear();
+            self.keys.extend(self.codes.iter().enumerate().map(key));
+            self.keys.sort_unstable();
+            self.order.extend(self.keys.iter().map(|key| (key & ((1 << index_bits) - 1)) as u32));
+            let code = |key: &u64| first & !mask | u128::from(key >> index_bits);
+            self.codes.iter_mut().zip(&self.keys).for_each(|(out, key)| *out = code(key));
+        } else {
+            self.wide_keys.clear();
+            self.wide_keys.extend(self.codes.iter().enumerate().map(|(index, code)| code << 32 | index as u128));
+            self.wide_keys.sort_unstable();
+            self.order.extend(self.wide_keys.iter().map(|key| *key as u32));
+            self.codes.iter_mut().zip(&self.wide_keys).for_each(|(out, key)| *out = key >> 32);
         }
     }
 
-    /// Fills `planar` from `order` and `sorted`.
+    /// Fills `planar` from `codes` and `sorted`.
     fn planarise(&mut self, attributes: &[Attribute], record_len: usize) {
-        self.planar.clear();
-        self.planar.reserve(self.order.len() * attributes.iter().map(planar_size).sum::<usize>());
+        let count = self.order.len();
+        self.planar.resize(count * attributes.iter().map(planar_size).sum::<usize>(), 0);
+        let mut rest = self.planar.as_mut_slice();
         let mut at = 0;
         for attribute in attributes {
-            let size = attribute.size();
-            let values = self.sorted.chunks_exact(record_len).map(|r| &r[at..at + size]);
-            match attribute.name.as_str() {
-                "position" => {
-                    for code in &self.order {
-                        let upper = (code >> 80) as u64;
-                        let lower = (code >> 32) as u64 & 0xffff_ffff_ffff;
-                        self.planar.extend_from_slice(&upper.to_le_bytes());
-                        self.planar.extend_from_slice(&lower.to_le_bytes());
+            let (plane, after) = rest.split_at_mut(count * planar_size(attribute));
+            rest = after;
+            let values = self.sorted.chunks_exact(record_len).map(|r| &r[at..at + attribute.size()]);
+            match (attribute.name.as_str(), attribute.size()) {
+                ("position", _) => {
+                    for (out, code) in plane.as_chunks_mut::<16>().0.iter_mut().zip(&self.codes) {
+                        let (upper, lower) = ((code >> 48) as u64, *code as u64 & 0xffff_ffff_ffff);
+                        *out = (u128::from(lower) << 64 | u128::from(upper)).to_le_bytes();
                     }
                 }
-                "rgb" => {
-                    for v in values {
+                ("rgb", _) => {
+                    for (out, v) in plane.as_chunks_mut::<8>().0.iter_mut().zip(values) {
                         let channel = |c: usize| u16::from_le_bytes([v[2 * c], v[2 * c + 1]]);
-                        let code = morton::interleave(channel(0), channel(1), channel(2));
-                        self.planar.extend_from_slice(&code.to_le_bytes());
+                        *out = morton::interleave(channel(0), channel(1), channel(2)).to_le_bytes();
                     }
                 }
-                _ => values.for_each(|v| self.planar.extend_from_slice(v)),
+                // The usual sizes by name: a copy of a known length is a single instruction.
+                (_, 1) => copy::<1>(plane, values),
+                (_, 2) => copy::<2>(plane, values),
+                (_, 4) => copy::<4>(plane, values),
+                (_, 8) => copy::<8>(plane, values),
+                (_, size) => plane.chunks_exact_mut(size).zip(values).for_each(|(out, v)| out.copy_from_slice(v)),
             }
-            at += size;
+            at += attribute.size();
         }
+    }
+}
+
+fn copy<'v, const N: usize>(plane: &mut [u8], values: impl Iterator<Item = &'v [u8]>) {
+    for (out, value) in plane.as_chunks_mut::<N>().0.iter_mut().zip(values) {
+        out.copy_from_slice(value);
     }
 }
 

@@ -90,19 +90,20 @@ impl NodePoints {
 }
 
 fn fill_positions(positions: &mut [Vec<i32>; 3], plane: &[u8]) {
-    let [xs, ys, zs] = positions;
     let words = plane.as_chunks::<8>().0.as_chunks::<2>().0;
+    let [xs, ys, zs] = positions;
     for values in [&mut *xs, &mut *ys, &mut *zs] {
-        values.reserve(words.len());
+        values.resize(words.len(), 0);
     }
-    for [upper, lower] in words {
-        let [x, y, z] = morton::position_from_words(u64::from_le_bytes(*upper), u64::from_le_bytes(*lower));
-        xs.push(x);
-        ys.push(y);
-        zs.push(z);
+    for ((([upper, lower], x), y), z) in words.iter().zip(xs).zip(ys).zip(zs) {
+        [*x, *y, *z] = morton::position_from_words(u64::from_le_bytes(*upper), u64::from_le_bytes(*lower));
     }
 }
 
 fn fill_rgb(values: &mut Vec<u16>, plane: &[u8]) {
-    values.extend(plane.as_chunks::<8>().0.iter().flat_map(|w| morton::deinterleave(u64::from_le_bytes(*w))));
+    let codes = plane.as_chunks::<8>().0;
+    values.resize(3 * codes.len(), 0);
+    for (rgb, code) in values.as_chunks_mut::<3>().0.iter_mut().zip(codes) {
+        *rgb = morton::deinterleave(u64::from_le_bytes(*code));
+    }
 }

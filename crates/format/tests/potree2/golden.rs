@@ -108,3 +108,29 @@ fn a_lazy_walk_loads_a_chunk_when_it_comes_to_its_proxy() {
     assert_eq!(tree.children(border).map(|n| n.key.to_string()).collect::<Vec<_>>(), ["r00007"]);
     assert_eq!(tree.load(&dataset, border).unwrap(), 0);
 }
+
+/// The bytes that the format page quotes, `file offset: hex  comment`, are those of the golden files.
+#[test]
+fn the_worked_example_of_the_format_page_is_the_golden_dataset() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats/potree2.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let files = load(&golden("default"));
+    let brotli = Dataset::open(&golden("brotli")).unwrap();
+    let (mut payload, mut planar) = (Vec::new(), vec![0; 3 * 39]);
+    brotli.read_payload(&brotli.read_root_chunk().unwrap()[0], &mut payload).unwrap();
+    assert_eq!(brotlic::decompress(&payload, &mut planar).unwrap(), planar.len());
+
+    let sources = [("hierarchy.bin ", files.hierarchy), ("octree.bin ", files.octree), ("brotli r ", planar)];
+    let mut quoted = [0; 3];
+    for line in page.lines() {
+        for ((name, bytes), quoted) in sources.iter().zip(&mut quoted) {
+            let Some((offset, rest)) = line.strip_prefix(name).and_then(|rest| rest.split_once(": ")) else { continue };
+            let hex = rest.split("  ").next().unwrap();
+            let expected: Vec<u8> = hex.split(' ').map(|h| u8::from_str_radix(h, 16).unwrap()).collect();
+            let offset: usize = offset.trim().parse().unwrap();
+            assert_eq!(bytes[offset..offset + expected.len()], expected, "{line}");
+            *quoted += expected.len();
+        }
+    }
+    assert_eq!(quoted, [176, 33, 117]);
+}
