@@ -51,7 +51,8 @@ impl Budget {
             });
         }
         let free = usable - fixed_bytes;
-        let chunk_points = (free / 2 / threads / bytes_per_chunk_point).clamp(least_chunk, MAX_CHUNK_POINTS.max(least_chunk));
+        let chunk_points =
+            (free / 2 / threads / bytes_per_chunk_point).clamp(least_chunk, MAX_CHUNK_POINTS.max(least_chunk));
         let store_bytes = free - threads * chunk_points * bytes_per_chunk_point;
         Ok(Self { store_bytes, chunk_points, window, fixed_bytes, bytes_per_chunk_point, ceiling })
     }

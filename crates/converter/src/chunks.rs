@@ -100,12 +100,9 @@ fn divide_once(cell: &Cell, gathered: &Gathered, frame: &RecordFrame) -> Result<
                         part.points += u64::from(count);
                         part.segments.push(segment);
                     }
-                    None => parts.push(Cell {
-                        key,
-                        points: u64::from(count),
-                        segments: vec![segment],
-                        is_one_place: false,
-                    }),
+                    None => {
+                        parts.push(Cell { key, points: u64::from(count), segments: vec![segment], is_one_place: false })
+                    }
                 }
             }
         }

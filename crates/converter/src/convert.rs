@@ -133,7 +133,8 @@ fn read(
                     events.warning(&line);
                     job.warnings.push(line);
                     let rescale = |v: i64| v >> too_fine.coarser_by;
-                    hint = Some(LatticeBounds { min: bounds.min.map(rescale), max: bounds.max.map(|v| rescale(v) + 1) });
+                    hint =
+                        Some(LatticeBounds { min: bounds.min.map(rescale), max: bounds.max.map(|v| rescale(v) + 1) });
                 }
             }
         }
@@ -153,7 +154,10 @@ fn nothing_to_convert(job: &Job, stats: &Stats) -> ConvertError {
     let first = job.sources.first().map(|s| s.scan.info().path.display().to_string()).unwrap_or_default();
     match job.sources.len() {
         1 => ConvertError::Input(format!("{first}: holds no points; there is nothing to convert")),
-        n => ConvertError::Input(format!("{first} and {} more inputs hold no points; there is nothing to convert", n - 1)),
+        n => ConvertError::Input(format!(
+            "{first} and {} more inputs hold no points; there is nothing to convert",
+            n - 1
+        )),
     }
 }
 

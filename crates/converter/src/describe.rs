@@ -11,9 +11,7 @@ use crate::gather::{Gathered, Range, Stats, is_eight_bit};
 use crate::grid::{Cube, tidy_world};
 use crate::job::Job;
 use crate::plan::{AttributeChoice, Duplicates, Encoding, Plan, RgbDepth, Sampling};
-use crate::report::{
-    CoordinateChange, DroppedAttribute, GridReport, InputReport, PointsReport, Report, TreeReport,
-};
+use crate::report::{CoordinateChange, DroppedAttribute, GridReport, InputReport, PointsReport, Report, TreeReport};
 use crate::sample::SPACING_BITS;
 
 /// Levels a hierarchy chunk, as the reference converter has it.

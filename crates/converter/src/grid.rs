@@ -201,7 +201,8 @@ mod tests {
 
     #[test]
     fn unequal_scales_give_one_cube_and_points_inside_it() {
-        let bounds = LatticeBounds { min: [-1_220_000_000, 450_000_000, 0], max: [-1_219_900_000, 450_100_000, 30_000] };
+        let bounds =
+            LatticeBounds { min: [-1_220_000_000, 450_000_000, 0], max: [-1_219_900_000, 450_100_000, 30_000] };
         let l = lattice([1e-7, 1e-7, 0.01]);
         let cube = Cube::around(&bounds, &l).unwrap();
         assert!(cube.side >= 300.0 && cube.side < 1200.0);

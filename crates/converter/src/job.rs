@@ -133,7 +133,8 @@ impl Job {
     pub(crate) fn coarsen(&mut self, bits: u32) {
         let factor = 2f64.powi(bits as i32);
         self.lattice.scale = self.lattice.scale.map(|s| s * factor);
-        self.lattice_reason = format!("{}; made {factor} times coarser, or 31 bits could not hold the extent", self.lattice_reason);
+        self.lattice_reason =
+            format!("{}; made {factor} times coarser, or 31 bits could not hold the extent", self.lattice_reason);
         for source in &mut self.sources {
             source.map = SourceMap::new(source.scan.info().lattice.as_ref(), &self.lattice);
         }

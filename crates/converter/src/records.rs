@@ -28,11 +28,9 @@ impl RecordFrame {
 #[inline]
 pub(crate) fn position(record: &[u8]) -> [i32; 3] {
     match record.first_chunk::<POSITION_BYTES>() {
-        Some(&[a, b, c, d, e, f, g, h, i, j, k, l]) => [
-            i32::from_le_bytes([a, b, c, d]),
-            i32::from_le_bytes([e, f, g, h]),
-            i32::from_le_bytes([i, j, k, l]),
-        ],
+        Some(&[a, b, c, d, e, f, g, h, i, j, k, l]) => {
+            [i32::from_le_bytes([a, b, c, d]), i32::from_le_bytes([e, f, g, h]), i32::from_le_bytes([i, j, k, l])]
+        }
         None => [0; 3],
     }
 }

@@ -78,8 +78,13 @@ pub(crate) fn gather(
     events: &dyn Events,
 ) -> Result<Outcome, ConvertError> {
     let partition = Partition::choose(hint, &job.lattice, job.points_declared);
-    let pass =
-        Pass { plan, job, partition, store: Store::new(temp_dir, job.schema.stride, store_bytes), misled: false.into() };
+    let pass = Pass {
+        plan,
+        job,
+        partition,
+        store: Store::new(temp_dir, job.schema.stride, store_bytes),
+        misled: false.into(),
+    };
     let (stats, segments) = pass.run(pool, events)?;
     let Pass { partition, store, misled, .. } = pass;
     if stats.bounds.is_empty() {
@@ -191,9 +196,9 @@ impl Pass<'_> {
                 worker.stats.warnings.push(format!("left out {lost} points: {error}"));
                 Ok(())
             }
-            Err(error) if error.advice.is_empty() => Err(error
-                .advise("copy the file again, or pass --unreadable skip to convert the rest")
-                .into()),
+            Err(error) if error.advice.is_empty() => {
+                Err(error.advise("copy the file again, or pass --unreadable skip to convert the rest").into())
+            }
             Err(error) => Err(error.into()),
         }
     }

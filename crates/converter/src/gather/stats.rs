@@ -112,11 +112,7 @@ macro_rules! extremes {
                     max = if v > max || !max.is_finite_number() { v } else { max };
                     odd |= !v.is_finite_number();
                 }
-                if odd {
-                    Number::finite_extremes($values)
-                } else {
-                    (min.as_f64(), max.as_f64(), false)
-                }
+                if odd { Number::finite_extremes($values) } else { (min.as_f64(), max.as_f64(), false) }
             }
         }
     }};

@@ -9,9 +9,8 @@ pub(super) fn nearest_to_center(level: u8, candidates: &[[u32; 3]], accepted: &m
     let shift = cell_shift(level);
     let mask = (1u64 << shift) - 1;
     // Twice the distance, so that the centre of an even-sized cell is a whole number.
-    let off_center = |t: &[u32; 3]| -> u64 {
-        t.iter().map(|v| (2 * (u64::from(*v) & mask)).abs_diff(mask).pow(2)).sum()
-    };
+    let off_center =
+        |t: &[u32; 3]| -> u64 { t.iter().map(|v| (2 * (u64::from(*v) & mask)).abs_diff(mask).pow(2)).sum() };
     for_each_cell(shift, candidates, |run, start| {
         let best = (0..run.len()).min_by_key(|&i| off_center(&run[i])).unwrap_or(0);
         accepted[start + best] = true;

@@ -10,6 +10,9 @@ use super::quiet;
 use super::source::Source;
 use crate::ReadError;
 
+/// So many chunks may be empty (some writers close a chunk that they never fill).
+const EMPTY_CHUNKS: u64 = 16;
+
 /// One chunk, in file order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Chunk {
@@ -54,15 +57,16 @@ impl Layout {
         let head: [u8; 8] = source.array_at(table).map_err(|e| e.what)?;
         let (version, count) = (u32_at(&head, 0), u64::from(u32_at(&head, 4)));
         let data_bytes = table - self.chunks_start();
-        if version != 0 || count > data_bytes / self.record_len as u64 {
+        if version != 0 || count > data_bytes / self.record_len as u64 + EMPTY_CHUNKS {
             return Err(format!("it declares version {version} and {count} chunks in {data_bytes} bytes of points"));
         }
         // an entry is two corrected integers of at most 32 bits and their contexts: 16 bytes are ample
         let coded = source.vec_at(table + 8, 16 * count + 64).map_err(|e| e.what)?;
-        let chunks = quiet::catch(|| self.decode_entries(coded, count as usize))
+        let mut chunks = quiet::catch(|| self.decode_entries(coded, count as usize))
             .unwrap_or_else(Err)
             .map_err(|e| format!("it does not decode: {e}"))?;
         self.check(&chunks, data_bytes)?;
+        while chunks.pop_if(|chunk| chunk.points == 0).is_some() {}
         Ok(chunks)
     }
 
@@ -70,6 +74,9 @@ impl Layout {
         let last = chunks.len().saturating_sub(1);
         for (i, chunk) in chunks.iter().enumerate() {
             let exact = i < last || self.chunk_points.is_none();
+            if chunk.points == 0 {
+                continue;
+            }
             if chunk.bytes < self.record_len as u64 || (exact && chunk.points > self.max_points(chunk.bytes)) {
                 return Err(format!("chunk {i} claims {} points in {} bytes", chunk.points, chunk.bytes));
             }
@@ -112,7 +119,7 @@ impl Layout {
                 points = integers.decompress(&mut decoder, points, POINTS).map_err(|e| e.to_string())?;
             }
             bytes = integers.decompress(&mut decoder, bytes, BYTES).map_err(|e| e.to_string())?;
-            let points = self.chunk_points.unwrap_or(points as u32);
+            let points = self.chunk_points.filter(|_| bytes != 0).unwrap_or(points as u32);
             out.push(Chunk { points: u64::from(points), bytes: u64::from(bytes as u32) });
         }
         Ok(out)

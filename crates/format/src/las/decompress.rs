@@ -127,3 +127,51 @@ pub(super) fn selection(schema: &Schema, wanted: &Wanted) -> DecompressionSelect
     });
     DecompressionSelection(bits)
 }
+
+#[cfg(test)]
+mod tests {
+    use laz::LazItemRecordBuilder;
+    use laz::las::Point7;
+    use laz::record::{LayeredPointRecordCompressor, RecordCompressor};
+
+    use super::*;
+
+    const RECORD_LEN: usize = 36;
+    const LAYOUT: Layout = Layout { points_start: 0, record_len: RECORD_LEN, chunk_points: Some(50_000), layers: 10 };
+
+    fn items() -> Vec<LazItem> {
+        LazItemRecordBuilder::default_version_of::<Point7>(0)
+    }
+
+    /// A chunk of three points.
+    fn chunk() -> Vec<u8> {
+        let mut compressor = LayeredPointRecordCompressor::new(Cursor::new(Vec::new()));
+        compressor.set_fields_from(&items()).unwrap();
+        for i in 0..3u8 {
+            compressor.compress_next(&[i; RECORD_LEN]).unwrap();
+        }
+        compressor.done().unwrap();
+        compressor.into_inner().into_inner()
+    }
+
+    fn decode(chunk: &[u8], points: u64) -> Result<Vec<u8>, Stop> {
+        let mut out = vec![0; RECORD_LEN * points as usize];
+        Decompressor::layered(&items(), LAYOUT, DecompressionSelection::all(), chunk, points)?.fill(&mut out).1?;
+        Ok(out)
+    }
+
+    /// The decompressor itself would allocate 4 GiB, or read a fourth point that is not there.
+    #[test]
+    fn a_chunk_whose_head_lies_is_refused_before_the_decompressor_sees_it() {
+        let whole = chunk();
+        assert_eq!(decode(&whole, 3).unwrap()[RECORD_LEN..2 * RECORD_LEN], [1; RECORD_LEN]);
+        assert!(matches!(decode(&whole, 4), Err(Stop::Corrupt(_))));
+        assert!(matches!(decode(&whole[..whole.len() - 1], 3), Err(Stop::Corrupt(_))));
+        for layer in 0..LAYOUT.layers {
+            let mut bytes = whole.clone();
+            let at = RECORD_LEN + 4 + 4 * layer;
+            bytes[at..at + 4].fill(0xff);
+            assert!(matches!(decode(&bytes, 3), Err(Stop::Corrupt(_))), "layer {layer}");
+        }
+    }
+}

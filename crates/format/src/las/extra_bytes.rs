@@ -25,7 +25,7 @@ impl ExtraBytes {
             warnings.push("there is more than one Extra Bytes record; the first is taken".to_owned());
         }
         let data = records.find("LASF_Spec", 4).map_or(&[][..], |r| &r.data);
-        if data.len() % DESCRIPTOR != 0 {
+        if !data.len().is_multiple_of(DESCRIPTOR) {
             warnings.push(format!("the Extra Bytes record has {} bytes, not a multiple of {DESCRIPTOR}", data.len()));
         }
         for descriptor in data.chunks_exact(DESCRIPTOR) {

@@ -8,24 +8,35 @@ use crate::{Column, PointBatch, Positions, Wanted, with_column};
 
 /// Records whose columns are filled before the next ones are touched: 34-byte records × 512 = 17 kB, half of a
 /// first-level cache.
-const BLOCK: usize = 512;
+pub(super) const BLOCK: usize = 512;
 
-/// Fills `batch` with the whole records in `raw`, `record_len` (> 0) bytes each; columns that are not wanted are
-/// emptied. The columns fit `fields` in number and type, the positions are quantized; memory they hold is reused.
-pub(super) fn fill(raw: &[u8], record_len: usize, fields: &[Field], wanted: &Wanted, batch: &mut PointBatch) {
-    let points = raw.len() / record_len;
+/// Makes room for `points` points in the positions and the wanted columns of `batch`; the others are emptied.
+///
+/// `resize`, not `clear`: a column that was as long before is not zeroed again.
+pub(super) fn resize(points: usize, fields: &[Field], wanted: &Wanted, batch: &mut PointBatch) {
     let Positions::Quantized(xyz) = &mut batch.positions else { return };
     xyz.iter_mut().for_each(|axis| axis.resize(points, 0));
-    let mut columns: Vec<(Field, &mut Column)> = Vec::with_capacity(fields.len());
     for (i, (field, column)) in fields.iter().zip(&mut batch.columns).enumerate() {
-        if wanted.0.get(i).copied().unwrap_or(false) {
-            // `resize`, not `clear`: a column that was as long before is not zeroed again
-            with_column!(column, v => v.resize(points * field.elements, Default::default()));
-            columns.push((*field, column));
-        } else {
-            column.clear();
-        }
+        let len = if is_wanted(wanted, i) { points * field.elements } else { 0 };
+        with_column!(column, v => v.resize(len, Default::default()));
     }
+}
+
+/// Writes the whole records in `raw`, `record_len` (> 0) bytes each, to `batch` from point `first` on.
+///
+/// `batch` was made ready by [`resize`], for at least `first` and these records; its columns fit `fields` in type.
+pub(super) fn fill(
+    raw: &[u8],
+    record_len: usize,
+    first: usize,
+    fields: &[Field],
+    wanted: &Wanted,
+    batch: &mut PointBatch,
+) {
+    let Positions::Quantized(xyz) = &mut batch.positions else { return };
+    let columns = fields.iter().zip(&mut batch.columns).enumerate();
+    let mut columns: Vec<(Field, &mut Column)> =
+        columns.filter(|(i, _)| is_wanted(wanted, *i)).map(|(_, (field, column))| (*field, column)).collect();
     let fill_blocks = match record_len {
         20 => fill_blocks::<20>,
         26 => fill_blocks::<26>,
@@ -36,19 +47,24 @@ pub(super) fn fill(raw: &[u8], record_len: usize, fields: &[Field], wanted: &Wan
         38 => fill_blocks::<38>,
         _ => fill_blocks::<0>,
     };
-    fill_blocks(raw, record_len, xyz, &mut columns);
+    fill_blocks(raw, record_len, first, xyz, &mut columns);
+}
+
+fn is_wanted(wanted: &Wanted, index: usize) -> bool {
+    wanted.0.get(index).copied().unwrap_or(false)
 }
 
 /// `LEN`: the record length, or 0 for any (`record_len`).
 fn fill_blocks<const LEN: usize>(
     raw: &[u8],
     record_len: usize,
+    first: usize,
     xyz: &mut [Vec<i32>; 3],
     columns: &mut [(Field, &mut Column)],
 ) {
     let record_len = if LEN == 0 { record_len } else { LEN };
     for (b, block) in raw.chunks(BLOCK * record_len).enumerate() {
-        let first = b * BLOCK;
+        let first = first + b * BLOCK;
         let points = block.len() / record_len;
         for (axis, out) in xyz.iter_mut().enumerate() {
             gather::<LEN, 4, _>(block, record_len, 4 * axis, &mut out[first..first + points], i32::from_le_bytes);
@@ -164,7 +180,11 @@ mod tests {
                 positions: Positions::Quantized(Default::default()),
                 columns: types.map(Column::new).into(),
             };
-            fill(&raw, len, &fields, &Wanted(vec![true, true, true, false]), &mut batch);
+            let wanted = Wanted(vec![true, true, true, false]);
+            resize(points, &fields, &wanted, &mut batch);
+            let (head, tail) = raw.split_at(700 * len);
+            fill(tail, len, 700, &fields, &wanted, &mut batch);
+            fill(head, len, 0, &fields, &wanted, &mut batch);
             let Positions::Quantized([x, _, z]) = &batch.positions else { panic!() };
             let [Column::UInt8(bits), Column::UInt16(rgb), Column::Float64(time), Column::Int8(none)] =
                 &batch.columns[..]

@@ -124,7 +124,7 @@ impl Planner<'_> {
         let mut at = layout.chunks_start();
         for (i, chunk) in chunks.iter_mut().enumerate() {
             let next = at + chunk.bytes;
-            if i % step == 0 || i == last {
+            if (i % step == 0 || i == last) && chunk.points > 0 {
                 let own = layout.layered_chunk(self.source, at, next).map_err(|e| e.what)?;
                 let own = own.ok_or_else(|| format!("no chunk starts at byte {at}"))?;
                 let fewer_at_the_end = i == last && layout.chunk_points.is_some() && own.points <= chunk.points;

@@ -1,0 +1,10 @@
+//! LAS and LAZ as their users meet them: files of other encoders read right, damaged ones told and survived.
+#![cfg(feature = "las")]
+
+mod common;
+mod corpus;
+mod damage;
+mod golden;
+mod hostile;
+mod mutation;
+mod oracle;
