@@ -35,6 +35,24 @@ pub(crate) fn position(record: &[u8]) -> [i32; 3] {
     }
 }
 
+/// Copies one record: a few 16-byte moves instead of a call, since records are short and their length varies.
+#[inline]
+pub(crate) fn copy_record(from: &[u8], to: &mut [u8]) {
+    let n = from.len().min(to.len());
+    let (from, to) = (&from[..n], &mut to[..n]);
+    if n < 16 {
+        to.copy_from_slice(from);
+        return;
+    }
+    for (from, to) in from.as_chunks::<16>().0.iter().zip(to.as_chunks_mut::<16>().0) {
+        *to = *from;
+    }
+    // The last move may overlap the one before.
+    if let (Some(from), Some(to)) = (from.last_chunk::<16>(), to.last_chunk_mut::<16>()) {
+        *to = *from;
+    }
+}
+
 /// From stored records to output records: positions relative to the cube, columns that were not asked for left out.
 #[derive(Debug, Clone)]
 pub(crate) struct OutputLayout {
@@ -42,10 +60,12 @@ pub(crate) struct OutputLayout {
     pub(crate) attributes: Vec<Attribute>,
     /// Bytes of an output record.
     pub(crate) stride: usize,
+    /// Bytes of a stored record.
+    pub(crate) stored_stride: usize,
     /// Runs of bytes to copy: (from, to) of the stored record, in output order.
     runs: Vec<(usize, usize)>,
-    /// Added to a stored coordinate it gives the output integer.
-    shift: [i64; 3],
+    /// Added to a stored coordinate (modulo 2^32) it gives the output integer.
+    shift: [u32; 3],
 }
 
 impl OutputLayout {
@@ -61,22 +81,30 @@ impl OutputLayout {
             }
         }
         let attributes = kept.iter().map(|&i| schema.attributes[i].clone()).collect();
-        let shift = std::array::from_fn(|a| frame.base[a] - frame.cube.min[a]);
-        Self { attributes, stride, runs, shift }
+        let shift = std::array::from_fn(|a| (frame.base[a] - frame.cube.min[a]) as u32);
+        Self { attributes, stride, stored_stride: schema.stride, runs, shift }
     }
 
-    /// Appends the output form of a stored record.
-    #[inline]
-    pub(crate) fn write(&self, record: &[u8], out: &mut Vec<u8>) {
-        let q = position(record);
-        let mut bytes = [0; POSITION_BYTES];
-        for a in 0..3 {
-            let v = (i64::from(q[a]) + self.shift[a]) as u32;
-            bytes[4 * a..4 * a + 4].copy_from_slice(&v.to_le_bytes());
+    /// Appends the output form of stored records that lie back to back.
+    pub(crate) fn write_all(&self, records: &[u8], out: &mut Vec<u8>) {
+        let start = out.len();
+        if self.stride == self.stored_stride && self.runs.len() <= 1 {
+            out.extend_from_slice(records);
+        } else {
+            for record in records.chunks_exact(self.stored_stride) {
+                out.extend_from_slice(&record[..POSITION_BYTES]);
+                for &(from, to) in &self.runs {
+                    out.extend_from_slice(&record[from..to]);
+                }
+            }
         }
-        out.extend_from_slice(&bytes);
-        for &(from, to) in &self.runs {
-            out.extend_from_slice(&record[from..to]);
+        for record in out[start..].chunks_exact_mut(self.stride) {
+            let q = position(record);
+            if let Some(bytes) = record.first_chunk_mut::<POSITION_BYTES>() {
+                for (channel, v) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(0..3) {
+                    *channel = (q[v] as u32).wrapping_add(self.shift[v]).to_le_bytes();
+                }
+            }
         }
     }
 }

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 
-use pointmill_format::{Aabb, Column, PointBatch, Positions, with_column};
+use pointmill_format::{Aabb, Column, PointBatch, Positions};
 
+use super::columns::Part;
 use super::{Pass, Segment, Segments, Stats};
 use crate::axis::SourceMap;
 use crate::error::ConvertError;
@@ -32,7 +33,7 @@ impl<'a> Worker<'a> {
         Self {
             pass,
             stats: Stats::new(&pass.job.schema, pass.job.sources.len()),
-            segments: Segments::new(),
+            segments: Segments::default(),
             q: Default::default(),
             selection: Vec::new(),
             cells: Vec::new(),
@@ -169,6 +170,7 @@ impl<'a> Worker<'a> {
         let base = self.pass.partition.base();
         self.records.clear();
         self.records.resize(order.len() * stride, 0);
+        let parts = Part::of(&batch.columns, &self.pass.job.sources[source].columns, schema);
         let mut rows = [0u32; TILE_POINTS];
         for (tile, order) in self.records.chunks_mut(TILE_POINTS * stride).zip(order.chunks(TILE_POINTS)) {
             for (record, &i) in tile.chunks_exact_mut(stride).zip(order) {
@@ -186,8 +188,8 @@ impl<'a> Worker<'a> {
             for (row, &i) in rows.iter_mut().zip(order) {
                 *row = if filtered { self.selection[i as usize] } else { i };
             }
-            for (column, &place) in batch.columns.iter().zip(&self.pass.job.sources[source].columns) {
-                put_column(tile, stride, schema.offsets[place], rows, column, schema.attributes[place].elements);
+            for part in &parts {
+                part.put(tile, stride, rows);
             }
             self.stats.checksum.add_all(tile, stride);
         }
@@ -202,25 +204,6 @@ impl<'a> Worker<'a> {
         }
         Ok(())
     }
-}
-
-/// Writes one column into the records of a tile.
-fn put_column(tile: &mut [u8], stride: usize, offset: usize, rows: &[u32], column: &Column, elements: usize) {
-    let records = tile.chunks_exact_mut(stride).zip(rows);
-    with_column!(column, v => match elements {
-        1 => for (record, &i) in records {
-            let bytes = v[i as usize].to_le_bytes();
-            record[offset..offset + bytes.len()].copy_from_slice(&bytes);
-        },
-        _ => for (record, &i) in records {
-            let mut at = offset;
-            for value in &v[i as usize * elements..(i as usize + 1) * elements] {
-                let bytes = value.to_le_bytes();
-                record[at..at + bytes.len()].copy_from_slice(&bytes);
-                at += bytes.len();
-            }
-        },
-    });
 }
 
 /// Four tables, so that runs of one class do not wait for the same counter.
@@ -289,6 +272,29 @@ fn world_bounds(lattice: Option<&pointmill_format::Lattice>, positions: &Positio
     bounds
 }
 
+/// Hashes packed cells. They come from the grid, not from an adversary, and one multiplication spreads them.
+#[derive(Debug, Default, Clone, Copy)]
+pub(crate) struct CellHasher(u64);
+
+pub(crate) type CellHash = std::hash::BuildHasherDefault<CellHasher>;
+
+impl std::hash::Hasher for CellHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|b| self.write_u64(u64::from(*b)));
+    }
+
+    #[inline]
+    fn write_u64(&mut self, v: u64) {
+        let p = u128::from(self.0 ^ v) * 0x9e37_79b9_7f4a_7c15;
+        self.0 = (p as u64) ^ (p >> 64) as u64;
+    }
+
+    #[inline]
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
 /// Groups points by cell: a counting sort over the few cells that a batch touches.
 #[derive(Default)]
 pub(crate) struct Grouping {
@@ -296,7 +302,7 @@ pub(crate) struct Grouping {
     pub(crate) order: Vec<u32>,
     /// Packed cell and number of points, in the order of `order`.
     pub(crate) groups: Vec<(u64, u32)>,
-    local: HashMap<u64, u32>,
+    local: HashMap<u64, u32, CellHash>,
     ids: Vec<u32>,
     seen: Vec<(u64, u32)>,
     starts: Vec<u32>,

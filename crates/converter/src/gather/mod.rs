@@ -2,6 +2,7 @@
 //! are grouped by the cells of a coarse grid, in memory or in one spill file.
 
 mod batch;
+mod columns;
 mod partition;
 mod stats;
 mod store;
@@ -65,7 +66,7 @@ pub(crate) struct Pass<'a> {
 }
 
 /// Where a batch of points puts its cells: segments by packed cell.
-type Segments = HashMap<u64, Vec<Segment>>;
+type Segments = HashMap<u64, Vec<Segment>, batch::CellHash>;
 
 /// Runs the pass with bounds that are believed until they prove wrong.
 pub(crate) fn gather(
@@ -148,7 +149,7 @@ impl Pass<'_> {
             return Err(error);
         }
         let mut stats = Stats::new(&self.job.schema, self.job.sources.len());
-        let mut segments = Segments::new();
+        let mut segments = Segments::default();
         for (part, cells) in parts {
             stats.merge(&part);
             for (cell, mut more) in cells {

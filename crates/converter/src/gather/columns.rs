@@ -1,0 +1,138 @@
+//! Columns into records: the inner loop of putting a block together.
+
+use pointmill_format::{Column, with_column};
+
+use crate::schema::Schema;
+
+/// Columns that are written together.
+pub(crate) enum Part<'a> {
+    /// One column.
+    One { column: &'a Column, offset: usize, elements: usize },
+    /// Neighbouring attributes of one byte each: one move instead of one each.
+    Bytes { columns: Vec<&'a [u8]>, offset: usize },
+}
+
+/// Most bytes written by one move.
+const MAX_BYTES: usize = 8;
+
+impl<'a> Part<'a> {
+    /// The parts of a batch; `places` are the columns' indices in the schema.
+    pub(crate) fn of(columns: &'a [Column], places: &[usize], schema: &Schema) -> Vec<Self> {
+        let mut order: Vec<usize> = (0..columns.len()).collect();
+        order.sort_unstable_by_key(|&c| schema.offsets[places[c]]);
+        let mut parts: Vec<Self> = Vec::new();
+        for c in order {
+            let offset = schema.offsets[places[c]];
+            match (&columns[c], parts.last_mut()) {
+                (Column::UInt8(v), Some(Self::Bytes { columns, offset: start }))
+                    if *start + columns.len() == offset && columns.len() < MAX_BYTES =>
+                {
+                    columns.push(v);
+                }
+                (Column::UInt8(v), _) if schema.attributes[places[c]].elements == 1 => {
+                    parts.push(Self::Bytes { columns: vec![v], offset });
+                }
+                (column, _) => {
+                    parts.push(Self::One { column, offset, elements: schema.attributes[places[c]].elements });
+                }
+            }
+        }
+        parts
+    }
+
+    /// Writes the rows into the records of a tile.
+    pub(crate) fn put(&self, tile: &mut [u8], stride: usize, rows: &[u32]) {
+        match self {
+            Self::Bytes { columns, offset } => match columns[..] {
+                [a] => put_bytes([a], tile, stride, *offset, rows),
+                [a, b] => put_bytes([a, b], tile, stride, *offset, rows),
+                [a, b, c] => put_bytes([a, b, c], tile, stride, *offset, rows),
+                [a, b, c, d] => put_bytes([a, b, c, d], tile, stride, *offset, rows),
+                [a, b, c, d, e] => put_bytes([a, b, c, d, e], tile, stride, *offset, rows),
+                [a, b, c, d, e, f] => put_bytes([a, b, c, d, e, f], tile, stride, *offset, rows),
+                [a, b, c, d, e, f, g] => put_bytes([a, b, c, d, e, f, g], tile, stride, *offset, rows),
+                [a, b, c, d, e, f, g, h] => put_bytes([a, b, c, d, e, f, g, h], tile, stride, *offset, rows),
+                _ => {}
+            },
+            Self::One { column, offset, elements } => put_column(column, *elements, tile, stride, *offset, rows),
+        }
+    }
+}
+
+fn put_bytes<const N: usize>(columns: [&[u8]; N], tile: &mut [u8], stride: usize, offset: usize, rows: &[u32]) {
+    // One length for all, so that one comparison a point will do.
+    let len = columns.iter().map(|c| c.len()).min().unwrap_or(0);
+    let columns = columns.map(|c| &c[..len]);
+    for (record, &i) in tile.chunks_exact_mut(stride).zip(rows) {
+        let bytes: [u8; N] = std::array::from_fn(|k| columns[k][i as usize]);
+        record[offset..offset + N].copy_from_slice(&bytes);
+    }
+}
+
+fn put_column(column: &Column, elements: usize, tile: &mut [u8], stride: usize, offset: usize, rows: &[u32]) {
+    let records = tile.chunks_exact_mut(stride).zip(rows);
+    with_column!(column, v => match elements {
+        1 => for (record, &i) in records {
+            let bytes = v[i as usize].to_le_bytes();
+            record[offset..offset + bytes.len()].copy_from_slice(&bytes);
+        },
+        3 => {
+            let v = v.as_chunks::<3>().0;
+            for (record, &i) in records {
+                let [a, b, c] = v[i as usize].map(|e| e.to_le_bytes());
+                let n = a.len();
+                let to = &mut record[offset..offset + 3 * n];
+                to[..n].copy_from_slice(&a);
+                to[n..2 * n].copy_from_slice(&b);
+                to[2 * n..].copy_from_slice(&c);
+            }
+        }
+        _ => for (record, &i) in records {
+            let mut at = offset;
+            for value in &v[i as usize * elements..(i as usize + 1) * elements] {
+                let bytes = value.to_le_bytes();
+                record[at..at + bytes.len()].copy_from_slice(&bytes);
+                at += bytes.len();
+            }
+        },
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pointmill_format::{Attribute, AttributeType};
+
+    #[test]
+    fn every_column_lands_at_its_place_in_the_rows_that_were_named() {
+        let ty = |c: &Column| c.ty();
+        let columns = [
+            Column::UInt16(vec![1, 2, 3, 4, 5, 6]),
+            Column::UInt8(vec![7, 8]),
+            Column::UInt8(vec![9, 10]),
+            Column::Int8(vec![-1, -2]),
+            Column::Float64(vec![0.5, f64::NAN]),
+            Column::Int16(vec![1, -1, 2, -2]),
+        ];
+        let elements = [3, 1, 1, 1, 1, 2];
+        let attributes: Vec<Attribute> = columns
+            .iter()
+            .zip(elements)
+            .enumerate()
+            .map(|(i, (c, n))| Attribute::new(i.to_string(), ty(c), n))
+            .collect();
+        assert_eq!(attributes[4].ty, AttributeType::Float64);
+        let schema = Schema::new(attributes);
+        let mut tile = vec![0; 2 * schema.stride];
+        for part in Part::of(&columns, &[0, 1, 2, 3, 4, 5], &schema) {
+            part.put(&mut tile, schema.stride, &[1, 0]);
+        }
+        let mut expected = vec![0; 12];
+        expected.extend([4u16, 5, 6].iter().flat_map(|v| v.to_le_bytes()));
+        expected.extend([8, 10, 254]);
+        expected.extend(f64::NAN.to_le_bytes());
+        expected.extend([2i16, -2].iter().flat_map(|v| v.to_le_bytes()));
+        assert_eq!(&tile[..schema.stride], expected);
+        assert_eq!(&tile[schema.stride + 12..schema.stride + 14], 1u16.to_le_bytes());
+    }
+}
