@@ -183,6 +183,7 @@ fn build(
         frame,
         store: &gathered.store,
         leaf_capacity: plan.leaf_capacity,
+        usual_points: budget.chunk_points.min(gathered.stats.points),
         duplicates: plan.duplicates,
         widen_rgb: &description.widen_rgb,
     };
