@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn any_order_gives_the_same_sum_and_any_changed_byte_another() {
-        let records: Vec<u8> = (0..35u32 * 100).map(|i| (i * 7919 >> 3) as u8).collect();
+        let records: Vec<u8> = (0..35u32 * 100).map(|i| ((i * 7919) >> 3) as u8).collect();
         let mut forward = Checksum::default();
         forward.add_all(&records, 35);
         let mut backward = Checksum::default();

@@ -102,7 +102,12 @@ fn divide_once(cell: &Cell, gathered: &Gathered, frame: &RecordFrame) -> Result<
                         part.segments.push(segment);
                     }
                     None => {
-                        parts.push(Cell { key, points: u64::from(count), segments: vec![segment], is_one_place: false })
+                        parts.push(Cell {
+                            key,
+                            points: u64::from(count),
+                            segments: vec![segment],
+                            is_one_place: false,
+                        });
                     }
                 }
             }

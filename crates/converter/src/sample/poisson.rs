@@ -186,7 +186,7 @@ impl Poisson {
         let high: [f32; 3] = cell.map(|c| (c + 2) as f32 * CELL_SPACINGS + 1.0001);
         // From the cell before the tile to the one behind it: four an axis. The tile's own are not occupied yet.
         let around = |c: u32| c.saturating_sub(1)..(c + 3).min(GRID_SIZE);
-        let four = 0b1111u64 << cell[2] >> 1;
+        let four = ((0b1111u128 << cell[2]) >> 1) as u64;
         for x in around(cell[0]) {
             for y in around(cell[1]) {
                 let mut cells = self.occupied[column(x, y)] & four;
@@ -258,6 +258,15 @@ mod tests {
         slab.extend_from_within(0..500);
         let taken = check(14, slab);
         assert!(taken > 1000 && taken < 6000, "{taken}");
+        // Layers at the lower and upper end of each axis, where there are no cells beyond.
+        for axis in 0..3 {
+            for end in [0, (1 << 17) - 1500] {
+                let mut layer: Vec<[u32; 3]> = (0..6000).map(|_| [next(), next(), next()]).collect();
+                layer.iter_mut().for_each(|t| t[axis] = end + t[axis] % 1500);
+                let taken = check(14, layer);
+                assert!(taken > 1000 && taken < 6000, "{taken}");
+            }
+        }
         let volume: Vec<[u32; 3]> = (0..4000).map(|_| [next() >> 3, next() >> 3, next() >> 3]).collect();
         let taken = check(14, volume);
         assert!(taken > 500 && taken < 4000, "{taken}");
