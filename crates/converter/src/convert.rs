@@ -123,7 +123,8 @@ fn read(
             Outcome::Complete(gathered) => return Ok(gathered),
             Outcome::Empty(stats) => return Err(nothing_to_convert(job, &stats)),
             Outcome::Retry(bounds) => {
-                let line = "the bounds in the headers are wrong; reading again with the true ones";
+                let line = "the points lie elsewhere than the headers made expect, or further apart than the coordinate \
+                            step allows; reading them again with the bounds that were found";
                 job.warnings.push(line.into());
                 events.warning(line);
                 hint = Some(bounds);
