@@ -36,7 +36,7 @@ impl Description {
         let mut warnings = job.warnings.clone();
         warnings.extend_from_slice(&stats.warnings);
         let rgb = job.schema.rgb();
-        let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, &s.rgb)).collect();
+        let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, s)).collect();
         let mut ranges = stats.ranges.clone();
         let mut widen_rgb = vec![None; job.sources.len()];
         if let Some(rgb) = rgb {
