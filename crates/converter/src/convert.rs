@@ -11,7 +11,7 @@ use crate::budget::Budget;
 use crate::build::chunk::{BuiltChunk, ChunkBuilder, ChunkPlan};
 use crate::build::commit::{Built, Committer};
 use crate::chunks::{self, Chunk};
-use crate::describe::{Description, HIERARCHY_STEP};
+use crate::describe::{Description, HIERARCHY_STEP, choose_attributes, resolve_crs};
 use crate::error::ConvertError;
 use crate::events::{Events, Phase};
 use crate::gather::{Gathered, Outcome, Stats, gather};
@@ -38,6 +38,7 @@ pub fn convert(plan: &Plan, events: &dyn Events) -> Result<Report, ConvertError>
     let staged = StagedFolder::new(&plan.output, plan.overwrite)?;
     let mut job = Job::open(plan, events)?;
     let budget = Budget::new(plan, job.schema.stride)?;
+    check_names(plan, &job)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads.max(1))
         .thread_name(|i| format!("pointmill-{i}"))
@@ -101,6 +102,14 @@ fn check(plan: &Plan) -> Result<(), ConvertError> {
         return bad(&format!("--temp-dir: {} is not a folder", dir.display()));
     }
     Ok(())
+}
+
+/// What names attributes or a reference system wrongly shall fail now, not after the points were read.
+fn check_names(plan: &Plan, job: &Job) -> Result<(), ConvertError> {
+    if let crate::AttributeChoice::List(_) = plan.attributes {
+        choose_attributes(&plan.attributes, job, &[])?;
+    }
+    resolve_crs(plan, job, &mut Vec::new()).map(drop)
 }
 
 /// Reads every point once; again only if the headers were wrong about the bounds.
