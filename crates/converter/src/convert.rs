@@ -196,6 +196,7 @@ fn build(
         usual_points: budget.chunk_points.min(gathered.stats.points),
         duplicates: plan.duplicates,
         widen_rgb: &description.widen_rgb,
+        class: description.class,
     };
     let next = AtomicUsize::new(0);
     let failed: Mutex<Option<(usize, ConvertError)>> = Mutex::new(None);
