@@ -31,8 +31,8 @@ fn in_memory_or_through_temporary_files() {
     let dir = two_scans(400_000);
     let ample = bytes(&dir, &["scans", "--memory", "4GiB"]);
     assert_eq!(dir.report("out")["temp_bytes"], 0);
-    let scarce = bytes(&dir, &["scans", "--memory", "92MiB", "--threads", "1"]);
-    assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "92 MiB hold 600,000 points?");
+    let scarce = bytes(&dir, &["scans", "--memory", "168MiB", "--threads", "1"]);
+    assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "168 MiB hold 600,000 points?");
     assert!(ample == scarce, "the datasets differ");
     dir.validate("out", &["scans"]);
 }
