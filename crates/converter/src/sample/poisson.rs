@@ -118,6 +118,13 @@ impl Default for Poisson {
 impl Poisson {
     pub(super) fn choose(&mut self, level: u8, candidates: &[[u32; 3]], accepted: &mut [bool]) {
         let Some(first) = candidates.first() else { return };
+        if u32::from(level) > TREE_BITS - SPACING_BITS {
+            // The spacing is less than one unit: only repeated places conflict, and they are neighbours in Morton order.
+            for (i, accepted) in accepted.iter_mut().enumerate() {
+                *accepted = i == 0 || candidates[i] != candidates[i - 1];
+            }
+            return;
+        }
         let shift = cell_shift(level);
         let cell_shift = shift + CELL_BITS;
         let tile_shift = cell_shift + 1;
