@@ -13,7 +13,7 @@ use crate::error::ConvertError;
 use crate::grid::LatticeBounds;
 use crate::pages;
 use crate::plan::{OnFault, RgbDepth};
-use crate::schema::POSITION_BYTES;
+use crate::schema::{POSITION_BYTES, as_doubles};
 
 /// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
 const TILE_POINTS: usize = 512;
@@ -66,6 +66,14 @@ impl<'a> Worker<'a> {
     pub(crate) fn take(&mut self, source: usize, batch: &PointBatch) -> Result<(), ConvertError> {
         let filtered = self.select(source, batch)?;
         self.stats.sources[source].read += batch.len() as u64;
+        let stored;
+        let batch = match self.as_stored(batch) {
+            Some(other) => {
+                stored = other;
+                &stored
+            }
+            None => batch,
+        };
         let kept = if filtered { self.selection.len() } else { batch.len() };
         if kept == 0 {
             return Ok(());
@@ -86,6 +94,18 @@ impl<'a> Worker<'a> {
             self.ranges(source, batch, filtered);
         }
         outcome
+    }
+
+    /// The batch with columns of the types that are stored, if these differ from what was read.
+    fn as_stored(&mut self, batch: &PointBatch) -> Option<PointBatch> {
+        let mut stored: Option<PointBatch> = None;
+        for (i, column) in batch.columns.iter().enumerate() {
+            if let Some((doubles, rounded)) = as_doubles(column) {
+                stored.get_or_insert_with(|| batch.clone()).columns[i] = doubles;
+                self.stats.rounded_values += rounded;
+            }
+        }
+        stored
     }
 
     fn take_slice(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> Result<(), ConvertError> {
