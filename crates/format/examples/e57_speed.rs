@@ -20,10 +20,14 @@ fn main() -> Result<(), ReadError> {
                 if let Positions::World(xyz) = &batch.positions {
                     for (sum, axis) in sum.iter_mut().zip(xyz) {
                         // four sums: one would wait for itself
-                        *sum += axis.chunks(4).fold([0.0; 4], |mut s, c| {
-                            s.iter_mut().zip(c).for_each(|(s, v)| *s += v);
-                            s
-                        }).iter().sum::<f64>();
+                        *sum += axis
+                            .chunks(4)
+                            .fold([0.0; 4], |mut s, c| {
+                                s.iter_mut().zip(c).for_each(|(s, v)| *s += v);
+                                s
+                            })
+                            .iter()
+                            .sum::<f64>();
                     }
                 }
                 for column in &batch.columns {
@@ -39,7 +43,10 @@ fn main() -> Result<(), ReadError> {
         }
         let secs = start.elapsed().as_secs_f64();
         let speed = points as f64 / secs / 1e6;
-        println!("{path} ({}): {points} points, {sum:?}, {sum16}, {speed:.1} M/s ({opened:.3} s to open)", scan.info().format);
+        println!(
+            "{path} ({}): {points} points, {sum:?}, {sum16}, {speed:.1} M/s ({opened:.3} s to open)",
+            scan.info().format
+        );
     }
     Ok(())
 }

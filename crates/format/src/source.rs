@@ -53,6 +53,7 @@ impl Source {
     }
 
     /// `len` bytes from `offset`, at most what the file holds from there: the allocation never exceeds the file.
+    #[cfg(feature = "las")]
     pub(crate) fn vec_at(&self, offset: u64, len: u64) -> Result<Vec<u8>, ReadError> {
         let len = len.min(self.len.saturating_sub(offset));
         let mut buf = vec![0; usize::try_from(len).unwrap_or(0)];
@@ -75,12 +76,14 @@ impl Source {
     }
 
     /// A sequential reader over `offset..end`.
+    #[cfg(feature = "las")]
     pub(crate) fn reader(&self, offset: u64, end: u64) -> SourceReader<'_> {
         SourceReader { source: self, next: offset, end: end.min(self.len), buf: Vec::new(), at: 0 }
     }
 }
 
 /// A buffered reader of a part of a [`Source`].
+#[cfg(feature = "las")]
 pub(crate) struct SourceReader<'a> {
     source: &'a Source,
     next: u64,
@@ -90,8 +93,10 @@ pub(crate) struct SourceReader<'a> {
 }
 
 /// Large enough that a read costs little beside decoding, small beside a batch.
+#[cfg(feature = "las")]
 const READER_BUFFER: u64 = 256 * 1024;
 
+#[cfg(feature = "las")]
 impl io::Read for SourceReader<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.buf.len() {

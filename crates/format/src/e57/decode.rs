@@ -55,9 +55,9 @@ pub(super) fn piece(
 /// The batch of the scratch memory, with columns of this scan's types.
 fn fitting_batch<'a>(batch: &'a mut Option<PointBatch>, scan: &E57Scan) -> &'a mut PointBatch {
     let types = || scan.info.attributes.iter().map(|a| a.ty);
-    let fits = batch.as_ref().is_some_and(|b| {
-        matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types())
-    });
+    let fits = batch
+        .as_ref()
+        .is_some_and(|b| matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types()));
     if !fits {
         *batch = None;
     }

@@ -50,9 +50,8 @@ impl<'a> Streams<'a> {
         let mut pages = Pages::new(source, raw, WINDOW);
         let (mut at, mut sizes) = (cut.start, Vec::new());
         while missing > 0 && at < cut.end {
-            let packet = Packet::read(&mut pages, at, cut.end, fields.len(), &mut sizes).map_err(|fault| {
-                ReadError::broken(source.path(), fault.byte, fault.what).advise(fault.advice)
-            })?;
+            let packet = Packet::read(&mut pages, at, cut.end, fields.len(), &mut sizes)
+                .map_err(|fault| ReadError::broken(source.path(), fault.byte, fault.what).advise(fault.advice))?;
             let mut stream = at + packet.streams.unwrap_or(0);
             for (f, size) in sizes.iter().enumerate() {
                 let (start, len) = places[f];
