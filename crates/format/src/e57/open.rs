@@ -1,5 +1,6 @@
 //! From the bytes around the points to a scan that can be decoded.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use ::e57::PointCloud;
@@ -115,15 +116,16 @@ fn cut_all(source: &Source, clouds: &[PointCloud], drafts: &mut [Draft<'_>], not
     let columns: u64 = drafts.iter().map(|draft| draft.fields.len() as u64).max().unwrap_or(0);
     let step = (PIECE_RECORDS * USUAL_COLUMNS / columns.max(USUAL_COLUMNS) / 8 * 8).max(8);
     let file_end = logical_len(source);
+    let mut taken = HashSet::new();
     for draft in drafts {
         let at = logical(draft.cloud.file_offset);
         // no byte belongs to two scans, so that a small file cannot claim many points
-        let same = starts.iter().filter(|start| **start == at).count();
-        let limit = starts.iter().copied().find(|start| *start > at).unwrap_or(file_end).min(file_end);
-        if same > 1 && clouds[..draft.index].iter().any(|c| c.records > 0 && logical(c.file_offset) == at) {
+        if !taken.insert(at) {
             notes.add(draft.index, "its points are those of an earlier scan; they are read once");
             continue;
         }
+        let next = starts.partition_point(|start| *start <= at);
+        let limit = starts.get(next).copied().unwrap_or(file_end).min(file_end);
         let section = Section::read(&mut pages, at, limit);
         let found = cuts::cut(&mut pages, section, draft.index, &draft.fields, draft.cloud.records, step);
         draft.cuts = found.cuts;

@@ -10,6 +10,8 @@ use crate::{Attribute, AttributeType};
 
 /// Columns that a file may have: more is not a scan.
 const MAX_ATTRIBUTES: usize = 1000;
+/// Columns times scans: so much is held in memory for them.
+const MAX_FILLS: usize = 1_000_000;
 
 /// The fields of a coordinate triple; a missing one is 0.
 pub(super) type Triple = [Option<usize>; 3];
@@ -271,6 +273,9 @@ impl Schema {
                 }
                 if columns.len() > MAX_ATTRIBUTES {
                     return Err(format!("its points have more than {MAX_ATTRIBUTES} fields"));
+                }
+                if columns.len() * scans.len() > MAX_FILLS {
+                    return Err(format!("{} scans with {} fields or more", scans.len(), columns.len()));
                 }
             }
         }

@@ -14,8 +14,9 @@ use crate::quiet;
 
 /// Stands for a text field: minimum and maximum of a constant integer ("string" in ASCII).
 pub(super) const TEXT_MARK: i64 = 0x7374_7269_6e67;
-/// Elements inside each other, at most: the parser recurses, real files have nine.
-const MAX_DEPTH: usize = 100;
+/// The parser's time grows with the square of both: attributes of an element, and namespace declarations.
+const MAX_ATTRIBUTES: usize = 100;
+const MAX_NAMESPACES: usize = 256;
 
 /// What the XML section says.
 pub(super) struct Document {
@@ -32,9 +33,7 @@ pub(super) struct Document {
 /// Why it cannot be understood, as text.
 pub(super) fn parse(xml: &[u8]) -> Result<Document, String> {
     let text = std::str::from_utf8(xml).map_err(|e| format!("not UTF-8 from its byte {} on", e.valid_up_to()))?;
-    if depth(text) > MAX_DEPTH {
-        return Err(format!("elements lie more than {MAX_DEPTH} deep inside each other"));
-    }
+    check_size(text)?;
     let text = mark_text_fields(text);
     let read = |text: &str| {
         let reader = quiet::catch(|| E57Reader::new(Cursor::new(file_of(text.as_bytes()))))?;
@@ -68,19 +67,36 @@ fn file_of(xml: &[u8]) -> Vec<u8> {
     logical.chunks_exact(DATA as usize).flat_map(with_checksum).collect()
 }
 
-/// At least how deep elements lie inside each other. Comments and quoted text may make it too large, not too small.
-fn depth(text: &str) -> usize {
-    let (mut depth, mut deepest) = (0usize, 0);
-    for tag in text.split('<').skip(1) {
-        if tag.starts_with('/') {
-            depth = depth.saturating_sub(1);
-        } else if !tag.starts_with(['!', '?']) {
-            let closed = tag.split_once('>').is_some_and(|(inside, _)| inside.ends_with('/'));
-            depth += usize::from(!closed);
-            deepest = deepest.max(depth);
+/// Refuses what would keep the parser busy without end. Whether the text is well-formed is the parser's business.
+fn check_size(text: &str) -> Result<(), String> {
+    let (mut rest, mut namespaces) = (text, 0);
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at..];
+        let skips = [("<![CDATA[", "]]>"), ("<!--", "-->"), ("<?", "?>"), ("<!", ">"), ("</", ">")];
+        if let Some((_, end)) = skips.into_iter().find(|(start, _)| rest.starts_with(start)) {
+            let Some(len) = rest.find(end) else { return Ok(()) };
+            rest = &rest[len..];
+            continue;
         }
+        let (mut quote, mut attributes, mut len) = (None, 0, rest.len());
+        for (i, byte) in rest.bytes().enumerate() {
+            match (quote, byte) {
+                (None, b'>') => {
+                    len = i;
+                    break;
+                }
+                (None, b'\'' | b'"') => (quote, attributes) = (Some(byte), attributes + 1),
+                (Some(open), byte) if byte == open => quote = None,
+                _ => {}
+            }
+        }
+        namespaces += rest[..len].matches("xmlns").count();
+        if attributes > MAX_ATTRIBUTES || namespaces > MAX_NAMESPACES {
+            return Err(format!("{attributes} attributes of an element, {namespaces} namespaces"));
+        }
+        rest = &rest[len..];
     }
-    deepest
+    Ok(())
 }
 
 /// Replaces the type `String` of prototype fields.
@@ -141,6 +157,11 @@ mod tests {
         assert!(why(b"<e57Root>\xff").contains("not UTF-8 from its byte 9 on"));
         assert!(why(b"<e57Root>").contains("XML"));
         assert!(why(XML.replace("\"48\"", "\"x\"").as_bytes()).contains("fileOffset"));
-        assert!(why("<a>".repeat(1_000_000).as_bytes()).contains("100 deep"));
+        // neither overflows the stack nor takes the square of its length
+        assert!(why("<a>".repeat(1_000_000).as_bytes()).contains("XML"));
+        let attributes: String = (0..100_000).map(|i| format!(" a{i}=\"'>\"")).collect();
+        assert!(why(format!("<![CDATA[>]]><a{attributes}/>").as_bytes()).contains("100000 attributes"));
+        let namespaces: String = (0..60_000).map(|i| format!("<a xmlns:a{i}='u'>")).collect();
+        assert!(why(namespaces.as_bytes()).contains("257 namespaces"));
     }
 }

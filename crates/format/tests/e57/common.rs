@@ -75,6 +75,7 @@ pub(crate) fn read_scan(scan: &dyn Scan, wanted: &Wanted) -> Cloud {
     cloud
 }
 
+#[allow(clippy::unnecessary_cast)] // not for all types
 fn doubles(column: &Column) -> Vec<f64> {
     with_column!(column, v => v.iter().map(|n| *n as f64).collect())
 }
