@@ -1,4 +1,5 @@
 //! The shortest use of this crate: `validate DATASET [SCAN...]` prints what was found, or with `--json` the outcome.
+//! `--quick` leaves out spacing, coverage and quality.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -7,14 +8,19 @@ use pointmill_validate::{Options, validate};
 
 fn main() -> ExitCode {
     let mut paths: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
-    let json = paths.iter().any(|p| p.as_os_str() == "--json");
-    paths.retain(|p| p.as_os_str() != "--json");
+    let mut flag = |word: &str| {
+        let before = paths.len();
+        paths.retain(|p| p.as_os_str() != word);
+        paths.len() < before
+    };
+    let (json, quick) = (flag("--json"), flag("--quick"));
     if paths.is_empty() {
-        eprintln!("usage: validate [--json] DATASET [SCAN...]");
+        eprintln!("usage: validate [--json] [--quick] DATASET [SCAN...]");
         return ExitCode::from(2);
     }
     let dataset = paths.remove(0);
-    let outcome = match validate(&dataset, &Options { against: paths, ..Options::default() }, &|_| {}) {
+    let options = Options { against: paths, neighbourhoods: !quick, ..Options::default() };
+    let outcome = match validate(&dataset, &options, &|_| {}) {
         Ok(outcome) => outcome,
         Err(error) => {
             eprintln!("{error}");

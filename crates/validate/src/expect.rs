@@ -34,6 +34,13 @@ impl Geometry {
         self.spacing / f64::from(level).exp2()
     }
 
+    /// False for a spacing that no writer would choose (usual: side / 128): searches by cells of that size would look
+    /// at everything or at nothing.
+    pub(crate) fn spacing_is_sane(&self) -> bool {
+        let cells = (self.cube.max[0] - self.cube.min[0]) / self.spacing;
+        (8.0..65_536.0).contains(&cells)
+    }
+
     /// Rounding allowed when world coordinates are compared: 4 ulps of the cube's largest coordinate on that axis.
     ///
     /// A dequantised coordinate carries two roundings (product, sum), a box bound one a level in the worst case, of
@@ -90,15 +97,15 @@ impl Geometry {
     /// border of a cell that rounding decides (within one lattice step, unless the cells are whole lattice steps).
     pub(crate) fn sample_cell(&self, level: u8, node: &Aabb, stored: [i32; 3]) -> Option<u32> {
         let mut cell = 0;
-        for axis in 0..3 {
+        for (axis, stored) in stored.into_iter().enumerate() {
             let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / CELLS;
             let in_steps = side / self.lattice.scale[axis];
             let origin = (node.min[axis] - self.lattice.offset[axis]) / self.lattice.scale[axis];
             let whole = (in_steps - in_steps.round()).abs() < 1e-6 && (origin - origin.round()).abs() < 1e-3;
             let u = if whole && in_steps >= 0.5 {
-                (f64::from(stored[axis]) - origin.round()) / in_steps.round()
+                (f64::from(stored) - origin.round()) / in_steps.round()
             } else {
-                let u = (f64::from(stored[axis]) - origin) / in_steps;
+                let u = (f64::from(stored) - origin) / in_steps;
                 if (u - u.round()).abs() * in_steps <= 1.0 {
                     return None;
                 }

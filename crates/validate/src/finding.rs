@@ -324,7 +324,7 @@ impl Findings {
     }
 
     /// Takes over the findings of one check from `other`.
-    pub(crate) fn absorb(&self, check: Check, other: Self) {
+    pub(crate) fn absorb(&self, check: Check, other: &Self) {
         self.checked(check, other.checked[check as usize].load(Ordering::Relaxed));
         let mut from = std::mem::take(&mut *other.slot(check));
         let mut slot = self.slot(check);

@@ -40,7 +40,7 @@ const FACTORS: [u32; 3] = [0x9E37_79B1, 0x85EB_CA77, 0xC2B2_AE3D];
 
 impl Grid {
     /// Sorts `sites` into cells of side `cell`, world units, > 0.
-    pub(crate) fn new(sites: Vec<Site>, cell: f64, lattice: &Lattice) -> Self {
+    pub(crate) fn new(sites: &[Site], cell: f64, lattice: &Lattice) -> Self {
         let bits = (sites.len().max(16) as u32).next_power_of_two().ilog2().min(28);
         let mut grid = Self {
             sites: Vec::new(),
@@ -58,7 +58,7 @@ impl Grid {
             grid.starts[i] += grid.starts[i - 1];
         }
         let mut next = grid.starts.clone();
-        let mut sorted = sites.clone();
+        let mut sorted = sites.to_vec();
         for (site, bucket) in sites.iter().zip(&buckets) {
             let at = &mut next[*bucket as usize];
             sorted[*at as usize] = *site;
@@ -113,8 +113,12 @@ impl Grid {
                     Origin::Neighbour => neighbour = neighbour.min(d),
                     _ => {}
                 }
-                ControlFlow::Continue(())
+                // a twin: nothing is nearer, and where points repeat by the thousand this ends the search at once
+                if own == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
+            if own == 0.0 {
+                break;
+            }
             if ring >= 1 && own <= square(f64::from(ring) * self.cell) {
                 break;
             }
@@ -200,7 +204,7 @@ mod tests {
             .enumerate()
             .map(|(i, position)| Site { position, origin: origins[i % 3] })
             .collect();
-        let grid = Grid::new(sites, 8.0, &lattice);
+        let grid = Grid::new(&sites, 8.0, &lattice);
         for p in scatter(300, 110) {
             let best = grid.sites().iter().map(|s| grid.distance_squared(p, s.position)).fold(f64::INFINITY, f64::min);
             assert_eq!(grid.nearest_squared(p, 20), best);

@@ -163,7 +163,7 @@ fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Ou
         tree: &tree,
         geometry,
         findings: &findings,
-        neighbourhoods: options.neighbourhoods,
+        neighbourhoods: options.neighbourhoods && geometry.spacing_is_sane(),
         sampling: Sampling::from_word(metadata.extra.get("pointmill").and_then(|own| own["sampling"].as_str())),
         sums: against.as_ref().map(|a| &a.sums),
         progress,
@@ -171,7 +171,7 @@ fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Ou
         max_problems: options.max_problems,
     })?;
     checks::ranges::check(metadata, &geometry, &walked.seen, walked.unreadable == 0, &findings);
-    say_what_was_skipped(&walked, &dataset, options, &findings);
+    say_what_was_skipped(&walked, &dataset, &geometry, options, &findings);
     let summary = match &against {
         Some(against) => Some(against.compare(&Context {
             dataset: &dataset,
@@ -230,7 +230,13 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: ReadError) -> R
     })
 }
 
-fn say_what_was_skipped(walked: &Walked, dataset: &Dataset, options: &Options, findings: &Findings) {
+fn say_what_was_skipped(
+    walked: &Walked,
+    dataset: &Dataset,
+    geometry: &Geometry,
+    options: &Options,
+    findings: &Findings,
+) {
     let metadata = dataset.metadata();
     if metadata.encoding == Encoding::Default {
         findings.skip(Check::Order, "only BROTLI promises an order");
@@ -238,9 +244,10 @@ fn say_what_was_skipped(walked: &Walked, dataset: &Dataset, options: &Options, f
     if metadata.attributes.iter().all(|a| a.histogram.is_none()) {
         findings.skip(Check::Histogram, "there are none");
     }
-    if !options.neighbourhoods {
-        findings.skip(Check::Spacing, "not asked for");
-        findings.skip(Check::Coverage, "not asked for");
+    if !options.neighbourhoods || !geometry.spacing_is_sane() {
+        let why = if options.neighbourhoods { "the spacing is out of proportion" } else { "not asked for" };
+        findings.skip(Check::Spacing, why);
+        findings.skip(Check::Coverage, why);
     } else if walked.unreadable > 0 {
         findings.skip(Check::Coverage, format!("the points of {} nodes could not be read", walked.unreadable));
     }

@@ -89,7 +89,7 @@ fn admit(chunk: &Pending, file_size: u64, chunks: &BTreeMap<u64, u64>, findings:
     let blame = |subject, expected: String, found: String| {
         findings.push(Finding::new(Check::Hierarchy, subject, expected, found).at(chunk.root));
     };
-    if chunk.size < record || chunk.size % record != 0 {
+    if chunk.size < record || !chunk.size.is_multiple_of(record) {
         blame("size of a chunk", format!("a multiple of {record} bytes"), format!("{} bytes", chunk.size));
     }
     let end = chunk.offset.saturating_add(chunk.size);

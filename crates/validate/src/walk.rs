@@ -81,7 +81,7 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
         Sampling::Unknown if walk.cells.found(Check::Spacing) == 0 => walk.cells,
         Sampling::Unknown => walk.pairs,
     };
-    task.findings.absorb(Check::Spacing, kept);
+    task.findings.absorb(Check::Spacing, &kept);
     Ok(Walked {
         seen: walk.seen.into_inner().unwrap_or_else(PoisonError::into_inner),
         tallies: walk.tallies,
@@ -259,7 +259,7 @@ impl Walk<'_> {
             let Some(positions) = self.positions(neighbour) else { continue };
             sites.extend(positions.iter().filter(|p| near(p)).map(|p| Site { position: *p, origin }));
         }
-        Grid::new(sites, coverage::cell_side(geometry, key.level), &geometry.lattice)
+        Grid::new(&sites, coverage::cell_side(geometry, key.level), &geometry.lattice)
     }
 }
 

@@ -100,7 +100,7 @@ fn a_wrong_node_type() {
 fn an_empty_node() {
     for encoding in BOTH {
         let mut cloud = Cloud::new(Sampler::Poisson);
-        let inner = *cloud.nodes.keys().filter(|k| cloud.is_inner(**k)).next_back().unwrap();
+        let inner = *cloud.nodes.keys().rfind(|k| cloud.is_inner(**k)).unwrap();
         let free = (0..8).filter_map(|c| inner.child(c)).find(|k| !cloud.nodes.contains_key(k)).unwrap();
         cloud.nodes.insert(free, Vec::new());
         let outcome = cloud.encode(encoding).validate();
@@ -144,7 +144,7 @@ fn an_octree_that_was_cut_short() {
 #[test]
 fn a_damaged_brotli_stream() {
     let mut files = good(Encoding::Brotli);
-    let last = files.entries.iter().max_by_key(|e| e.byte_offset).unwrap().clone();
+    let last = *files.entries.iter().max_by_key(|e| e.byte_offset).unwrap();
     files.octree[last.byte_offset as usize..].fill(0xff);
     let outcome = files.validate();
     assert_only(&outcome, Check::Payloads, 1);

@@ -6,10 +6,12 @@ use std::sync::atomic::Ordering;
 use pointmill_format::{Aabb, Column, PointBatch, Positions};
 
 use super::columns::Part;
+use super::store::BLOCK_BYTES;
 use super::{Pass, Segment, Segments, Stats};
 use crate::axis::SourceMap;
 use crate::error::ConvertError;
 use crate::grid::LatticeBounds;
+use crate::pages;
 use crate::plan::{OnFault, RgbDepth};
 use crate::schema::POSITION_BYTES;
 
@@ -25,7 +27,14 @@ pub(crate) struct Worker<'a> {
     selection: Vec<u32>,
     cells: Vec<u64>,
     grouping: Grouping,
+    /// The block that is being filled, and its records so far.
+    open: Option<OpenBlock>,
     records: Vec<u8>,
+}
+
+struct OpenBlock {
+    index: u32,
+    source: usize,
 }
 
 impl<'a> Worker<'a> {
@@ -38,12 +47,15 @@ impl<'a> Worker<'a> {
             selection: Vec::new(),
             cells: Vec::new(),
             grouping: Grouping::default(),
+            open: None,
             records: Vec::new(),
         }
     }
 
-    pub(crate) fn finish(self) -> (Stats, Segments) {
-        (self.stats, self.segments)
+    /// Hands over the last block and everything that was learnt.
+    pub(crate) fn finish(mut self) -> Result<(Stats, Segments), ConvertError> {
+        self.close_block()?;
+        Ok((self.stats, self.segments))
     }
 
     /// Takes one batch of `source`: filter, lattice, ranges, cells, records.
@@ -68,8 +80,38 @@ impl<'a> Worker<'a> {
         self.ranges(source, batch, filtered);
         self.pass.partition.cells(&self.q, &mut self.cells);
         self.grouping.group(&self.cells);
+        let (block, start) = self.room_for(source, kept)?;
         self.assemble(source, batch, filtered);
-        self.store(source)
+        self.note_segments(block, start);
+        Ok(())
+    }
+
+    /// The block that takes the next `points` records of `source`, and the number of records it has.
+    fn room_for(&mut self, source: usize, points: usize) -> Result<(u32, u32), ConvertError> {
+        let stride = self.pass.job.schema.stride;
+        let is_full = self.records.len() + points * stride > BLOCK_BYTES;
+        if is_full || self.open.as_ref().is_some_and(|b| b.source != source) {
+            self.close_block()?;
+        }
+        if self.records.capacity() < BLOCK_BYTES {
+            self.records = pages::buffer(BLOCK_BYTES);
+        }
+        let index = match &self.open {
+            Some(block) => block.index,
+            None => {
+                let index = self.pass.store.open(source as u32)?;
+                self.open = Some(OpenBlock { index, source });
+                index
+            }
+        };
+        Ok((index, (self.records.len() / stride) as u32))
+    }
+
+    fn close_block(&mut self) -> Result<(), ConvertError> {
+        match self.open.take() {
+            Some(block) => self.pass.store.fill(block.index, &mut self.records),
+            None => Ok(()),
+        }
     }
 
     /// Fills `selection` with the points that pass the filter; false if all do.
@@ -168,11 +210,11 @@ impl<'a> Worker<'a> {
         let stride = schema.stride;
         let order = &self.grouping.order;
         let base = self.pass.partition.base();
-        self.records.clear();
-        self.records.resize(order.len() * stride, 0);
+        let start = self.records.len();
+        self.records.resize(start + order.len() * stride, 0);
         let parts = Part::of(&batch.columns, &self.pass.job.sources[source].columns, schema);
         let mut rows = [0u32; TILE_POINTS];
-        for (tile, order) in self.records.chunks_mut(TILE_POINTS * stride).zip(order.chunks(TILE_POINTS)) {
+        for (tile, order) in self.records[start..].chunks_mut(TILE_POINTS * stride).zip(order.chunks(TILE_POINTS)) {
             for (record, &i) in tile.chunks_exact_mut(stride).zip(order) {
                 let i = i as usize;
                 let x = (self.q[0][i] - base[0]) as i32;
@@ -195,14 +237,11 @@ impl<'a> Worker<'a> {
         }
     }
 
-    fn store(&mut self, source: usize) -> Result<(), ConvertError> {
-        let block = self.pass.store.add(source as u32, &mut self.records)?;
-        let mut start = 0;
+    fn note_segments(&mut self, block: u32, mut start: u32) {
         for &(cell, count) in &self.grouping.groups {
             self.segments.entry(cell).or_default().push(Segment { block, start, count });
             start += count;
         }
-        Ok(())
     }
 }
 

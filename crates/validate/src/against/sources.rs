@@ -133,6 +133,7 @@ impl Source {
     }
 
     /// Brings points of a batch into the dataset's terms.
+    #[allow(clippy::unnecessary_cast)] // one body for every type of column
     fn fill(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
         block.reset(rules.attributes.len());
         block.keep.resize(points, true);
@@ -146,14 +147,14 @@ impl Source {
         if rules.every > 1 {
             let first = batch.first_point + start as u64;
             for (i, keep) in block.keep.iter_mut().enumerate() {
-                *keep &= (first + i as u64) % rules.every == 0;
+                *keep &= (first + i as u64).is_multiple_of(rules.every);
             }
         }
         if let Some(classes) = &rules.classes {
             let column = self.classification.map(|i| &batch.columns[i]);
             for (i, keep) in block.keep.iter_mut().enumerate() {
                 // a scan without classes has never been classified: class 0
-                let class = column.map_or(0, |c| with_column!(c, v => v[start + i] as u8));
+                let class = column.map_or(0, |c| with_column!(c, v => v.get(start + i).map_or(0, |v| *v as u8)));
                 *keep &= classes.contains(&class);
             }
         }
@@ -198,6 +199,7 @@ impl Source {
     }
 }
 
+#[allow(clippy::unnecessary_cast)] // one body for every type of column
 fn count_deviating(column: &Column, start: usize, value: &[f64], keep: &[bool]) -> u64 {
     let elements = value.len().max(1);
     with_column!(column, values => {

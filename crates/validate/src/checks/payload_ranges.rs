@@ -56,7 +56,7 @@ fn node_range(node: &TreeNode, file_size: u64, record_len: Option<u64>, findings
         Some(len) if record.byte_size != points * len => {
             blame("byteSize", format!("{} for {points} points of {len} bytes", points * len), record.byte_size)
         }
-        Some(len) if record.byte_offset % len != 0 => {
+        Some(len) if !record.byte_offset.is_multiple_of(len) => {
             // readable all the same, but renderers that derive point indices from offsets go astray
             blame("byteOffset", format!("a multiple of {len}"), record.byte_offset);
             true

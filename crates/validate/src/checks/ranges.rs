@@ -67,6 +67,7 @@ impl Seen {
     }
 }
 
+#[allow(clippy::eq_op, clippy::unnecessary_cast)] // one body for every type of column; v != v: NaN
 fn add_column(seen: &mut [(f64, f64)], column: &Column) {
     with_column!(column, values => {
         let elements = seen.len();

@@ -230,7 +230,7 @@ pub fn attributes() -> Vec<Attribute> {
 }
 
 fn octant(position: [i32; 3], level: u8) -> usize {
-    let bit = |v: i32| (v / (SIDE >> level) & 1) as usize;
+    let bit = |v: i32| ((v / (SIDE >> level)) & 1) as usize;
     4 * bit(position[0]) + 2 * bit(position[1]) + bit(position[2])
 }
 
@@ -334,11 +334,11 @@ pub fn las(points: &[Point]) -> Vec<u8> {
     put(104, &[3]);
     put(105, &34u16.to_le_bytes());
     put(107, &(points.len() as u32).to_le_bytes());
-    for axis in 0..3 {
+    for (axis, offset) in OFFSET.into_iter().enumerate() {
         put(131 + 8 * axis, &SCALE.to_le_bytes());
-        put(155 + 8 * axis, &OFFSET[axis].to_le_bytes());
-        put(179 + 16 * axis, &(OFFSET[axis] + f64::from(SIDE) * SCALE).to_le_bytes());
-        put(187 + 16 * axis, &OFFSET[axis].to_le_bytes());
+        put(155 + 8 * axis, &offset.to_le_bytes());
+        put(179 + 16 * axis, &(offset + f64::from(SIDE) * SCALE).to_le_bytes());
+        put(187 + 16 * axis, &offset.to_le_bytes());
     }
     for p in points {
         p.position.iter().for_each(|v| out.extend(v.to_le_bytes()));
