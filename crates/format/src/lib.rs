@@ -1,6 +1,7 @@
 //! Readers and writers of point-cloud formats, for renderers and for preprocessors.
 //!
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
+//! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
 //! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
@@ -13,8 +14,14 @@ mod error;
 mod lattice;
 mod node_key;
 mod points;
+#[cfg(any(feature = "e57", feature = "las"))]
+mod quiet;
 mod scan;
+#[cfg(any(feature = "e57", feature = "las"))]
+mod source;
 
+#[cfg(feature = "e57")]
+pub mod e57;
 #[cfg(feature = "las")]
 pub mod las;
 pub mod potree2;
