@@ -11,7 +11,7 @@ use super::{Pass, Segment, Segments, Stats};
 use crate::axis::SourceMap;
 use crate::error::ConvertError;
 use crate::grid::LatticeBounds;
-use crate::pages;
+use crate::os_hints;
 use crate::plan::{OnFault, RgbDepth};
 use crate::schema::{POSITION_BYTES, as_doubles};
 
@@ -136,7 +136,7 @@ impl<'a> Worker<'a> {
             self.close_block()?;
         }
         if self.records.capacity() < BLOCK_BYTES {
-            self.records = pages::buffer(BLOCK_BYTES);
+            self.records = os_hints::buffer(BLOCK_BYTES);
         }
         let index = match &self.open {
             Some(block) => block.index,
