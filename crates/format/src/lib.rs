@@ -2,6 +2,7 @@
 //!
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
+//! * `ply`, `pcd`, `text` (features of these names): PLY, PCD, and XYZ/CSV, PTS, PTX and OFF scans, likewise.
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
 //! found in a file are never trusted; an allocation is bounded by the size of the file that asks for it.
@@ -14,10 +15,23 @@ mod lattice;
 mod node_key;
 mod points;
 mod scan;
+// each reader uses its part of these two: a build with few of them leaves some of it idle
+#[cfg(any(feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code))]
+mod rows;
+#[cfg(any(feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg_attr(not(feature = "las"), allow(dead_code))]
+mod source;
 
 #[cfg(feature = "las")]
 pub mod las;
+#[cfg(feature = "pcd")]
+pub mod pcd;
+#[cfg(feature = "ply")]
+pub mod ply;
 pub mod potree2;
+#[cfg(feature = "text")]
+pub mod text;
 
 pub use aabb::Aabb;
 pub use attributes::{Attribute, AttributeType};

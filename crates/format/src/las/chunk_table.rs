@@ -7,7 +7,7 @@ use laz::decompressors::IntegerDecompressorBuilder;
 
 use super::bytes::{i64_at, u32_at};
 use super::quiet;
-use super::source::Source;
+use crate::source::Source;
 use crate::ReadError;
 
 /// So many chunks may be empty (some writers close a chunk that they never fill).

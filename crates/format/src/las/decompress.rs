@@ -8,7 +8,7 @@ use laz::{DecompressionSelection, LazItem};
 use super::chunk_table::{Chunk, Layout};
 use super::quiet;
 use super::schema::{Layer, Schema};
-use super::source::Source;
+use crate::source::Source;
 use crate::Wanted;
 
 /// Why a decode ended before its points were complete.

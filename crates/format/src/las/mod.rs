@@ -40,7 +40,6 @@ mod pieces;
 mod quiet;
 mod records;
 mod schema;
-mod source;
 
 use std::path::Path;
 
@@ -51,7 +50,7 @@ use laszip::{Arrangement, LaszipRecord};
 use pieces::{Plan, Planner};
 use records::Records;
 use schema::Schema;
-use source::Source;
+use crate::source::Source;
 
 /// True if the first bytes of a file say that it is LAS or LAZ.
 pub fn is_las(first_bytes: &[u8]) -> bool {

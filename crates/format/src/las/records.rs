@@ -2,7 +2,7 @@
 
 use super::bytes::{text, u16_at, u64_at};
 use super::header::Header;
-use super::source::Source;
+use crate::source::Source;
 use crate::ReadError;
 
 const VLR_HEADER: u64 = 54;
