@@ -21,7 +21,8 @@ pub(crate) struct Index {
 
 /// True if the line holds more than blanks.
 pub(crate) fn is_filled(line: &[u8]) -> bool {
-    line.iter().any(|b| *b > b' ')
+    // mostly the first byte tells
+    line.first().is_some_and(|b| *b > b' ') || line.iter().any(|b| *b > b' ')
 }
 
 /// Without the line end (LF or CR LF).

@@ -97,8 +97,8 @@ fn rounded(v: f64, max: f64) -> Option<f64> {
 /// 0–1 to 0–65535, rounded; a thousandth beyond either end is cut off, more is `None`; NaN is 0.
 #[inline]
 pub(crate) fn unit_to_u16(v: f64) -> Option<u16> {
-    // NaN and negatives saturate to 0 in the cast
-    (v.is_nan() || (-0.001..=1.001).contains(&v)).then(|| (v.min(1.0) * 65535.0 + 0.5) as u16)
+    // NaN becomes 0 in the cast
+    (v.is_nan() || (-0.001..=1.001).contains(&v)).then(|| (v.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)
 }
 
 #[cfg(test)]

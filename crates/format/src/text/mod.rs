@@ -158,6 +158,10 @@ fn is_comment(line: &[u8]) -> bool {
 
 /// A line of numbers, if the file is what it should be.
 fn is_data(line: &[u8]) -> bool {
+    // a digit first is the usual row
+    if line.first().is_some_and(|b| b.is_ascii_digit() || *b == b'-') {
+        return true;
+    }
     lines::is_filled(line) && !is_comment(line)
 }
 
