@@ -31,7 +31,9 @@ fn main() -> Result<(), ReadError> {
         let secs = start.elapsed().as_secs_f64();
         let rate = points as f64 / secs / 1e6;
         let format = &scan.info().format;
-        println!("{path} ({format}): {points} points, sum {sum:.3}, opened in {open_secs:.2} s, {rate:.1} M/s with that");
+        println!(
+            "{path} ({format}): {points} points, sum {sum:.3}, opened in {open_secs:.2} s, {rate:.1} M/s with that"
+        );
     }
     Ok(())
 }
@@ -39,7 +41,9 @@ fn main() -> Result<(), ReadError> {
 /// By content, as a converter does it.
 fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
     let mut first = [0; 4096];
-    let read = std::fs::File::open(path).and_then(|mut f| f.read(&mut first)).map_err(|e| ReadError::io(path, "opening", e))?;
+    let read = std::fs::File::open(path)
+        .and_then(|mut f| f.read(&mut first))
+        .map_err(|e| ReadError::io(path, "opening", e))?;
     match &first[..read] {
         bytes if ply::is_ply(bytes) => ply::open(path),
         bytes if pcd::is_pcd(bytes) => pcd::open(path),

@@ -17,7 +17,7 @@ mod points;
 mod scan;
 // each reader uses its part of these two: a build with few of them leaves some of it idle
 #[cfg(any(feature = "pcd", feature = "ply", feature = "text"))]
-#[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code))]
+#[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code, unused_imports))]
 mod rows;
 #[cfg(any(feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 #[cfg_attr(not(feature = "las"), allow(dead_code))]

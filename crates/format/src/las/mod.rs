@@ -43,6 +43,7 @@ mod schema;
 
 use std::path::Path;
 
+use crate::source::Source;
 use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Wanted};
 use chunk_table::Layout;
 use header::{EXPORT_AGAIN, Header};
@@ -50,7 +51,6 @@ use laszip::{Arrangement, LaszipRecord};
 use pieces::{Plan, Planner};
 use records::Records;
 use schema::Schema;
-use crate::source::Source;
 
 /// True if the first bytes of a file say that it is LAS or LAZ.
 pub fn is_las(first_bytes: &[u8]) -> bool {

@@ -58,9 +58,11 @@ impl Header {
     pub(super) fn read(source: &Source) -> Result<Self, ReadError> {
         let bytes = source.vec_at(0, MAX_HEADER)?;
         if !super::is_pcd(&bytes) {
-            let what = if bytes.is_empty() { "the file is empty" } else { "not a PCD file (no VERSION or FIELDS line)" };
-            return Err(ReadError::broken(source.path(), 0, what)
-                .advise("if it holds lines of numbers, name it .xyz or .txt"));
+            let what =
+                if bytes.is_empty() { "the file is empty" } else { "not a PCD file (no VERSION or FIELDS line)" };
+            return Err(
+                ReadError::broken(source.path(), 0, what).advise("if it holds lines of numbers, name it .xyz or .txt")
+            );
         }
         let mut found = Lines::default();
         for (at, line) in lines::lines(&bytes) {
@@ -124,7 +126,8 @@ impl Lines {
         if let (Some(width), Some(height)) = (self.width, self.height)
             && width.checked_mul(height) != Some(points)
         {
-            self.warnings.push(format!("WIDTH {width} times HEIGHT {height} is not POINTS {points}; the latter is taken"));
+            self.warnings
+                .push(format!("WIDTH {width} times HEIGHT {height} is not POINTS {points}; the latter is taken"));
         }
         let fields = self.fields()?;
         let Self { version, names_at: fields_at, warnings, .. } = self;

@@ -98,12 +98,8 @@ fn place(
                 let width = p.ty.size() * p.elements;
                 std::iter::repeat_n((p.at, width), p.elements)
             });
-            let planes = Planes {
-                points: header.points,
-                properties: per_field.collect(),
-                stride,
-                decompress: lzf::decompress,
-            };
+            let planes =
+                Planes { points: header.points, properties: per_field.collect(), stride, decompress: lzf::decompress };
             Ok((pieces, Storage::Planes(planes)))
         }
     }

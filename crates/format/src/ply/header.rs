@@ -54,7 +54,8 @@ impl Header {
     pub(super) fn read(source: &Source) -> Result<Self, ReadError> {
         let bytes = source.vec_at(0, MAX_HEADER)?;
         if !super::is_ply(&bytes) {
-            let what = if bytes.is_empty() { "the file is empty" } else { "not a PLY file (it does not start with ply)" };
+            let what =
+                if bytes.is_empty() { "the file is empty" } else { "not a PLY file (it does not start with ply)" };
             return Err(ReadError::broken(source.path(), 0, what));
         }
         let mut parser = Parser { encoding: None, elements: Vec::new(), warnings: Vec::new() };
@@ -85,7 +86,8 @@ impl Header {
             .find_map(|name| self.elements.iter().position(|e| e.name.eq_ignore_ascii_case(name)));
         found.ok_or_else(|| {
             let names: Vec<_> = self.elements.iter().map(|e| e.name.as_str()).collect();
-            let there = if names.is_empty() { "it has none".to_owned() } else { format!("it has {}", names.join(", ")) };
+            let there =
+                if names.is_empty() { "it has none".to_owned() } else { format!("it has {}", names.join(", ")) };
             ReadError::broken(source.path(), self.end, format!("there is no element vertex ({there})"))
                 .advise("export it with vertices")
         })

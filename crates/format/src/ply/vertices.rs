@@ -119,13 +119,16 @@ impl Walker<'_> {
             let Some(end) = self.row_end(parts)? else { break };
             if end - self.at > MAX_ROW {
                 let what = format!("a vertex has {} bytes of lists", end - self.at);
-                return Err(ReadError::broken(self.source.path(), self.at, what).advise("it is damaged, export it again"));
+                return Err(
+                    ReadError::broken(self.source.path(), self.at, what).advise("it is damaged, export it again")
+                );
             }
             self.at = end;
             open.points += 1;
             open.byte_len = end - open.byte_offset;
             if open.points == binary::PIECE_POINTS || open.byte_len >= PIECE_BYTES {
-                let next = Piece { first_point: open.first_point + open.points, points: 0, byte_offset: end, byte_len: 0 };
+                let next =
+                    Piece { first_point: open.first_point + open.points, points: 0, byte_offset: end, byte_len: 0 };
                 pieces.push(std::mem::replace(&mut open, next));
             }
         }

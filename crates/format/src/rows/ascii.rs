@@ -47,13 +47,7 @@ impl RowParser<'_> {
     }
 
     #[inline]
-    fn field(
-        &self,
-        field: &Field,
-        tokens: &mut Tokens<'_>,
-        row: usize,
-        batch: &mut PointBatch,
-    ) -> Result<(), String> {
+    fn field(&self, field: &Field, tokens: &mut Tokens<'_>, row: usize, batch: &mut PointBatch) -> Result<(), String> {
         match field.target {
             Target::Axis(axis) => {
                 let v = tokens.number()?;
@@ -98,7 +92,11 @@ impl RowParser<'_> {
         macro_rules! integer {
             ($out:ident, $t:ty) => {{
                 let v = tokens.integer(ty)?;
-                store($out, index, <$t>::try_from(v).map_err(|_| format!("{v} does not fit the type {}", ty.potree_name()))?);
+                store(
+                    $out,
+                    index,
+                    <$t>::try_from(v).map_err(|_| format!("{v} does not fit the type {}", ty.potree_name()))?,
+                );
             }};
         }
         match (rule, column) {

@@ -7,8 +7,10 @@ use crate::{Piece, ReadError};
 
 /// Bytes of a piece: large beside the cost of a task, small beside the memory of a job.
 pub(crate) const PIECE_BYTES: u64 = 8 << 20;
-/// Bytes that are read at once while counting.
+/// Bytes that are read at once while counting, and the longest line.
 const WINDOW: u64 = 1 << 20;
+/// Bytes that are read first: a file may have very many small headers.
+const FIRST_WINDOW: u64 = 4 << 10;
 
 /// The rows of a part of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,15 +41,20 @@ pub(crate) fn walk(
     from: u64,
     mut visit: impl FnMut(u64, &[u8]) -> Result<bool, ReadError>,
 ) -> Result<u64, ReadError> {
-    let (mut at, mut buf) = (from, Vec::new());
+    let (mut at, mut buf, mut size) = (from, Vec::new(), FIRST_WINDOW);
     while at < source.len() {
-        let window = source.slice_at(at, WINDOW.min(source.len() - at), &mut buf)?;
+        let window = source.slice_at(at, size.min(source.len() - at), &mut buf)?;
         let is_last = at + window.len() as u64 == source.len();
         let whole = match memrchr(b'\n', window) {
             _ if is_last => window.len(),
             Some(newline) => newline + 1,
+            None if size < WINDOW => {
+                size = WINDOW;
+                continue;
+            }
             None => return Err(endless_line(source, at)),
         };
+        size = (size * 4).min(WINDOW);
         let mut start = 0;
         let ends = memchr_iter(b'\n', &window[..whole]).map(|n| n + 1);
         for end in ends.chain((is_last && !window.ends_with(b"\n")).then_some(whole)) {

@@ -19,7 +19,7 @@ pub(crate) use names::{Role, las_type, role};
 pub(crate) use number::Endian;
 pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};
 pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage};
-pub(crate) use schema::{Field, Property, Rule, Schema, Target};
+pub(crate) use schema::{Field, MAX_FIELDS, Property, Rule, Schema, Target};
 
 /// Advice for files that end early.
 pub(crate) const CUT_SHORT: &str = "it was cut short; copy or export it again";

@@ -11,6 +11,9 @@ use crate::{Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, S
 /// Binary rows that are read at once, so that they are still in the second-level cache when they become columns.
 const READ_BYTES: usize = 128 << 10;
 
+/// Columns of a batch take no more than this: rows of thousands of numbers come in smaller batches.
+const MAX_BATCH_BYTES: usize = 64 << 20;
+
 /// How the rows of a scan lie in its file.
 #[derive(Debug)]
 pub(crate) enum Storage {
@@ -42,9 +45,11 @@ pub(crate) struct Planes {
     pub(crate) properties: Vec<(usize, usize)>,
     /// Bytes of a record.
     pub(crate) stride: usize,
-    /// Writes the decompressed bytes to the second buffer.
-    pub(crate) decompress: fn(&[u8], usize, &mut Vec<u8>) -> Result<(), String>,
+    pub(crate) decompress: Decompress,
 }
+
+/// Replaces the last argument by so many decompressed bytes; `Err` says why the first is damaged.
+pub(crate) type Decompress = fn(&[u8], usize, &mut Vec<u8>) -> Result<(), String>;
 
 /// Which lines are rows, and what happens to their points.
 #[derive(Debug)]
@@ -165,7 +170,7 @@ impl Decoder<'_> {
     ) -> Result<(), ReadError> {
         let at_once = (READ_BYTES / stride).max(1);
         let mut at = piece.byte_offset;
-        for (first_point, points) in batches(piece) {
+        for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for first in (0..points).step_by(at_once) {
                 let len = (points - first).min(at_once) * stride;
@@ -192,7 +197,7 @@ impl Decoder<'_> {
     ) -> Result<(), ReadError> {
         let bytes = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
         let mut at = 0;
-        for (first_point, points) in batches(piece) {
+        for (first_point, points) in batches(piece, self.schema) {
             decoded.clear();
             for _ in 0..points {
                 rows.compact(bytes, &mut at, decoded).ok_or_else(|| {
@@ -226,7 +231,7 @@ impl Decoder<'_> {
             ReadError::broken(self.source.path(), piece.byte_offset, what)
                 .advise("it is damaged; copy or export it again")
         })?;
-        for (first_point, points) in batches(piece) {
+        for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for (field, (property_at, width)) in self.schema.fields.iter().zip(&planes.properties) {
                 let start = total * property_at + first_point as usize * width;
@@ -257,16 +262,14 @@ impl Decoder<'_> {
         let (wanted, separator, least) = (self.wanted, rule.separator, rule.least);
         let parser = RowParser { fields, wanted, separator, least, elements: &elements };
         let mut lines = lines::lines(bytes).filter(|(_, line)| (rule.is_row)(line));
-        for (first_point, points) in batches(piece) {
+        for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for row in 0..points {
                 let (at, line) = lines.next().ok_or_else(|| {
                     let what = format!("{row} of {points} lines are left; the file has changed");
                     ReadError::broken(self.source.path(), piece.byte_offset, what)
                 })?;
-                parser
-                    .row(line, row, batch)
-                    .map_err(|m| self.misfit(piece.byte_offset + (at + m.at) as u64, m))?;
+                parser.row(line, row, batch).map_err(|m| self.misfit(piece.byte_offset + (at + m.at) as u64, m))?;
             }
             self.pose(rule, batch);
             if !sink(batch) {
@@ -313,19 +316,19 @@ impl Decoder<'_> {
 }
 
 /// Runs of at most a batch: first point and number of points.
-fn batches(piece: &Piece) -> impl Iterator<Item = (u64, usize)> {
+fn batches(piece: &Piece, schema: &Schema) -> impl Iterator<Item = (u64, usize)> + use<> {
+    let point_bytes = 24 + schema.attributes.iter().map(crate::Attribute::size).sum::<usize>();
+    let most = (MAX_BATCH_BYTES / point_bytes).clamp(1, MAX_BATCH_POINTS);
     let (first, points) = (piece.first_point, piece.points);
-    (0..points)
-        .step_by(MAX_BATCH_POINTS)
-        .map(move |done| (first + done, (points - done).min(MAX_BATCH_POINTS as u64) as usize))
+    (0..points).step_by(most).map(move |done| (first + done, (points - done).min(most as u64) as usize))
 }
 
 /// The batch of the scratch memory, with columns of this scan's types.
 fn fitting_batch<'a>(batch: &'a mut Option<PointBatch>, schema: &Schema) -> &'a mut PointBatch {
     let types = || schema.attributes.iter().map(|a| a.ty);
-    let fits = batch.as_ref().is_some_and(|b| {
-        matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types())
-    });
+    let fits = batch
+        .as_ref()
+        .is_some_and(|b| matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types()));
     if !fits {
         *batch = None;
     }

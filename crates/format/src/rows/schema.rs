@@ -4,7 +4,7 @@ use super::names::{self, Role, role};
 use crate::{Attribute, AttributeType};
 
 /// More numbers in a row than any scan has; a header that says more is refused.
-const MAX_FIELDS: usize = 4096;
+pub(crate) const MAX_FIELDS: usize = 4096;
 
 /// A column as the file declares it.
 #[derive(Debug, Clone, PartialEq)]
@@ -228,8 +228,18 @@ mod tests {
     #[test]
     fn colour_comes_first_and_the_rest_keeps_its_order() {
         let s = schema(&[
-            ("b", UInt8), ("scalar_Intensity", Float32), ("z", Float32), ("y", Float32), ("x", Float64), ("nx", Float64),
-            ("ny", Float64), ("nz", Float64), ("g", UInt8), ("r", UInt8), ("intensity", Int32), ("quality", Int32),
+            ("b", UInt8),
+            ("scalar_Intensity", Float32),
+            ("z", Float32),
+            ("y", Float32),
+            ("x", Float64),
+            ("nx", Float64),
+            ("ny", Float64),
+            ("nz", Float64),
+            ("g", UInt8),
+            ("r", UInt8),
+            ("intensity", Int32),
+            ("quality", Int32),
         ])
         .unwrap();
         assert_eq!(

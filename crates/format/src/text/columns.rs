@@ -1,7 +1,8 @@
 //! What the columns of a text hold: by name, by number, by value.
 
 use crate::rows::{
-    ColumnRange, Field, LineRule, Property, Role, RowScan, Rule, Schema, Storage, Target, las_type, probe_rows, role,
+    ColumnRange, EXPORT_AGAIN, Field, LineRule, MAX_FIELDS, Property, Role, RowScan, Rule, Schema, Storage, Target,
+    las_type, probe_rows, role,
 };
 use crate::source::Source;
 use crate::{AttributeType, Piece, ReadError};
@@ -83,6 +84,10 @@ struct Sample {
 impl Table {
     /// The scan: `columns` by name, or (`None`) by number and values.
     pub(super) fn scan(mut self, columns: Option<Vec<Column>>) -> Result<RowScan, ReadError> {
+        if self.numeric.len() > MAX_FIELDS {
+            let what = format!("a row has {} columns, more than {MAX_FIELDS}", self.numeric.len());
+            return Err(ReadError::broken(self.source.path(), self.first_row, what).advise(EXPORT_AGAIN));
+        }
         let fields = vec![Field { at: 0, ty: AttributeType::Float64, target: Target::Skip }; self.numeric.len()];
         let raw = Schema { attributes: Vec::new(), fields, flat: false };
         let mut scan = RowScan::new(self.source, self.format, self.declared, raw, Storage::Lines(self.rule));
@@ -95,9 +100,8 @@ impl Table {
             }
             *column = Column::padding();
         }
-        let shift = |i: usize| {
-            self.pts_intensity && columns[i].ty.is_none() && sample.ranges[i].is_integer_in(-2048.0, 2047.0)
-        };
+        let shift =
+            |i: usize| self.pts_intensity && columns[i].ty.is_none() && sample.ranges[i].is_integer_in(-2048.0, 2047.0);
         let intensity = columns.iter().position(|c| c.role == Role::Intensity).filter(|i| shift(*i));
         let unit = has_unit_colours(&columns, &sample.ranges);
         let property = |(column, range): (&Column, &ColumnRange)| {
@@ -212,7 +216,7 @@ mod tests {
 
     #[test]
     fn seven_columns_are_ordered_by_their_ranges() {
-        let xyz = vec![range(0.0, 1e5, false); 3];
+        let xyz = [range(0.0, 1e5, false); 3];
         let byte = range(0.0, 255.0, true);
         let with = |rest: [ColumnRange; 4]| roles(xyz.iter().copied().chain(rest).collect());
         assert_eq!(with([range(0.0, 4000.0, true), byte, byte, byte]), "x y z i r g b");

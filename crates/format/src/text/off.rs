@@ -97,11 +97,7 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
 }
 
 /// The counts, behind the keyword or on a line of their own: their place, they, and where the vertices start.
-fn counts<'a>(
-    source: &Source,
-    first: &'a [u8],
-    keyword: Keyword,
-) -> Result<(u64, Vec<&'a [u8]>, u64), ReadError> {
+fn counts<'a>(source: &Source, first: &'a [u8], keyword: Keyword) -> Result<(u64, Vec<&'a [u8]>, u64), ReadError> {
     let mut at = keyword.end;
     for (place, line) in lines::lines(&first[keyword.end..]) {
         at = keyword.end + place;
@@ -124,7 +120,8 @@ mod tests {
 
     #[test]
     fn the_keyword_says_what_a_vertex_has() {
-        let names = |word: &str, count| Keyword::find(word.as_bytes()).and_then(|k| k.columns(count)).map(|n| n.join(" "));
+        let names =
+            |word: &str, count| Keyword::find(word.as_bytes()).and_then(|k| k.columns(count)).map(|n| n.join(" "));
         assert_eq!(names("OFF\n", 3).unwrap(), "x y z");
         assert_eq!(names("# made\nCOFF 1 0 0\n", 7).unwrap(), "x y z r g b alpha");
         assert_eq!(names("STCNOFF", 11).unwrap(), "x y z nx ny nz r g b s t");

@@ -93,6 +93,7 @@ pub(crate) fn read_scan(scan: &dyn Scan, wanted: &Wanted) -> Cloud {
     cloud
 }
 
+#[allow(clippy::unnecessary_cast)] // one of the ten types is the target
 fn doubles(column: &Column) -> Vec<f64> {
     with_column!(column, v => v.iter().map(|n| *n as f64).collect())
 }

@@ -17,7 +17,8 @@ fn with(bytes: &str, columns: &[&str], separator: Option<char>) -> Result<Cloud,
 
 #[test]
 fn a_count_beyond_2_to_the_32_is_declared_and_only_what_is_there_is_read() {
-    let header = ply("ascii", "element vertex 5000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n");
+    let header =
+        ply("ascii", "element vertex 5000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n");
     let cloud = read_bytes(header + "1 2 3\n4 5 6\n").unwrap();
     assert_eq!((cloud.info.points_declared, cloud.len()), (5_000_000_000, 2));
     assert!(cloud.warned("declares 5000000000 points, 2 whole ones are there"));
@@ -33,11 +34,14 @@ fn hostile_elements_before_the_vertices_end_at_the_file() {
         "element a 18446744073709551615\nproperty list uchar double v\n",
         "element a 1\nproperty list uint double v\n",
     ] {
-        let rest = format!("{element}element vertex 1\nproperty float x\nproperty float y\nend_header\n\u{7f}\u{7f}\u{7f}\u{7f}");
+        let rest = format!(
+            "{element}element vertex 1\nproperty float x\nproperty float y\nend_header\n\u{7f}\u{7f}\u{7f}\u{7f}"
+        );
         let e = read_bytes(ply("binary_little_endian", &rest)).unwrap_err();
         assert!(e.what.contains("of element a end outside the file"), "{e}");
     }
-    let nothing = "element a 18446744073709551615\nelement vertex 1\nproperty char x\nproperty char y\nend_header\n\x01\x02";
+    let nothing =
+        "element a 18446744073709551615\nelement vertex 1\nproperty char x\nproperty char y\nend_header\n\x01\x02";
     assert_eq!(read_bytes(ply("binary_little_endian", nothing)).unwrap().xyz, [[1.0], [2.0], [0.0]]);
 }
 
@@ -155,4 +159,29 @@ fn pcd_blocks_that_cannot_be_are_refused_before_memory_is_taken() {
     bytes.extend([1, 2, 3, 4]);
     let e = read_bytes(&bytes).unwrap_err();
     assert!(e.what.contains("cannot be in a block of 4 bytes"), "{e}");
+}
+
+#[test]
+fn very_many_empty_scans_take_time_for_their_bytes_only() {
+    let scan = "0\n0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+    let start = std::time::Instant::now();
+    let cloud = read_bytes(scan.repeat(20_000)).unwrap();
+    assert_eq!((cloud.len(), cloud.info.format.as_str()), (0, "PTX, 20000 scans, 0 grid cells"));
+    assert!(start.elapsed().as_secs() < 60);
+}
+
+#[test]
+fn very_wide_rows_are_refused_or_come_in_small_batches() {
+    let e = read_bytes("1 ".repeat(5000) + "\n1\n").unwrap_err();
+    assert!(e.what.contains("5000 columns"), "{e}");
+    let mut header = "element vertex 100000\nproperty float x\nproperty float y\n".to_owned();
+    (0..4000).for_each(|i| header += &format!("property double p{i}\n"));
+    let scan =
+        common::open(&common::file((ply("ascii", &header) + "end_header\n" + &"1\n".repeat(100_000)).as_bytes()))
+            .unwrap();
+    let mut scratch = pointmill_format::Scratch::default();
+    let result = scan.decode(0, &Wanted::all(scan.info()), &mut scratch, &mut |_| true);
+    assert!(result.unwrap_err().what.contains("the line has 1 numbers, 4002 are expected"));
+    let batch = scratch.batch.unwrap();
+    assert!(batch.columns.iter().map(|c| c.len() * 8).sum::<usize>() <= 64 << 20);
 }
