@@ -86,7 +86,8 @@ fn divide_once(cell: &Cell, gathered: &Gathered, frame: &RecordFrame) -> Result<
                 let at = i as usize * frame.stride;
                 sorted.extend_from_slice(&records[at..at + frame.stride]);
             }
-            let block = gathered.store.add(source, &mut sorted)?;
+            let block = gathered.store.open(source)?;
+            gathered.store.fill(block, &mut sorted)?;
             let mut at = 0;
             for &(_, count) in &grouping.groups {
                 let first = grouping.order[at as usize] as usize * frame.stride;
@@ -101,7 +102,12 @@ fn divide_once(cell: &Cell, gathered: &Gathered, frame: &RecordFrame) -> Result<
                         part.segments.push(segment);
                     }
                     None => {
-                        parts.push(Cell { key, points: u64::from(count), segments: vec![segment], is_one_place: false })
+                        parts.push(Cell {
+                            key,
+                            points: u64::from(count),
+                            segments: vec![segment],
+                            is_one_place: false,
+                        });
                     }
                 }
             }

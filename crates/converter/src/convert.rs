@@ -1,6 +1,6 @@
 //! A run, all passes in order.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -108,7 +108,7 @@ fn read(
     plan: &Plan,
     job: &mut Job,
     budget: &Budget,
-    temp_dir: &PathBuf,
+    temp_dir: &Path,
     pool: &rayon::ThreadPool,
     events: &dyn Events,
     clock: &mut Clock<'_>,
@@ -183,6 +183,7 @@ fn build(
         frame,
         store: &gathered.store,
         leaf_capacity: plan.leaf_capacity,
+        usual_points: budget.chunk_points.min(gathered.stats.points),
         duplicates: plan.duplicates,
         widen_rgb: &description.widen_rgb,
     };

@@ -28,6 +28,7 @@ mod grid;
 mod job;
 pub mod memory;
 mod morton;
+mod pages;
 mod plan;
 mod records;
 mod report;

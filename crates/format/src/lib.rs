@@ -1,6 +1,7 @@
 //! Readers and writers of point-cloud formats, for renderers and for preprocessors.
 //!
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
+//! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
 //! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
 //! * `ply`, `pcd`, `text` (features of these names): PLY, PCD, and XYZ/CSV, PTS, PTX and OFF scans, likewise.
 //!
@@ -14,15 +15,18 @@ mod error;
 mod lattice;
 mod node_key;
 mod points;
+#[cfg(any(feature = "e57", feature = "las"))]
+mod quiet;
 mod scan;
-// each reader uses its part of these two: a build with few of them leaves some of it idle
+// each reader uses its part of it: a build with few of them leaves some of it idle
 #[cfg(any(feature = "pcd", feature = "ply", feature = "text"))]
 #[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code, unused_imports))]
 mod rows;
-#[cfg(any(feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
-#[cfg_attr(not(feature = "las"), allow(dead_code))]
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 
+#[cfg(feature = "e57")]
+pub mod e57;
 #[cfg(feature = "las")]
 pub mod las;
 #[cfg(feature = "pcd")]

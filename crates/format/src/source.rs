@@ -46,6 +46,7 @@ impl Source {
     }
 
     /// `N` bytes from `offset`.
+    #[cfg(any(feature = "e57", feature = "las", feature = "pcd"))]
     pub(crate) fn array_at<const N: usize>(&self, offset: u64) -> Result<[u8; N], ReadError> {
         let mut buf = [0; N];
         self.read_at(offset, &mut buf)?;
@@ -53,6 +54,7 @@ impl Source {
     }
 
     /// `len` bytes from `offset`, at most what the file holds from there: the allocation never exceeds the file.
+    #[cfg(any(feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
     pub(crate) fn vec_at(&self, offset: u64, len: u64) -> Result<Vec<u8>, ReadError> {
         let len = len.min(self.len.saturating_sub(offset));
         let mut buf = vec![0; usize::try_from(len).unwrap_or(0)];
@@ -75,12 +77,14 @@ impl Source {
     }
 
     /// A sequential reader over `offset..end`.
+    #[cfg(feature = "las")]
     pub(crate) fn reader(&self, offset: u64, end: u64) -> SourceReader<'_> {
         SourceReader { source: self, next: offset, end: end.min(self.len), buf: Vec::new(), at: 0 }
     }
 }
 
 /// A buffered reader of a part of a [`Source`].
+#[cfg(feature = "las")]
 pub(crate) struct SourceReader<'a> {
     source: &'a Source,
     next: u64,
@@ -90,8 +94,10 @@ pub(crate) struct SourceReader<'a> {
 }
 
 /// Large enough that a read costs little beside decoding, small beside a batch.
+#[cfg(feature = "las")]
 const READER_BUFFER: u64 = 256 * 1024;
 
+#[cfg(feature = "las")]
 impl io::Read for SourceReader<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.buf.len() {

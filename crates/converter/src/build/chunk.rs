@@ -12,6 +12,7 @@ use crate::chunks::Chunk;
 use crate::error::ConvertError;
 use crate::gather::Store;
 use crate::morton;
+use crate::pages;
 use crate::plan::Duplicates;
 use crate::records::RecordFrame;
 use crate::sample::Sampler;
@@ -22,6 +23,8 @@ pub(crate) struct ChunkPlan<'a> {
     pub(crate) frame: &'a RecordFrame,
     pub(crate) store: &'a Store,
     pub(crate) leaf_capacity: u32,
+    /// Buffers are made for chunks of this size at once; what is not touched costs nothing.
+    pub(crate) usual_points: u64,
     pub(crate) duplicates: Duplicates,
     /// For each source: byte offset of an 8-bit colour that is to be stored as 16 bit.
     pub(crate) widen_rgb: &'a [Option<usize>],
@@ -105,6 +108,8 @@ impl<'a> ChunkBuilder<'a> {
             written: Checksum::default(),
         };
         nodes.payloads.clear();
+        let room = self.points.len().max(self.plan.usual_points as usize) * self.plan.frame.stride;
+        pages::reserve(&mut nodes.payloads, room);
         let mut subtree =
             Subtree { capacity: self.plan.leaf_capacity as usize, sampler: &mut self.sampler, overfull_leaves: 0 };
         let mut root = subtree.node(chunk.key, 0..self.points.len(), &mut nodes)?;
@@ -119,7 +124,7 @@ impl<'a> ChunkBuilder<'a> {
     fn load(&mut self, chunk: &Chunk, accounts: &mut Accounts) -> Result<(), ConvertError> {
         let stride = self.plan.frame.stride;
         self.records.clear();
-        self.records.reserve_exact(chunk.points as usize * stride);
+        pages::reserve(&mut self.records, chunk.points.max(self.plan.usual_points) as usize * stride);
         for segment in &chunk.segments {
             let start = self.records.len();
             let source = self.plan.store.take(*segment, &mut self.records)?;

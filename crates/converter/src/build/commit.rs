@@ -28,6 +28,9 @@ pub(crate) struct Committer<'a> {
     changed: Condvar,
 }
 
+/// Buffers below this size are not passed on.
+const SPARE_BYTES: usize = 4 << 20;
+
 struct State {
     /// The next chunk to put behind the others.
     next: usize,
@@ -53,14 +56,16 @@ pub(crate) struct Built {
 #[derive(Debug, Clone, Copy)]
 struct TopPoint {
     t: [u32; 3],
-    chunk: u32,
+    slab: u32,
     record: u32,
 }
 
-/// Pending records by chunk, dropped once all of a chunk's are written.
+/// Pending records in slabs. A slab holds what a chunk handed in or what one node above took, and is dropped once all
+/// of it was written or has moved up: what rises to the root must not keep whole chunks in memory.
 struct TopNodes {
     stride: usize,
-    slabs: HashMap<u32, Slab>,
+    /// By number; `None` once nothing refers to it any more.
+    slabs: Vec<Option<Slab>>,
     writer: PayloadWriter,
     payloads: Vec<u8>,
     nodes: Vec<NodeEntry>,
@@ -80,20 +85,45 @@ impl Nodes<TopPoint> for TopNodes {
     fn write(&mut self, key: NodeKey, points: &[TopPoint]) -> Result<(), ConvertError> {
         let record = |p: &TopPoint| {
             let at = p.record as usize * self.stride;
-            self.slabs.get(&p.chunk).map_or(&[][..], |slab| &slab.records[at..at + self.stride])
+            self.slabs[p.slab as usize].as_ref().map_or(&[][..], |slab| &slab.records[at..at + self.stride])
         };
         let records = points.iter().map(record);
         let entry = self.writer.write(key, records, &mut self.payloads, &mut self.written)?;
         self.nodes.push(entry);
-        for p in points {
-            if let Some(slab) = self.slabs.get_mut(&p.chunk) {
-                slab.remaining -= 1;
-                if slab.remaining == 0 {
-                    self.slabs.remove(&p.chunk);
-                }
+        points.iter().for_each(|p| self.release(*p));
+        Ok(())
+    }
+}
+
+impl TopNodes {
+    fn add_slab(&mut self, records: Vec<u8>, points: usize) -> u32 {
+        self.slabs.push((points > 0).then_some(Slab { records, remaining: points }));
+        (self.slabs.len() - 1) as u32
+    }
+
+    /// Moves the records of a node that was just sampled into a slab of their own.
+    fn gather_slab(&mut self, points: &mut [TopPoint]) {
+        let mut records = Vec::with_capacity(points.len() * self.stride);
+        for p in points.iter() {
+            if let Some(slab) = &self.slabs[p.slab as usize] {
+                records.extend_from_slice(&slab.records[p.record as usize * self.stride..][..self.stride]);
             }
         }
-        Ok(())
+        points.iter().for_each(|p| self.release(*p));
+        let slab = self.add_slab(records, points.len());
+        for (record, p) in points.iter_mut().enumerate() {
+            *p = TopPoint { slab, record: record as u32, ..*p };
+        }
+    }
+
+    fn release(&mut self, point: TopPoint) {
+        let slot = &mut self.slabs[point.slab as usize];
+        if let Some(slab) = slot {
+            slab.remaining -= 1;
+            if slab.remaining == 0 {
+                *slot = None;
+            }
+        }
     }
 }
 
@@ -109,7 +139,7 @@ impl<'a> Committer<'a> {
     ) -> Self {
         let top = TopNodes {
             stride,
-            slabs: HashMap::new(),
+            slabs: Vec::new(),
             writer,
             payloads: Vec::new(),
             nodes: Vec::new(),
@@ -155,7 +185,7 @@ impl<'a> Committer<'a> {
                 let next = state.next;
                 let Some(chunk) = state.waiting.remove(&next) else { break };
                 let following = self.keys.get(next + 1).copied();
-                state.append(next, chunk, following, &mut ready)?;
+                state.append(chunk, following, &mut ready)?;
                 state.next += 1;
             }
         }
@@ -164,7 +194,8 @@ impl<'a> Committer<'a> {
             write_all_at(self.file, &bytes, offset)
                 .map_err(|e| ConvertError::io(&self.path, "writing node payloads", e))?;
             let mut state = self.lock();
-            if state.spare.len() < self.window {
+            // The small buffers of the nodes above are not worth keeping.
+            if state.spare.len() < self.window && bytes.capacity() > SPARE_BYTES {
                 state.spare.push(bytes);
             }
         }
@@ -189,7 +220,6 @@ impl<'a> Committer<'a> {
 impl State {
     fn append(
         &mut self,
-        index: usize,
         chunk: BuiltChunk,
         following: Option<NodeKey>,
         ready: &mut VecDeque<(u64, Vec<u8>)>,
@@ -197,10 +227,8 @@ impl State {
         let BuiltChunk { payloads, nodes, root, pending_trees, pending_records, accounts } = chunk;
         self.accounts.merge(&accounts);
         self.place(nodes, payloads, ready);
-        let index = index as u32;
-        let remaining = pending_trees.len();
-        self.top.slabs.insert(index, Slab { records: pending_records, remaining });
-        self.stack.push(lift(root, index, &pending_trees));
+        let slab = self.top.add_slab(pending_records, pending_trees.len());
+        self.stack.push(lift(root, slab, &pending_trees));
         self.climb(following)?;
         if !self.top.payloads.is_empty() {
             let payloads = std::mem::take(&mut self.top.payloads);
@@ -231,7 +259,8 @@ impl State {
             }
             let first = self.stack.iter().rposition(|n| n.key.parent() != Some(parent)).map_or(0, |i| i + 1);
             let children = self.stack.split_off(first);
-            let node = Pending::above(parent, children, &mut self.sampler, &mut self.top)?;
+            let mut node = Pending::above(parent, children, &mut self.sampler, &mut self.top)?;
+            self.top.gather_slab(&mut node.points);
             self.stack.push(node);
         }
         Ok(())
@@ -239,8 +268,8 @@ impl State {
 }
 
 /// From points of a chunk to points above the chunks.
-fn lift(node: Pending<u32>, chunk: u32, trees: &[[u32; 3]]) -> Pending<TopPoint> {
-    let points = node.points.iter().map(|&record| TopPoint { t: trees[record as usize], chunk, record }).collect();
-    let children = node.children.into_iter().map(|c| lift(c, chunk, trees)).collect();
+fn lift(node: Pending<u32>, slab: u32, trees: &[[u32; 3]]) -> Pending<TopPoint> {
+    let points = node.points.iter().map(|&record| TopPoint { t: trees[record as usize], slab, record }).collect();
+    let children = node.children.into_iter().map(|c| lift(c, slab, trees)).collect();
     Pending { key: node.key, points, is_inner: node.is_inner, children }
 }

@@ -150,7 +150,8 @@ impl Pass<'_> {
         }
         let mut stats = Stats::new(&self.job.schema, self.job.sources.len());
         let mut segments = Segments::default();
-        for (part, cells) in parts {
+        for part in parts {
+            let (part, cells) = part?;
             stats.merge(&part);
             for (cell, mut more) in cells {
                 segments.entry(cell).or_default().append(&mut more);

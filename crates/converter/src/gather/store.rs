@@ -7,6 +7,10 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use crate::error::ConvertError;
 use crate::file_at::{read_exact_at, write_all_at};
+use crate::pages;
+
+/// Blocks grow to this size: a few large pages, and one long write when they go to disk.
+pub(crate) const BLOCK_BYTES: usize = 8 << 20;
 
 /// A run of records of one block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,24 +64,36 @@ impl Store {
         self.spilled.load(Ordering::Relaxed)
     }
 
-    /// Adds a block of records and returns its index; `records` comes back (emptied) when it went to disk.
-    pub(crate) fn add(&self, source: u32, records: &mut Vec<u8>) -> Result<u32, ConvertError> {
+    /// The index that the next block will have; it must be added with [`Self::fill`].
+    pub(crate) fn open(&self, source: u32) -> Result<u32, ConvertError> {
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        blocks.push(Block { source, remaining: 0, place: Place::Gone });
+        Ok((blocks.len() - 1) as u32)
+    }
+
+    /// Adds the records of a block. The buffer comes back empty, with or without its memory.
+    pub(crate) fn fill(&self, block: u32, records: &mut Vec<u8>) -> Result<(), ConvertError> {
         let bytes = records.len() as u64;
-        let before = self.in_memory.fetch_add(bytes, Ordering::Relaxed);
-        let place = if before + bytes <= self.memory_limit {
-            Place::Memory(Arc::new(std::mem::take(records)))
+        let keeps_buffer = records.len() * 2 > records.capacity();
+        let cost = if keeps_buffer { records.capacity() as u64 } else { bytes };
+        let before = self.in_memory.fetch_add(cost, Ordering::Relaxed);
+        let place = if before + cost <= self.memory_limit {
+            let kept = if keeps_buffer { std::mem::take(records) } else { records.as_slice().to_vec() };
+            Place::Memory(Arc::new(kept))
         } else {
-            self.in_memory.fetch_sub(bytes, Ordering::Relaxed);
+            self.in_memory.fetch_sub(cost, Ordering::Relaxed);
             let offset = self.spilled.fetch_add(bytes, Ordering::Relaxed);
             let file = self.spill_file()?;
             write_all_at(file, records, offset)
                 .map_err(|e| ConvertError::io(&self.spill_dir, "writing the spill file", e))?;
             Place::Disk { offset }
         };
+        records.clear();
         let remaining = (bytes / self.stride as u64) as u32;
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
-        blocks.push(Block { source, remaining, place });
-        Ok((blocks.len() - 1) as u32)
+        let slot = &mut blocks[block as usize];
+        (slot.remaining, slot.place) = (remaining, place);
+        Ok(())
     }
 
     /// Appends the records of a segment to `out` and returns its source. Each record may be taken once.
@@ -92,6 +108,7 @@ impl Store {
             Place::Memory(bytes) => out.extend_from_slice(&bytes[start..start + len]),
             Place::Disk { offset } => {
                 let at = out.len();
+                pages::reserve(out, len);
                 out.resize(at + len, 0);
                 read_exact_at(self.spill_file()?, &mut out[at..], offset + start as u64)
                     .map_err(|e| ConvertError::io(&self.spill_dir, "reading the spill file", e))?;
@@ -104,7 +121,7 @@ impl Store {
         if block.remaining == 0
             && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
         {
-            self.in_memory.fetch_sub(bytes.len() as u64, Ordering::Relaxed);
+            self.in_memory.fetch_sub(bytes.capacity() as u64, Ordering::Relaxed);
         }
         Ok(source)
     }
@@ -131,8 +148,10 @@ mod tests {
     fn memory_and_disk_give_back_the_same_records() {
         let dir = tempfile::tempdir().unwrap();
         let store = Store::new(dir.path(), 4, 40);
-        let a = store.add(0, &mut (0..40u8).collect()).unwrap();
-        let b = store.add(1, &mut (100..140u8).collect()).unwrap();
+        let a = store.open(0).unwrap();
+        let b = store.open(1).unwrap();
+        store.fill(a, &mut (0..40u8).collect()).unwrap();
+        store.fill(b, &mut (100..140u8).collect()).unwrap();
         assert_eq!(store.spilled_bytes(), 40);
         let mut out = Vec::new();
         assert_eq!(store.take(Segment { block: b, start: 2, count: 3 }, &mut out).unwrap(), 1);
@@ -144,7 +163,8 @@ mod tests {
     fn a_block_leaves_memory_once_all_of_it_was_taken() {
         let dir = tempfile::tempdir().unwrap();
         let store = Store::new(dir.path(), 4, 40);
-        let a = store.add(0, &mut vec![1; 40]).unwrap();
+        let a = store.open(0).unwrap();
+        store.fill(a, &mut vec![1; 40]).unwrap();
         let mut out = Vec::new();
         store.take(Segment { block: a, start: 0, count: 4 }, &mut out).unwrap();
         assert_eq!(store.in_memory.load(Ordering::Relaxed), 40);

@@ -1,10 +1,14 @@
 //! A maximal Poisson-disk sample: no two points closer than the spacing, and every candidate closer than the spacing
-//! to one that was taken. By greedy choice in Morton order.
+//! to one that was taken. By greedy choice in a fixed order.
 //!
 //! Candidates come in Morton order, so those of a cube are one run, and so are the points taken from it. The node is
 //! walked in *tiles* of four spacings. When a tile's run begins, the few taken points around it that can conflict
 //! (closer than the spacing to the tile's box) are copied into a small array, found through *cells* of two spacings;
 //! each candidate is then compared with that array alone, eight points at a time, and joins it if it is taken.
+//!
+//! Within a tile the candidates are visited in a scattered order. Any sweep (along the Morton curve, outwards from a
+//! centre) packs each point against the ones before: nearest neighbours are then 1.04 to 1.08 spacings apart on a dense
+//! plane. Scattered, they are 1.09 to 1.12 apart, with a sixth fewer points and no hole larger.
 //!
 //! Distances are compared in `f32`, in units of the spacing from the node's corner (0 to 128, so a coordinate is off by
 //! 2^-18 at most): a pair conflicts below `1 + MARGIN`, which is more than all rounding together. So no pair is ever
@@ -28,21 +32,20 @@ const LANES: usize = 8;
 
 /// The grid, kept from node to node; all empty in between.
 pub(super) struct Poisson {
-    /// Range in `taken` of each cell, by Morton code of the cell: neighbours in space are near in memory.
+    /// One bit for each cell from which a point was taken, a word for each column of cells: bit z of word (x, y).
+    occupied: Vec<u64>,
+    /// Range in `taken` of each occupied cell, by Morton code of the cell: neighbours in space are near in memory.
     ranges: Vec<Range>,
-    touched: Vec<u32>,
     /// In spacings from the corner of the node.
     taken: Vec<[f32; 3]>,
     near: Near,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Range {
     start: u32,
     end: u32,
 }
-
-const EMPTY: Range = Range { start: 0, end: 0 };
 
 /// Points that a candidate may conflict with, eight to a block; unused lanes are infinitely far away.
 #[derive(Debug, Default)]
@@ -80,30 +83,48 @@ impl Near {
         self.len += 1;
     }
 
-    /// True if a point is too near to `p`. Newest first: what was taken last is nearest in Morton order.
+    /// True if a point is too near to `p`.
     #[inline]
     fn conflicts(&self, p: [f32; 3]) -> bool {
-        self.blocks.iter().rev().any(|block| {
-            let mut hits = [false; LANES];
-            for (i, hit) in hits.iter_mut().enumerate() {
+        self.blocks.iter().any(|block| {
+            // All lanes first, one question at the end: the compiler makes vector code of it.
+            let mut hits = 0u32;
+            for i in 0..LANES {
                 let (dx, dy, dz) = (block.x[i] - p[0], block.y[i] - p[1], block.z[i] - p[2]);
-                *hit = dx * dx + dy * dy + dz * dz < CONFLICT_BELOW;
+                hits |= u32::from(dx * dx + dy * dy + dz * dz < CONFLICT_BELOW);
             }
-            hits.iter().fold(false, |any, hit| any | hit)
+            hits != 0
         })
     }
 }
 
+/// The numbers below `n`, each once, every one far from those before: multiples of the golden ratio modulo a power of
+/// two (an odd factor reaches every residue).
+#[inline]
+fn scattered(n: usize) -> impl Iterator<Item = usize> {
+    let size = n.next_power_of_two();
+    let step = ((size as u64 * 0x9e37_79b9) >> 32) as usize | 1;
+    (0..size).map(move |i| i.wrapping_mul(step) & (size - 1)).filter(move |i| *i < n)
+}
+
 impl Default for Poisson {
     fn default() -> Self {
-        let ranges = vec![EMPTY; 1 << (3 * GRID_BITS)];
-        Self { ranges, touched: Vec::new(), taken: Vec::new(), near: Near::default() }
+        let occupied = vec![0; (GRID_SIZE * GRID_SIZE) as usize];
+        let ranges = vec![Range::default(); 1 << (3 * GRID_BITS)];
+        Self { occupied, ranges, taken: Vec::new(), near: Near::default() }
     }
 }
 
 impl Poisson {
     pub(super) fn choose(&mut self, level: u8, candidates: &[[u32; 3]], accepted: &mut [bool]) {
         let Some(first) = candidates.first() else { return };
+        if u32::from(level) > TREE_BITS - SPACING_BITS {
+            // The spacing is less than one unit: only repeated places conflict, and they are neighbours in Morton order.
+            for (i, accepted) in accepted.iter_mut().enumerate() {
+                *accepted = i == 0 || candidates[i] != candidates[i - 1];
+            }
+            return;
+        }
         let shift = cell_shift(level);
         let cell_shift = shift + CELL_BITS;
         let tile_shift = cell_shift + 1;
@@ -111,46 +132,57 @@ impl Poisson {
         let corner = first.map(|t| t >> node_bits << node_bits);
         // A power of two, so nothing is lost by it.
         let unit = 1.0 / (1u32 << shift) as f32;
+        self.occupied.fill(0);
+        self.taken.clear();
         let mut at = 0;
         while let Some(&first) = candidates.get(at) {
             self.collect_near(first.map(|t| t >> tile_shift << 1 & (GRID_SIZE - 1)));
-            let mut cell_start = self.taken.len() as u32;
-            let mut previous = first;
-            while let Some(&t) = candidates.get(at) {
-                let change = (t[0] ^ previous[0]) | (t[1] ^ previous[1]) | (t[2] ^ previous[2]);
-                if change >> cell_shift != 0 {
-                    cell_start = self.close_cell(previous.map(|t| t >> cell_shift), cell_start);
-                    if change >> tile_shift != 0 {
-                        break;
-                    }
-                }
-                previous = t;
-                let p: [f32; 3] = std::array::from_fn(|a| (t[a] - corner[a]) as i32 as f32 * unit);
+            let tile = first.map(|t| t >> tile_shift);
+            let run = candidates[at..].iter().take_while(|t| t.map(|t| t >> tile_shift) == tile).count();
+            let place = |t: [u32; 3]| -> [f32; 3] { std::array::from_fn(|a| (t[a] - corner[a]) as i32 as f32 * unit) };
+            let (candidates, accepted) = (&candidates[at..at + run], &mut accepted[at..at + run]);
+            at += run;
+            for i in scattered(run) {
+                let p = place(candidates[i]);
                 if !self.near.conflicts(p) {
-                    accepted[at] = true;
+                    accepted[i] = true;
                     self.near.push(p);
-                    self.taken.push(p);
                 }
-                at += 1;
             }
-            self.close_cell(previous.map(|t| t >> cell_shift), cell_start);
+            self.note_taken(candidates, accepted, cell_shift, place);
         }
-        for cell in self.touched.drain(..) {
-            self.ranges[cell as usize] = EMPTY;
-        }
-        self.taken.clear();
     }
 
-    /// Notes which points were taken from a cell whose run has ended.
+    /// Notes which points were taken from a tile, cell by cell.
     #[inline]
-    fn close_cell(&mut self, cell: [u32; 3], start: u32) -> u32 {
-        let end = self.taken.len() as u32;
-        if end > start {
-            let code = interleave(cell.map(|c| c & (GRID_SIZE - 1))) as u32;
-            self.ranges[code as usize] = Range { start, end };
-            self.touched.push(code);
+    fn note_taken(
+        &mut self,
+        candidates: &[[u32; 3]],
+        accepted: &[bool],
+        cell_shift: u32,
+        place: impl Fn([u32; 3]) -> [f32; 3],
+    ) {
+        let mut open: Option<([u32; 3], u32)> = None;
+        for (t, _) in candidates.iter().zip(accepted).filter(|(_, taken)| **taken) {
+            let cell = t.map(|t| t >> cell_shift);
+            match open {
+                Some((c, _)) if c == cell => {}
+                _ => {
+                    self.close_cell(open);
+                    open = Some((cell, self.taken.len() as u32));
+                }
+            }
+            self.taken.push(place(*t));
         }
-        end
+        self.close_cell(open);
+    }
+
+    #[inline]
+    fn close_cell(&mut self, open: Option<([u32; 3], u32)>) {
+        let Some((cell, start)) = open else { return };
+        let cell = cell.map(|c| c & (GRID_SIZE - 1));
+        self.ranges[interleave(cell) as usize] = Range { start, end: self.taken.len() as u32 };
+        self.occupied[column(cell[0], cell[1])] |= 1 << cell[2];
     }
 
     /// Gathers the taken points that lie closer than the spacing to a tile; `cell` is the tile's lowest cell.
@@ -159,26 +191,16 @@ impl Poisson {
         // Rounding moves a coordinate by less than a ten-thousandth of a spacing.
         let low: [f32; 3] = cell.map(|c| c as f32 * CELL_SPACINGS - 1.0001);
         let high: [f32; 3] = cell.map(|c| (c + 2) as f32 * CELL_SPACINGS + 1.0001);
-        // The cells around the tile: four an axis, of which the middle two are the tile's own.
-        let along = |c: u32, axis: usize| -> [Option<u64>; 4] {
-            std::array::from_fn(|i| {
-                let mut v = [0; 3];
-                v[axis] = (c + i as u32).checked_sub(1).filter(|v| *v < GRID_SIZE)?;
-                Some(interleave(v))
-            })
-        };
-        let (xs, ys, zs) = (along(cell[0], 0), along(cell[1], 1), along(cell[2], 2));
-        let is_own = |i: usize| i == 1 || i == 2;
-        for (i, x) in xs.into_iter().enumerate() {
-            let Some(x) = x else { continue };
-            for (j, y) in ys.into_iter().enumerate() {
-                let Some(y) = y else { continue };
-                let step = if is_own(i) && is_own(j) { 3 } else { 1 };
-                for z in zs.iter().step_by(step).flatten() {
-                    let range = self.ranges[(x | y | z) as usize];
-                    if range == EMPTY {
-                        continue;
-                    }
+        // From the cell before the tile to the one behind it: four an axis. The tile's own are not occupied yet.
+        let around = |c: u32| c.saturating_sub(1)..(c + 3).min(GRID_SIZE);
+        let four = ((0b1111u128 << cell[2]) >> 1) as u64;
+        for x in around(cell[0]) {
+            for y in around(cell[1]) {
+                let mut cells = self.occupied[column(x, y)] & four;
+                while cells != 0 {
+                    let z = cells.trailing_zeros();
+                    cells &= cells - 1;
+                    let range = self.ranges[interleave([x, y, z]) as usize];
                     for p in &self.taken[range.start as usize..range.end as usize] {
                         let inside = (p[0] > low[0])
                             & (p[0] < high[0])
@@ -194,6 +216,12 @@ impl Poisson {
             }
         }
     }
+}
+
+/// Word of `occupied` for a column of cells.
+#[inline]
+fn column(x: u32, y: u32) -> usize {
+    (x << GRID_BITS | y) as usize
 }
 
 #[cfg(test)]
@@ -237,6 +265,15 @@ mod tests {
         slab.extend_from_within(0..500);
         let taken = check(14, slab);
         assert!(taken > 1000 && taken < 6000, "{taken}");
+        // Layers at the lower and upper end of each axis, where there are no cells beyond.
+        for axis in 0..3 {
+            for end in [0, (1 << 17) - 1500] {
+                let mut layer: Vec<[u32; 3]> = (0..6000).map(|_| [next(), next(), next()]).collect();
+                layer.iter_mut().for_each(|t| t[axis] = end + t[axis] % 1500);
+                let taken = check(14, layer);
+                assert!(taken > 1000 && taken < 6000, "{taken}");
+            }
+        }
         let volume: Vec<[u32; 3]> = (0..4000).map(|_| [next() >> 3, next() >> 3, next() >> 3]).collect();
         let taken = check(14, volume);
         assert!(taken > 500 && taken < 4000, "{taken}");
@@ -251,6 +288,15 @@ mod tests {
         let mut accepted = [false; 4];
         Poisson::default().choose(0, &candidates, &mut accepted);
         assert_eq!(accepted, [true, false, true, true]);
+    }
+
+    #[test]
+    fn scattered_visits_each_once() {
+        for n in [0, 1, 2, 3, 7, 8, 100, 1000] {
+            let mut seen: Vec<usize> = scattered(n).collect();
+            seen.sort_unstable();
+            assert_eq!(seen, (0..n).collect::<Vec<_>>());
+        }
     }
 
     #[test]

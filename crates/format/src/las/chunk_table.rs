@@ -7,8 +7,8 @@ use laz::decompressors::IntegerDecompressorBuilder;
 
 use super::bytes::{i64_at, u32_at};
 use super::quiet;
+use super::source::Source;
 use crate::ReadError;
-use crate::source::Source;
 
 /// So many chunks may be empty (some writers close a chunk that they never fill).
 const EMPTY_CHUNKS: u64 = 16;

@@ -9,7 +9,7 @@ use super::kernels;
 use super::laszip::LaszipRecord;
 use super::pieces::Storage;
 use super::schema::Schema;
-use crate::source::Source;
+use super::source::Source;
 use crate::{Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Scratch, Wanted};
 
 /// A chunk larger than this is read through a buffer instead of at once.

@@ -8,8 +8,8 @@ use laz::{DecompressionSelection, LazItem};
 use super::chunk_table::{Chunk, Layout};
 use super::quiet;
 use super::schema::{Layer, Schema};
+use super::source::Source;
 use crate::Wanted;
-use crate::source::Source;
 
 /// Why a decode ended before its points were complete.
 #[derive(Debug, PartialEq, Eq)]

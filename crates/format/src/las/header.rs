@@ -1,7 +1,7 @@
 //! The public header block of LAS 1.0–1.5 (LAS 1.4 R15 §2.4; 1.5 adds 18 bytes at its end).
 
 use super::bytes::{f64_at, f64x3_at, u16_at, u32_at, u64_at};
-use crate::source::Source;
+use super::source::Source;
 use crate::{Aabb, Lattice, ReadError};
 
 /// Bytes of the LAS 1.0–1.2 header; every later one starts with these.

@@ -37,20 +37,19 @@ mod header;
 mod kernels;
 mod laszip;
 mod pieces;
-mod quiet;
 mod records;
 mod schema;
 
 use std::path::Path;
 
-use crate::source::Source;
-use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Wanted};
+use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Wanted, quiet, source};
 use chunk_table::Layout;
 use header::{EXPORT_AGAIN, Header};
 use laszip::{Arrangement, LaszipRecord};
 use pieces::{Plan, Planner};
 use records::Records;
 use schema::Schema;
+use source::Source;
 
 /// True if the first bytes of a file say that it is LAS or LAZ.
 pub fn is_las(first_bytes: &[u8]) -> bool {

@@ -5,7 +5,7 @@ use super::decompress;
 use super::header::Header;
 use super::laszip::{Arrangement, LaszipRecord};
 use super::records::Records;
-use crate::source::Source;
+use super::source::Source;
 use crate::{Piece, ReadError};
 
 /// Records of a LAS piece: 1.7 MB of format 3, a batch of its own.

@@ -2,8 +2,8 @@
 
 use super::bytes::{text, u16_at, u64_at};
 use super::header::Header;
+use super::source::Source;
 use crate::ReadError;
-use crate::source::Source;
 
 const VLR_HEADER: u64 = 54;
 const EVLR_HEADER: u64 = 60;
