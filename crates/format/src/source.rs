@@ -46,6 +46,7 @@ impl Source {
     }
 
     /// `N` bytes from `offset`.
+    #[cfg(any(feature = "e57", feature = "las", feature = "pcd"))]
     pub(crate) fn array_at<const N: usize>(&self, offset: u64) -> Result<[u8; N], ReadError> {
         let mut buf = [0; N];
         self.read_at(offset, &mut buf)?;
@@ -53,7 +54,7 @@ impl Source {
     }
 
     /// `len` bytes from `offset`, at most what the file holds from there: the allocation never exceeds the file.
-    #[cfg(feature = "las")]
+    #[cfg(any(feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
     pub(crate) fn vec_at(&self, offset: u64, len: u64) -> Result<Vec<u8>, ReadError> {
         let len = len.min(self.len.saturating_sub(offset));
         let mut buf = vec![0; usize::try_from(len).unwrap_or(0)];
