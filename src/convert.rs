@@ -36,6 +36,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     protect_inputs(&plan)?;
     if let Some(file) = &args.report {
         require_folder(file, &plan.output)?;
+        protect_from_report(&plan, file)?;
     }
     let progress = Progress::new(&args.talk, Some(stop_flag()));
     let result = pointmill_converter::convert(&plan, &progress);
@@ -133,6 +134,16 @@ fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
     let Some(scan) = plan.inputs.iter().find(inside) else { return Ok(()) };
     let (output, scan) = (plan.output.display(), scan.display());
     Err(Failure::Usage(format!("{output}: the output would replace the input {scan}; choose another folder")))
+}
+
+/// The report never replaces a scan.
+fn protect_from_report(plan: &Plan, report: &Path) -> Result<(), Failure> {
+    let Ok(report) = report.canonicalize() else {
+        return Ok(()); // not there: nothing to protect
+    };
+    let same = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file == report);
+    let Some(scan) = plan.inputs.iter().find(same) else { return Ok(()) };
+    Err(Failure::Usage(format!("{}: the report would replace this input; choose another file", scan.display())))
 }
 
 /// Better to learn before the run than after it that the report has no place to go.

@@ -181,6 +181,9 @@ fn identity(path: &Path) -> PathBuf {
 
 /// Says what a file is, by its first bytes, else by its ending.
 pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
+    if !fs::metadata(path)?.is_file() {
+        return Ok(Kind::NoScan); // opening a pipe would wait for somebody who writes to it
+    }
     let mut first = Vec::with_capacity(16);
     File::open(path)?.take(16).read_to_end(&mut first)?;
     Ok(kind_by_content(&first).unwrap_or_else(|| kind_by_ending(path)))

@@ -3,6 +3,7 @@
 mod arguments;
 mod bad_input;
 mod bad_output;
+mod hostile;
 mod interrupted;
 mod sameness;
 mod support;

@@ -57,67 +57,117 @@ fn divide(
 }
 
 fn divide_once(cell: &Cell, gathered: &Gathered, frame: &RecordFrame) -> Result<Vec<Cell>, ConvertError> {
-    let level = (u32::from(cell.key.level) + SPLIT_LEVELS).min(TREE_BITS);
-    let mut parts: Vec<Cell> = Vec::new();
-    let mut grouping = Grouping::default();
-    let (mut records, mut sorted, mut cells) = (Vec::new(), Vec::new(), Vec::new());
-    let mut extremes: Option<([u32; 3], [u32; 3])> = None;
+    let mut division = Division::new(cell, gathered, frame);
+    let mut records = Vec::new();
+    let mut source = None;
     for segment in &cell.segments {
         let mut start = 0;
         while start < segment.count {
-            let count = (segment.count - start).min(SPLIT_POINTS as u32);
+            let before = records.len();
+            let room = SPLIT_POINTS - before / frame.stride;
+            let count = (segment.count - start).min(room as u32);
             let part = Segment { block: segment.block, start: segment.start + start, count };
             start += count;
-            records.clear();
-            let source = gathered.store.take(part, &mut records)?;
-            cells.clear();
-            for record in records.chunks_exact(frame.stride) {
-                let t = frame.tree(record);
-                let (lo, hi) = extremes.get_or_insert((t, t));
-                for a in 0..3 {
-                    lo[a] = lo[a].min(t[a]);
-                    hi[a] = hi[a].max(t[a]);
-                }
-                cells.push(crate::morton::interleave(t.map(|t| (t >> (TREE_BITS - level)) & 0x1f_ffff)));
+            let from = gathered.store.take(part, &mut records)?;
+            if let Some(source) = source.filter(|s| *s != from) {
+                // A block holds records of one source.
+                let rest = records.split_off(before);
+                division.add(&records, source)?;
+                records = rest;
             }
-            grouping.group(&cells);
-            sorted.clear();
-            for &i in &grouping.order {
-                let at = i as usize * frame.stride;
-                sorted.extend_from_slice(&records[at..at + frame.stride]);
-            }
-            let block = gathered.store.open(source)?;
-            gathered.store.fill(block, &mut sorted)?;
-            let mut at = 0;
-            for &(_, count) in &grouping.groups {
-                let first = grouping.order[at as usize] as usize * frame.stride;
-                let t = frame.tree(&records[first..first + frame.stride]);
-                let [x, y, z] = t.map(|t| t >> (TREE_BITS - level));
-                let key = NodeKey { level: level as u8, x, y, z };
-                let segment = Segment { block, start: at, count };
-                at += count;
-                match parts.iter_mut().find(|p| p.key == key) {
-                    Some(part) => {
-                        part.points += u64::from(count);
-                        part.segments.push(segment);
-                    }
-                    None => {
-                        parts.push(Cell {
-                            key,
-                            points: u64::from(count),
-                            segments: vec![segment],
-                            is_one_place: false,
-                        });
-                    }
-                }
+            source = Some(from);
+            if records.len() >= SPLIT_POINTS * frame.stride {
+                division.add(&records, from)?;
+                records.clear();
             }
         }
     }
-    if extremes.is_some_and(|(lo, hi)| lo == hi) {
-        parts.iter_mut().for_each(|p| p.is_one_place = true);
+    if let Some(source) = source {
+        division.add(&records, source)?;
     }
-    parts.sort_unstable_by(|a, b| crate::morton::compare([a.key.x, a.key.y, a.key.z], [b.key.x, b.key.y, b.key.z]));
-    Ok(parts)
+    Ok(division.finish())
+}
+
+/// The parts of a cell, as far as they are known.
+struct Division<'a> {
+    gathered: &'a Gathered,
+    frame: &'a RecordFrame,
+    level: u32,
+    parts: Vec<Cell>,
+    extremes: Option<([u32; 3], [u32; 3])>,
+    grouping: Grouping,
+    cells: Vec<u64>,
+    sorted: Vec<u8>,
+}
+
+impl<'a> Division<'a> {
+    fn new(cell: &Cell, gathered: &'a Gathered, frame: &'a RecordFrame) -> Self {
+        Self {
+            gathered,
+            frame,
+            level: (u32::from(cell.key.level) + SPLIT_LEVELS).min(TREE_BITS),
+            parts: Vec::new(),
+            extremes: None,
+            grouping: Grouping::default(),
+            cells: Vec::new(),
+            sorted: Vec::new(),
+        }
+    }
+
+    /// Puts records of one source, many at a time so that the parts come in long segments, into a block of their own.
+    fn add(&mut self, records: &[u8], source: u32) -> Result<(), ConvertError> {
+        let (stride, level, frame) = (self.frame.stride, self.level, self.frame);
+        if records.is_empty() {
+            return Ok(());
+        }
+        self.cells.clear();
+        for record in records.chunks_exact(stride) {
+            let t = frame.tree(record);
+            let (lo, hi) = self.extremes.get_or_insert((t, t));
+            for a in 0..3 {
+                lo[a] = lo[a].min(t[a]);
+                hi[a] = hi[a].max(t[a]);
+            }
+            self.cells.push(crate::morton::interleave(t.map(|t| (t >> (TREE_BITS - level)) & 0x1f_ffff)));
+        }
+        self.grouping.group(&self.cells);
+        self.sorted.clear();
+        for &i in &self.grouping.order {
+            let at = i as usize * stride;
+            self.sorted.extend_from_slice(&records[at..at + stride]);
+        }
+        let block = self.gathered.store.open(source)?;
+        self.gathered.store.fill(block, &mut self.sorted)?;
+        let mut at = 0;
+        for &(_, count) in &self.grouping.groups {
+            let first = self.grouping.order[at as usize] as usize * stride;
+            let t = frame.tree(&records[first..first + stride]);
+            let [x, y, z] = t.map(|t| t >> (TREE_BITS - level));
+            let key = NodeKey { level: level as u8, x, y, z };
+            let segment = Segment { block, start: at, count };
+            at += count;
+            match self.parts.iter_mut().find(|p| p.key == key) {
+                Some(part) => {
+                    part.points += u64::from(count);
+                    part.segments.push(segment);
+                }
+                None => {
+                    let (points, segments) = (u64::from(count), vec![segment]);
+                    self.parts.push(Cell { key, points, segments, is_one_place: false });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Vec<Cell> {
+        if self.extremes.is_some_and(|(lo, hi)| lo == hi) {
+            self.parts.iter_mut().for_each(|p| p.is_one_place = true);
+        }
+        let xyz = |p: &Cell| [p.key.x, p.key.y, p.key.z];
+        self.parts.sort_unstable_by(|a, b| crate::morton::compare(xyz(a), xyz(b)));
+        self.parts
+    }
 }
 
 /// The highest nodes that are small enough (or hold one place only) become chunks.

@@ -11,7 +11,7 @@ use crate::budget::Budget;
 use crate::build::chunk::{BuiltChunk, ChunkBuilder, ChunkPlan};
 use crate::build::commit::{Built, Committer};
 use crate::chunks::{self, Chunk};
-use crate::describe::{Description, HIERARCHY_STEP};
+use crate::describe::{Description, HIERARCHY_STEP, choose_attributes, resolve_crs};
 use crate::error::ConvertError;
 use crate::events::{Events, Phase};
 use crate::gather::{Gathered, Outcome, Stats, gather};
@@ -38,6 +38,7 @@ pub fn convert(plan: &Plan, events: &dyn Events) -> Result<Report, ConvertError>
     let staged = StagedFolder::new(&plan.output, plan.overwrite)?;
     let mut job = Job::open(plan, events)?;
     let budget = Budget::new(plan, job.schema.stride)?;
+    check_names(plan, &job)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads.max(1))
         .thread_name(|i| format!("pointmill-{i}"))
@@ -103,6 +104,14 @@ fn check(plan: &Plan) -> Result<(), ConvertError> {
     Ok(())
 }
 
+/// What names attributes or a reference system wrongly shall fail now, not after the points were read.
+fn check_names(plan: &Plan, job: &Job) -> Result<(), ConvertError> {
+    if let crate::AttributeChoice::List(_) = plan.attributes {
+        choose_attributes(&plan.attributes, job, &[])?;
+    }
+    resolve_crs(plan, job, &mut Vec::new()).map(drop)
+}
+
 /// Reads every point once; again only if the headers were wrong about the bounds.
 fn read(
     plan: &Plan,
@@ -123,7 +132,8 @@ fn read(
             Outcome::Complete(gathered) => return Ok(gathered),
             Outcome::Empty(stats) => return Err(nothing_to_convert(job, &stats)),
             Outcome::Retry(bounds) => {
-                let line = "the bounds in the headers are wrong; reading again with the true ones";
+                let line = "the points lie elsewhere than the headers made expect, or further apart than the coordinate \
+                            step allows; reading them again with the bounds that were found";
                 job.warnings.push(line.into());
                 events.warning(line);
                 hint = Some(bounds);
@@ -186,6 +196,7 @@ fn build(
         usual_points: budget.chunk_points.min(gathered.stats.points),
         duplicates: plan.duplicates,
         widen_rgb: &description.widen_rgb,
+        class: description.class,
     };
     let next = AtomicUsize::new(0);
     let failed: Mutex<Option<(usize, ConvertError)>> = Mutex::new(None);

@@ -23,6 +23,8 @@ pub(crate) struct Description {
     pub(crate) kept: Vec<usize>,
     /// For each source: byte offset in a stored record of a colour that is 8 bits deep.
     pub(crate) widen_rgb: Vec<Option<usize>>,
+    /// Byte offset of the classification in a stored record, if it is one byte.
+    pub(crate) class: Option<usize>,
     dropped: Vec<DroppedAttribute>,
     /// Ranges of the output, by index of the schema.
     ranges: Vec<Range>,
@@ -43,7 +45,7 @@ impl Description {
             ));
         }
         let rgb = job.schema.rgb();
-        let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, &s.rgb)).collect();
+        let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, s)).collect();
         let mut ranges = stats.ranges.clone();
         let mut widen_rgb = vec![None; job.sources.len()];
         if let Some(rgb) = rgb {
@@ -67,7 +69,9 @@ impl Description {
         let (kept, dropped) = choose_attributes(&plan.attributes, job, &ranges)?;
         let crs = resolve_crs(plan, job, &mut warnings)?;
         let grid = grid_report(job, cube);
-        Ok(Self { kept, widen_rgb, dropped, ranges, crs, grid, warnings })
+        let class = job.schema.find("classification");
+        let class = class.filter(|&i| job.schema.attributes[i].size() == 1).map(|i| job.schema.offsets[i]);
+        Ok(Self { kept, widen_rgb, class, dropped, ranges, crs, grid, warnings })
     }
 
     pub(crate) fn metadata(
@@ -96,8 +100,11 @@ impl Description {
             let range = &self.ranges[i];
             // A range must be there and finite; a column of NaN has none.
             let finite = |v: &[f64]| v.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect::<Vec<_>>();
-            let histogram = (attribute.name == "classification" && attribute.ty == AttributeType::UInt8)
-                .then(|| stats.classes.clone());
+            let histogram = (attribute.name == "classification" && attribute.ty == AttributeType::UInt8).then(|| {
+                let mut left = stats.classes.clone();
+                left.iter_mut().zip(&accounts.classes_dropped).for_each(|(all, dropped)| *all -= dropped);
+                left
+            });
             AttributeStats { attribute, min: finite(&range.min), max: finite(&range.max), histogram }
         }));
         let name = if plan.name.is_empty() { default_name(plan) } else { plan.name.clone() };

@@ -183,17 +183,8 @@ fn choose_lattice(choice: ScaleChoice, lattices: &[Lattice], hint: Option<&Aabb>
         lattice.scale[a] = scale;
         lattice.offset[a] = finest.map(|l| l.offset[a]).fold(f64::INFINITY, f64::min);
     }
-    let mut reason = String::from("the finest scale of the sources, per axis");
-    if let Some(hint) = hint {
-        let widest = (0..3).map(|a| (hint.max[a] - hint.min[a]) / lattice.scale[a]).fold(0.0, f64::max);
-        // Two bits of room: one for the power-of-two cube, one for headers that are slightly wrong.
-        let bits = (widest.log2().ceil() - 30.0).max(0.0);
-        if bits > 0.0 && bits < 1000.0 {
-            lattice.scale = lattice.scale.map(|s| s * 2f64.powf(bits));
-            reason = format!("{reason}; made {} times coarser to hold the declared extent", 2f64.powf(bits));
-        }
-    }
-    (lattice, reason)
+    // What headers declare never makes the lattice coarser: they may lie. Points that were read may, see `coarsen`.
+    (lattice, "the finest scale of the sources, per axis".into())
 }
 
 #[cfg(test)]
@@ -207,7 +198,13 @@ mod tests {
         assert_eq!(choose_lattice(ScaleChoice::Auto, &[a, a], None).0, a);
         assert_eq!(choose_lattice(ScaleChoice::Auto, &[a, b], None).0, b);
         assert_eq!(choose_lattice(ScaleChoice::Fixed(0.5), &[a, b], None).0.offset, [100.0, 0.0, -5.0]);
-        let wide = Aabb { min: [0.0; 3], max: [4_000_000.0, 1.0, 1.0] };
-        assert_eq!(choose_lattice(ScaleChoice::Auto, &[a, b], Some(&wide)).0.scale, [0.004; 3]);
+    }
+
+    #[test]
+    fn declared_bounds_however_wide_do_not_make_the_lattice_coarser() {
+        let a = Lattice { scale: [0.01; 3], offset: [0.0; 3] };
+        let b = Lattice { scale: [0.001; 3], offset: [0.0; 3] };
+        let lie = Aabb { min: [-1e12; 3], max: [1e12; 3] };
+        assert_eq!(choose_lattice(ScaleChoice::Auto, &[a, b], Some(&lie)).0, b);
     }
 }

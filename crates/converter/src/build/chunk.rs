@@ -28,6 +28,8 @@ pub(crate) struct ChunkPlan<'a> {
     pub(crate) duplicates: Duplicates,
     /// For each source: byte offset of an 8-bit colour that is to be stored as 16 bit.
     pub(crate) widen_rgb: &'a [Option<usize>],
+    /// Byte offset of the classification in a stored record.
+    pub(crate) class: Option<usize>,
 }
 
 /// A chunk, built: final nodes as bytes, and what the nodes above may still change.
@@ -44,7 +46,7 @@ pub(crate) struct BuiltChunk {
 }
 
 /// Order-independent sums over chunks.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Accounts {
     /// What the records in the store must have added up to, corrected for changes made on purpose.
     pub(crate) written: Checksum,
@@ -53,6 +55,8 @@ pub(crate) struct Accounts {
     pub(crate) wide: Checksum,
     pub(crate) dropped: Checksum,
     pub(crate) duplicates_dropped: u64,
+    /// Dropped points by class; no entries if there were none.
+    pub(crate) classes_dropped: Vec<u64>,
     pub(crate) overfull_leaves: u64,
 }
 
@@ -71,6 +75,10 @@ impl Accounts {
         self.wide.merge(&other.wide);
         self.dropped.merge(&other.dropped);
         self.duplicates_dropped += other.duplicates_dropped;
+        if self.classes_dropped.len() < other.classes_dropped.len() {
+            self.classes_dropped.resize(other.classes_dropped.len(), 0);
+        }
+        self.classes_dropped.iter_mut().zip(&other.classes_dropped).for_each(|(a, b)| *a += b);
         self.overfull_leaves += other.overfull_leaves;
     }
 }
@@ -116,7 +124,9 @@ impl<'a> ChunkBuilder<'a> {
         accounts.overfull_leaves = subtree.overfull_leaves;
         accounts.written = nodes.written;
         let (payloads, nodes) = (nodes.payloads, nodes.nodes);
-        let (mut pending_trees, mut pending_records) = (Vec::new(), Vec::new());
+        let pending = count(&root);
+        let mut pending_trees = Vec::with_capacity(pending);
+        let mut pending_records = Vec::with_capacity(pending * self.plan.frame.stride);
         self.detach(&mut root, &mut pending_trees, &mut pending_records);
         Ok(BuiltChunk { payloads, nodes, root, pending_trees, pending_records, accounts })
     }
@@ -151,6 +161,10 @@ impl<'a> ChunkBuilder<'a> {
             if same {
                 accounts.dropped.add(bytes(next));
                 accounts.duplicates_dropped += 1;
+                if let Some(class) = self.plan.class {
+                    accounts.classes_dropped.resize(256, 0);
+                    accounts.classes_dropped[usize::from(bytes(next)[class])] += 1;
+                }
             }
             same
         });
@@ -169,6 +183,11 @@ impl<'a> ChunkBuilder<'a> {
             self.detach(child, trees, records);
         }
     }
+}
+
+/// Points of a node and of everything below it that was not written.
+fn count(node: &Pending<u32>) -> usize {
+    node.points.len() + node.children.iter().map(count).sum::<usize>()
 }
 
 /// Final nodes of a chunk.

@@ -263,6 +263,11 @@ impl State {
             let children = self.stack.split_off(first);
             let mut node = Pending::above(parent, children, &mut self.sampler, &mut self.top)?;
             self.top.gather_slab(&mut node.points);
+            // What is left in the children: a few points must not keep the slabs in which they came.
+            for child in &mut node.children {
+                self.top.gather_slab(&mut child.points);
+                child.points.shrink_to_fit();
+            }
             self.stack.push(node);
         }
         Ok(())

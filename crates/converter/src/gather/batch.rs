@@ -74,6 +74,9 @@ impl<'a> Worker<'a> {
             }
             None => batch,
         };
+        if filtered {
+            self.unfiltered_colour(source, batch);
+        }
         let kept = if filtered { self.selection.len() } else { batch.len() };
         if kept == 0 {
             return Ok(());
@@ -210,6 +213,16 @@ impl<'a> Worker<'a> {
             }
         }
         Ok(self.selection.len() < batch.len())
+    }
+
+    /// What colour values mean is a fact of the whole file: points that are left out tell it as well.
+    fn unfiltered_colour(&mut self, source: usize, batch: &PointBatch) {
+        let job = self.pass.job;
+        let places = &job.sources[source].columns;
+        let colour = batch.columns.iter().zip(places).find(|(_, place)| Some(**place) == job.schema.rgb());
+        if let Some((column, _)) = colour {
+            self.stats.sources[source].rgb_unfiltered.include(column, None);
+        }
     }
 
     fn ranges(&mut self, source: usize, batch: &PointBatch, filtered: bool) {
@@ -441,11 +454,12 @@ impl Grouping {
 }
 
 /// Says what the colour values of a source mean.
-pub(crate) fn is_eight_bit(policy: RgbDepth, rgb: &super::stats::Range) -> bool {
+pub(crate) fn is_eight_bit(policy: RgbDepth, source: &super::stats::SourceStats) -> bool {
+    let deepest = source.rgb.max.iter().chain(&source.rgb_unfiltered.max);
     match policy {
         RgbDepth::Eight => true,
         RgbDepth::Sixteen => false,
-        RgbDepth::Auto => !rgb.is_empty() && rgb.max.iter().all(|v| *v <= 255.0),
+        RgbDepth::Auto => !source.rgb.is_empty() && deepest.into_iter().all(|v| *v <= 255.0),
     }
 }
 

@@ -40,8 +40,10 @@ pub(crate) struct SourceStats {
     pub(crate) kept: u64,
     /// World coordinates, before any filter.
     pub(crate) bounds: Aabb,
-    /// Range of the colour.
+    /// Range of the colour of the points that go in.
     pub(crate) rgb: Range,
+    /// Range of the colour of batches that the filter cut, points that it left out included.
+    pub(crate) rgb_unfiltered: Range,
 }
 
 /// Smallest and largest value of each element; NaN and infinities are not values.
@@ -156,7 +158,8 @@ floats!(f32, f64);
 
 impl Stats {
     pub(crate) fn new(schema: &Schema, sources: usize) -> Self {
-        let source = SourceStats { read: 0, kept: 0, bounds: Aabb::EMPTY, rgb: Range::new(3) };
+        let source =
+            SourceStats { read: 0, kept: 0, bounds: Aabb::EMPTY, rgb: Range::new(3), rgb_unfiltered: Range::new(3) };
         Self {
             bounds: LatticeBounds::EMPTY,
             ranges: schema.attributes.iter().map(|a| Range::new(a.elements)).collect(),
@@ -184,6 +187,7 @@ impl Stats {
             a.kept += b.kept;
             a.bounds = a.bounds.union(&b.bounds);
             a.rgb.merge(&b.rgb);
+            a.rgb_unfiltered.merge(&b.rgb_unfiltered);
         }
         self.checksum.merge(&other.checksum);
         self.change.merge(&other.change);

@@ -18,15 +18,20 @@ pub(crate) struct StagedFolder {
 impl StagedFolder {
     /// Checks that `output` may be made and makes the staging folder beside it.
     pub(crate) fn new(output: &Path, overwrite: bool) -> Result<Self, ConvertError> {
-        check_output(output, overwrite)?;
-        let parent = parent_of(output);
+        // `.` and `..` have a name and a folder above them as well.
+        let output = match output.file_name() {
+            Some(_) => output.to_path_buf(),
+            None => fs::canonicalize(output).unwrap_or_else(|_| output.to_path_buf()),
+        };
+        check_output(&output, overwrite)?;
+        let parent = parent_of(&output);
         fs::create_dir_all(&parent).map_err(|e| ConvertError::io(&parent, "making the folder of the output", e))?;
         let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let staging = tempfile::Builder::new()
             .prefix(&format!(".{name}.unfinished-"))
             .tempdir_in(&parent)
             .map_err(|e| ConvertError::io(&parent, "making a folder beside the output", e))?;
-        Ok(Self { staging, output: output.to_path_buf(), overwrite })
+        Ok(Self { staging, output, overwrite })
     }
 
     /// The folder that holds the output, on whose file system it is made.

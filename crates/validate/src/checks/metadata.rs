@@ -52,8 +52,10 @@ fn geometry(root: &Value, judge: &Judge) {
     judge.that(cubic, "boundingBox", "a cube with sides above 0", &root["boundingBox"]);
     if let (Some((min, max)), Some(offset), Some(scale)) = (corners, offset, scale) {
         judge.that(offset == min, "offset", &format!("boundingBox.min {min:?}"), &root["offset"]);
-        let reach = (0..3).map(|a| (max[a] - offset[a]) / scale[a]).fold(0.0, f64::max);
-        judge.that(reach <= MAX_STORED, "cube in lattice steps", "at most 2^31", &json!(reach));
+        // Where steps differ between the axes the cube may well reach further than the points on the axis of fine steps.
+        let last = tight_max(root).map_or(max, |tight| [0, 1, 2].map(|a| tight[a].min(max[a])));
+        let reach = (0..3).map(|a| (last[a] - offset[a]) / scale[a]).fold(0.0, f64::max);
+        judge.that(reach <= MAX_STORED, "points in lattice steps", "at most 2^31", &json!(reach));
     }
     let spacing = root["spacing"].as_f64().filter(|s| *s > 0.0);
     judge.that(spacing.is_some(), "spacing", "a number above 0", &root["spacing"]);
@@ -63,6 +65,12 @@ fn geometry(root: &Value, judge: &Judge) {
             judge.0.push(Finding::new(Check::Metadata, "spacing", format!("side / 128 = {usual}"), spacing).warning());
         }
     }
+}
+
+/// The upper corner of the box around the points.
+fn tight_max(root: &Value) -> Option<[f64; 3]> {
+    let position = root["attributes"].as_array()?.iter().find(|a| a["name"] == "position")?;
+    numbers(&position["max"])?.try_into().ok()
 }
 
 fn attributes(root: &Value, judge: &Judge) {

@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::expect::Geometry;
 use crate::finding::{Check, Finding, Findings};
 
-/// Smallest and largest values seen. NaN is neither.
+/// Smallest and largest values seen. NaN and infinities are neither: JSON cannot write them.
 #[derive(Debug, Clone)]
 pub(crate) struct Seen {
     /// Stored positions.
@@ -79,7 +79,14 @@ fn add_column(seen: &mut [(f64, f64)], column: &Column) {
                 if v < bounds.0 || bounds.0 != bounds.0 { bounds.0 = v; }
                 if v > bounds.1 || bounds.1 != bounds.1 { bounds.1 = v; }
             }
-            *seen = (seen.0.min(bounds.0 as f64), seen.1.max(bounds.1 as f64));
+            let mut bounds = (bounds.0 as f64, bounds.1 as f64);
+            if bounds.0.is_infinite() || bounds.1.is_infinite() {
+                bounds = NOTHING; // rare: look again
+                for v in values.iter().skip(element).step_by(elements).map(|v| *v as f64).filter(|v| v.is_finite()) {
+                    bounds = (bounds.0.min(v), bounds.1.max(v));
+                }
+            }
+            *seen = (seen.0.min(bounds.0), seen.1.max(bounds.1));
         }
     });
 }
