@@ -15,7 +15,7 @@ use crate::progress::Progress;
 use crate::text;
 
 /// Brotli's knee for node payloads: above it the time grows several times over for a few per cent.
-const BROTLI_QUALITY: u8 = 4;
+const BROTLI_QUALITY: u8 = 5;
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     if let Some(other) = args.to.iter().find(|to| **to != Target::Potree2) {

@@ -51,7 +51,7 @@ impl Budget {
             return Err(ConvertError::Memory {
                 ceiling,
                 needed: least + least / 9 + 1,
-                why: format!("{threads} threads with leaves of up to {} points", plan.leaf_capacity),
+                why: format!("working threads: {threads}, points of a leaf: up to {}", plan.leaf_capacity),
             });
         }
         let free = usable - fixed_bytes;

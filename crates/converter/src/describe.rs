@@ -37,6 +37,13 @@ impl Description {
     pub(crate) fn new(plan: &Plan, job: &Job, stats: &Stats, cube: &Cube) -> Result<Self, ConvertError> {
         let mut warnings = job.warnings.clone();
         warnings.extend_from_slice(&stats.warnings);
+        if stats.rounded_values > 0 {
+            warnings.push(format!(
+                "{} values of 64-bit integers lie beyond 2^53 and were rounded: they are stored as doubles, because Potree \
+                 viewers fail on 64-bit integers",
+                stats.rounded_values
+            ));
+        }
         let rgb = job.schema.rgb();
         let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, s)).collect();
         let mut ranges = stats.ranges.clone();

@@ -28,7 +28,7 @@ mod grid;
 mod job;
 pub mod memory;
 mod morton;
-mod pages;
+mod os_hints;
 mod plan;
 mod records;
 mod report;

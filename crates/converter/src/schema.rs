@@ -1,6 +1,6 @@
 //! The columns of the job: the union of what the inputs have, in one order, as fixed-size records.
 
-use pointmill_format::{Attribute, AttributeType, ScanInfo};
+use pointmill_format::{Attribute, AttributeType, Column, ScanInfo};
 
 /// Attribute order: `rgb` right after the position (a Unity loader finds it only there), then the order of LAS.
 const USUAL_ORDER: [&str; 15] = [
@@ -83,8 +83,34 @@ impl Schema {
     }
 }
 
+/// The type that is stored for a type that was read. Potree viewers fail on every node that has a 64-bit integer, so
+/// these become doubles (exact up to 2^53; what is not is counted, see [`as_doubles`]).
+fn stored_type(ty: AttributeType) -> AttributeType {
+    match ty {
+        AttributeType::Int64 | AttributeType::UInt64 => AttributeType::Float64,
+        other => other,
+    }
+}
+
+/// The column as it is stored, if that is another one than was read; and how many of its values were rounded.
+pub(crate) fn as_doubles(column: &Column) -> Option<(Column, u64)> {
+    let (values, rounded): (Vec<f64>, usize) = match column {
+        Column::Int64(v) => (
+            v.iter().map(|v| *v as f64).collect(),
+            v.iter().filter(|v| (**v as f64) as i128 != i128::from(**v)).count(),
+        ),
+        Column::UInt64(v) => (
+            v.iter().map(|v| *v as f64).collect(),
+            v.iter().filter(|v| (**v as f64) as i128 != i128::from(**v)).count(),
+        ),
+        _ => return None,
+    };
+    Some((Column::Float64(values), rounded as u64))
+}
+
 /// Index in `all` of the attribute with the same meaning, added if there is none.
 fn place(all: &mut Vec<Attribute>, attribute: &Attribute) -> usize {
+    let attribute = &Attribute { ty: stored_type(attribute.ty), ..attribute.clone() };
     let same = |a: &Attribute| {
         a.ty == attribute.ty
             && a.elements == attribute.elements
@@ -120,6 +146,16 @@ mod tests {
             file_bytes: 0,
             warnings: vec![],
         }
+    }
+
+    #[test]
+    fn wide_integers_become_doubles_and_what_is_rounded_is_counted() {
+        let (column, rounded) = as_doubles(&Column::Int64(vec![-3, 1 << 53, (1 << 53) + 1, i64::MAX])).unwrap();
+        assert_eq!((column.ty(), rounded), (AttributeType::Float64, 2));
+        assert_eq!(as_doubles(&Column::UInt64(vec![u64::MAX, 7])).unwrap().1, 1);
+        assert!(as_doubles(&Column::UInt32(vec![7])).is_none());
+        let (schema, _) = Schema::union(&[&scan(vec![Attribute::new("id", AttributeType::UInt64, 1)])]);
+        assert_eq!(schema.attributes[0].ty, AttributeType::Float64);
     }
 
     #[test]

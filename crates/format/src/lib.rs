@@ -1,7 +1,9 @@
 //! Readers and writers of point-cloud formats, for renderers and for preprocessors.
 //!
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
+//! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
 //! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
+//! * `ply`, `pcd`, `text` (features of these names): PLY, PCD, and XYZ/CSV, PTS, PTX and OFF scans, likewise.
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
 //! found in a file are never trusted; an allocation is bounded by the size of the file that asks for it.
@@ -13,11 +15,27 @@ mod error;
 mod lattice;
 mod node_key;
 mod points;
+#[cfg(any(feature = "e57", feature = "las"))]
+mod quiet;
 mod scan;
+// each reader uses its part of it: a build with few of them leaves some of it idle
+#[cfg(any(feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code, unused_imports))]
+mod rows;
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+mod source;
 
+#[cfg(feature = "e57")]
+pub mod e57;
 #[cfg(feature = "las")]
 pub mod las;
+#[cfg(feature = "pcd")]
+pub mod pcd;
+#[cfg(feature = "ply")]
+pub mod ply;
 pub mod potree2;
+#[cfg(feature = "text")]
+pub mod text;
 
 pub use aabb::Aabb;
 pub use attributes::{Attribute, AttributeType};

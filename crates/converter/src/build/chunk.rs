@@ -12,7 +12,7 @@ use crate::chunks::Chunk;
 use crate::error::ConvertError;
 use crate::gather::Store;
 use crate::morton;
-use crate::pages;
+use crate::os_hints;
 use crate::plan::Duplicates;
 use crate::records::RecordFrame;
 use crate::sample::Sampler;
@@ -117,7 +117,7 @@ impl<'a> ChunkBuilder<'a> {
         };
         nodes.payloads.clear();
         let room = self.points.len().max(self.plan.usual_points as usize) * self.plan.frame.stride;
-        pages::reserve(&mut nodes.payloads, room);
+        os_hints::reserve(&mut nodes.payloads, room);
         let mut subtree =
             Subtree { capacity: self.plan.leaf_capacity as usize, sampler: &mut self.sampler, overfull_leaves: 0 };
         let mut root = subtree.node(chunk.key, 0..self.points.len(), &mut nodes)?;
@@ -134,7 +134,7 @@ impl<'a> ChunkBuilder<'a> {
     fn load(&mut self, chunk: &Chunk, accounts: &mut Accounts) -> Result<(), ConvertError> {
         let stride = self.plan.frame.stride;
         self.records.clear();
-        pages::reserve(&mut self.records, chunk.points.max(self.plan.usual_points) as usize * stride);
+        os_hints::reserve(&mut self.records, chunk.points.max(self.plan.usual_points) as usize * stride);
         for segment in &chunk.segments {
             let start = self.records.len();
             let source = self.plan.store.take(*segment, &mut self.records)?;

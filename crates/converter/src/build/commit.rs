@@ -13,6 +13,7 @@ use super::tree::{Nodes, Pending};
 use crate::checksum::Checksum;
 use crate::error::ConvertError;
 use crate::file_at::write_all_at;
+use crate::os_hints;
 use crate::sample::Sampler;
 use crate::write::payload::PayloadWriter;
 
@@ -193,6 +194,7 @@ impl<'a> Committer<'a> {
         for (offset, bytes) in ready {
             write_all_at(self.file, &bytes, offset)
                 .map_err(|e| ConvertError::io(&self.path, "writing node payloads", e))?;
+            os_hints::start_write_back(self.file, offset, bytes.len());
             let mut state = self.lock();
             // The small buffers of the nodes above are not worth keeping.
             if state.spare.len() < self.window && bytes.capacity() > SPARE_BYTES {

@@ -3,15 +3,16 @@
 //! A node is a leaf if it holds no more points than the capacity, or if all of them share one place. An inner node
 //! takes a sample of what its children hold; they keep the rest. A leaf that loses everything is left out. An inner
 //! node that loses everything takes one point back from below, so that no inner node is empty and yet no sample has a
-//! hole. That is why nodes stay *pending* until nothing above can ask them any more.
+//! hole. That is why nodes stay *pending* until nothing above can ask them any more; nearly always that is known at
+//! once, because a node has many pairs of points of which its parent can take one only.
 
 use pointmill_format::NodeKey;
 
 use crate::error::ConvertError;
 use crate::sample::Sampler;
 
-/// An inner node that keeps at least this many points after its parent took its share can serve every ancestor that
-/// may still ask (one point each, at most 31 of them); everything below it is then final.
+/// An inner node that keeps at least this many points whatever its parent takes can serve every ancestor that may ask
+/// later (one point each, at most 31 of them); everything below it is then final.
 const ENOUGH_FOR_ALL_ANCESTORS: usize = 32;
 
 /// A node whose points are not final.
@@ -75,7 +76,27 @@ impl<P: Copy> Pending<P> {
             }
         }
         let is_inner = !children.is_empty();
-        Ok(Self { key, points, is_inner, children })
+        let mut node = Self { key, points, is_inner, children };
+        if key.level == 0 || node.will_keep_enough(sampler, nodes) {
+            node.write_children(nodes)?;
+        }
+        Ok(node)
+    }
+
+    /// True if enough disjoint pairs of points (neighbours in Morton order) exclude one another in the parent's sample.
+    fn will_keep_enough(&self, sampler: &Sampler, nodes: &impl Nodes<P>) -> bool {
+        let Some(parent) = self.key.parent() else { return true };
+        let mut pairs = 0;
+        let mut rest = &self.points[..];
+        while let [a, b, ..] = rest {
+            let excluded = sampler.takes_one_only(parent.level, nodes.tree(*a), nodes.tree(*b));
+            pairs += usize::from(excluded);
+            if pairs == ENOUGH_FOR_ALL_ANCESTORS {
+                return true;
+            }
+            rest = &rest[if excluded { 2 } else { 1 }..];
+        }
+        false
     }
 
     /// If an inner node has no point left, takes one from the child that has most.

@@ -11,12 +11,16 @@ use super::{Pass, Segment, Segments, Stats};
 use crate::axis::SourceMap;
 use crate::error::ConvertError;
 use crate::grid::LatticeBounds;
-use crate::pages;
+use crate::os_hints;
 use crate::plan::{OnFault, RgbDepth};
-use crate::schema::POSITION_BYTES;
+use crate::schema::{POSITION_BYTES, as_doubles};
 
 /// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
 const TILE_POINTS: usize = 512;
+
+/// A batch is taken in slices of this many points, whose columns stay in the second-level cache while they are
+/// gathered cell by cell.
+const SLICE_POINTS: usize = 8_192;
 
 /// One thread's part of the pass.
 pub(crate) struct Worker<'a> {
@@ -62,6 +66,14 @@ impl<'a> Worker<'a> {
     pub(crate) fn take(&mut self, source: usize, batch: &PointBatch) -> Result<(), ConvertError> {
         let filtered = self.select(source, batch)?;
         self.stats.sources[source].read += batch.len() as u64;
+        let stored;
+        let batch = match self.as_stored(batch) {
+            Some(other) => {
+                stored = other;
+                &stored
+            }
+            None => batch,
+        };
         if filtered {
             self.unfiltered_colour(source, batch);
         }
@@ -69,8 +81,38 @@ impl<'a> Worker<'a> {
         if kept == 0 {
             return Ok(());
         }
-        let selection = filtered.then_some(&self.selection[..]);
-        let bounds = quantize(&self.pass.job.sources[source].map, batch, selection, &mut self.q, &mut self.stats);
+        // Identity, if nothing was left out: then the rows of a slice are consecutive.
+        let selection = std::mem::take(&mut self.selection);
+        let mut outcome = Ok(());
+        for start in (0..kept).step_by(SLICE_POINTS) {
+            let range = start..(start + SLICE_POINTS).min(kept);
+            let rows = if filtered { Rows::Selected(&selection[range]) } else { Rows::Consecutive(range) };
+            outcome = self.take_slice(source, batch, &rows);
+            if outcome.is_err() {
+                break;
+            }
+        }
+        self.selection = selection;
+        if !self.pass.misled.load(Ordering::Relaxed) {
+            self.ranges(source, batch, filtered);
+        }
+        outcome
+    }
+
+    /// The batch with columns of the types that are stored, if these differ from what was read.
+    fn as_stored(&mut self, batch: &PointBatch) -> Option<PointBatch> {
+        let mut stored: Option<PointBatch> = None;
+        for (i, column) in batch.columns.iter().enumerate() {
+            if let Some((doubles, rounded)) = as_doubles(column) {
+                stored.get_or_insert_with(|| batch.clone()).columns[i] = doubles;
+                self.stats.rounded_values += rounded;
+            }
+        }
+        stored
+    }
+
+    fn take_slice(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> Result<(), ConvertError> {
+        let bounds = quantize(&self.pass.job.sources[source].map, batch, rows, &mut self.q, &mut self.stats);
         self.stats.bounds.union(&bounds);
         if !self.pass.partition.holds(&bounds) {
             self.pass.misled.store(true, Ordering::Relaxed);
@@ -78,13 +120,13 @@ impl<'a> Worker<'a> {
         if self.pass.misled.load(Ordering::Relaxed) {
             return Ok(()); // the pass will be repeated with the bounds that this one finds
         }
-        self.stats.points += kept as u64;
-        self.stats.sources[source].kept += kept as u64;
-        self.ranges(source, batch, filtered);
+        let points = self.q[0].len();
+        self.stats.points += points as u64;
+        self.stats.sources[source].kept += points as u64;
         self.pass.partition.cells(&self.q, &mut self.cells);
         self.grouping.group(&self.cells);
-        let (block, start) = self.room_for(source, kept)?;
-        self.assemble(source, batch, filtered);
+        let (block, start) = self.room_for(source, points)?;
+        self.assemble(source, batch, rows);
         self.note_segments(block, start);
         Ok(())
     }
@@ -97,7 +139,7 @@ impl<'a> Worker<'a> {
             self.close_block()?;
         }
         if self.records.capacity() < BLOCK_BYTES {
-            self.records = pages::buffer(BLOCK_BYTES);
+            self.records = os_hints::buffer(BLOCK_BYTES);
         }
         let index = match &self.open {
             Some(block) => block.index,
@@ -218,7 +260,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Builds the records in the order of their cells.
-    fn assemble(&mut self, source: usize, batch: &PointBatch, filtered: bool) {
+    fn assemble(&mut self, source: usize, batch: &PointBatch, slice: &Rows<'_>) {
         let schema = &self.pass.job.schema;
         let stride = schema.stride;
         let order = &self.grouping.order;
@@ -240,8 +282,13 @@ impl<'a> Worker<'a> {
                 }
             }
             let rows = &mut rows[..order.len()];
-            for (row, &i) in rows.iter_mut().zip(order) {
-                *row = if filtered { self.selection[i as usize] } else { i };
+            match slice {
+                Rows::Consecutive(range) => {
+                    rows.iter_mut().zip(order).for_each(|(row, i)| *row = range.start as u32 + i);
+                }
+                Rows::Selected(chosen) => {
+                    rows.iter_mut().zip(order).for_each(|(row, i)| *row = chosen[*i as usize]);
+                }
             }
             for part in &parts {
                 part.put(tile, stride, rows);
@@ -273,25 +320,31 @@ fn count_classes(values: &[u8], into: &mut [u64]) {
     }
 }
 
-/// Puts the selected positions on the job lattice and returns their bounds there.
+/// Rows of a batch that are taken together.
+enum Rows<'a> {
+    Consecutive(std::ops::Range<usize>),
+    Selected(&'a [u32]),
+}
+
+/// Puts the positions of some rows on the job lattice and returns their bounds there.
 fn quantize(
     map: &SourceMap,
     batch: &PointBatch,
-    selection: Option<&[u32]>,
+    rows: &Rows<'_>,
     q: &mut [Vec<i64>; 3],
     stats: &mut Stats,
 ) -> LatticeBounds {
     let mut bounds = LatticeBounds::EMPTY;
     for a in 0..3 {
         q[a].clear();
-        let (max, squares) = match (&batch.positions, selection) {
-            (Positions::Quantized(p), None) => map.axes[a].map_integers(&p[a], &mut q[a]),
-            (Positions::World(p), None) => map.axes[a].map_world(&p[a], &mut q[a]),
-            (Positions::Quantized(p), Some(s)) => {
+        let (max, squares) = match (&batch.positions, rows) {
+            (Positions::Quantized(p), Rows::Consecutive(r)) => map.axes[a].map_integers(&p[a][r.clone()], &mut q[a]),
+            (Positions::World(p), Rows::Consecutive(r)) => map.axes[a].map_world(&p[a][r.clone()], &mut q[a]),
+            (Positions::Quantized(p), Rows::Selected(s)) => {
                 let chosen: Vec<i32> = s.iter().map(|i| p[a][*i as usize]).collect();
                 map.axes[a].map_integers(&chosen, &mut q[a])
             }
-            (Positions::World(p), Some(s)) => {
+            (Positions::World(p), Rows::Selected(s)) => {
                 let chosen: Vec<f64> = s.iter().map(|i| p[a][*i as usize]).collect();
                 map.axes[a].map_world(&chosen, &mut q[a])
             }

@@ -26,6 +26,8 @@ pub(crate) struct Stats {
     pub(crate) thinned: u64,
     pub(crate) invalid: u64,
     pub(crate) unreadable: u64,
+    /// 64-bit integers that a double does not hold exactly.
+    pub(crate) rounded_values: u64,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -171,6 +173,7 @@ impl Stats {
             thinned: 0,
             invalid: 0,
             unreadable: 0,
+            rounded_values: 0,
             warnings: Vec::new(),
         }
     }
@@ -194,6 +197,7 @@ impl Stats {
         self.thinned += other.thinned;
         self.invalid += other.invalid;
         self.unreadable += other.unreadable;
+        self.rounded_values += other.rounded_values;
         self.warnings.extend_from_slice(&other.warnings);
         self.warnings.sort();
     }

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use crate::error::ConvertError;
 use crate::file_at::{read_exact_at, write_all_at};
-use crate::pages;
+use crate::os_hints;
 
 /// Blocks grow to this size: a few large pages, and one long write when they go to disk.
 pub(crate) const BLOCK_BYTES: usize = 8 << 20;
@@ -108,7 +108,7 @@ impl Store {
             Place::Memory(bytes) => out.extend_from_slice(&bytes[start..start + len]),
             Place::Disk { offset } => {
                 let at = out.len();
-                pages::reserve(out, len);
+                os_hints::reserve(out, len);
                 out.resize(at + len, 0);
                 read_exact_at(self.spill_file()?, &mut out[at..], offset + start as u64)
                     .map_err(|e| ConvertError::io(&self.spill_dir, "reading the spill file", e))?;

@@ -58,6 +58,18 @@ impl Sampler {
         }
         &self.accepted
     }
+
+    /// True if a node of `level` cannot take both points, whatever else it is offered.
+    pub(crate) fn takes_one_only(&self, level: u8, a: [u32; 3], b: [u32; 3]) -> bool {
+        let shift = cell_shift(level);
+        match self.method {
+            Method::Poisson(_) => {
+                let squared: u64 = (0..3).map(|i| u64::from(a[i].abs_diff(b[i])).pow(2)).sum();
+                squared < 1 << (2 * shift)
+            }
+            Method::Cells(_) => a.map(|t| t >> shift) == b.map(|t| t >> shift),
+        }
+    }
 }
 
 /// Bits below the spacing of a level: a cell as wide as the spacing is `t >> cell_shift(level)`.

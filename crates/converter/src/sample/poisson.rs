@@ -66,34 +66,45 @@ const FAR: Block = Block { x: [f32::INFINITY; LANES], y: [f32::INFINITY; LANES],
 impl Near {
     fn clear(&mut self) {
         self.blocks.clear();
+        self.blocks.push(FAR);
         self.len = 0;
     }
 
     #[inline]
     fn push(&mut self, p: [f32; 3]) {
+        self.push_if(true, p);
+    }
+
+    /// Adds the point, or nothing. Whether a candidate is taken cannot be predicted, so there is no branch: a point that
+    /// is not taken is written as one infinitely far away, where the next will be written over it.
+    #[inline]
+    fn push_if(&mut self, taken: bool, p: [f32; 3]) {
+        let p = if taken { p } else { [f32::INFINITY; 3] };
         let lane = self.len % LANES;
-        if lane == 0 {
-            self.blocks.push(FAR);
-        }
         if let Some(block) = self.blocks.last_mut() {
             block.x[lane] = p[0];
             block.y[lane] = p[1];
             block.z[lane] = p[2];
         }
-        self.len += 1;
+        self.len += usize::from(taken);
+        if self.len == self.blocks.len() * LANES {
+            self.blocks.push(FAR);
+        }
     }
 
     /// True if a point is too near to `p`.
     #[inline]
     fn conflicts(&self, p: [f32; 3]) -> bool {
-        self.blocks.iter().any(|block| {
-            // All lanes first, one question at the end: the compiler makes vector code of it.
-            let mut hits = 0u32;
-            for i in 0..LANES {
-                let (dx, dy, dz) = (block.x[i] - p[0], block.y[i] - p[1], block.z[i] - p[2]);
-                hits |= u32::from(dx * dx + dy * dy + dz * dz < CONFLICT_BELOW);
+        // Early exits are for crowds only: in the usual two blocks a branch would cost more than it saves.
+        self.blocks.chunks(4).any(|blocks| {
+            let mut hits = [0u32; LANES];
+            for block in blocks {
+                for (i, hit) in hits.iter_mut().enumerate() {
+                    let (dx, dy, dz) = (block.x[i] - p[0], block.y[i] - p[1], block.z[i] - p[2]);
+                    *hit |= u32::from(dx * dx + dy * dy + dz * dz < CONFLICT_BELOW);
+                }
             }
-            hits != 0
+            hits.iter().fold(0, |any, hit| any | hit) != 0
         })
     }
 }
@@ -118,6 +129,13 @@ impl Default for Poisson {
 impl Poisson {
     pub(super) fn choose(&mut self, level: u8, candidates: &[[u32; 3]], accepted: &mut [bool]) {
         let Some(first) = candidates.first() else { return };
+        if u32::from(level) > TREE_BITS - SPACING_BITS {
+            // The spacing is less than one unit: only repeated places conflict, and they are neighbours in Morton order.
+            for (i, accepted) in accepted.iter_mut().enumerate() {
+                *accepted = i == 0 || candidates[i] != candidates[i - 1];
+            }
+            return;
+        }
         let shift = cell_shift(level);
         let cell_shift = shift + CELL_BITS;
         let tile_shift = cell_shift + 1;
@@ -137,10 +155,9 @@ impl Poisson {
             at += run;
             for i in scattered(run) {
                 let p = place(candidates[i]);
-                if !self.near.conflicts(p) {
-                    accepted[i] = true;
-                    self.near.push(p);
-                }
+                let taken = !self.near.conflicts(p);
+                accepted[i] = taken;
+                self.near.push_if(taken, p);
             }
             self.note_taken(candidates, accepted, cell_shift, place);
         }

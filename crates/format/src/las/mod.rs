@@ -37,14 +37,12 @@ mod header;
 mod kernels;
 mod laszip;
 mod pieces;
-mod quiet;
 mod records;
 mod schema;
-mod source;
 
 use std::path::Path;
 
-use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Wanted};
+use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Wanted, quiet, source};
 use chunk_table::Layout;
 use header::{EXPORT_AGAIN, Header};
 use laszip::{Arrangement, LaszipRecord};

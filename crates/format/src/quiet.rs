@@ -12,7 +12,7 @@ thread_local! {
 ///
 /// The panic hook is wrapped once, for the whole process: on a thread that is inside this function it says nothing,
 /// everywhere else it does what the hook before it did.
-pub(super) fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
+pub(crate) fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
     static WRAP_HOOK: Once = Once::new();
     WRAP_HOOK.call_once(|| {
         let before = std::panic::take_hook();

@@ -1,8 +1,11 @@
-//! Large buffers in large pages. The kernel hands out memory in pages of 4 KiB, a fault for each; on the way from a
-//! LAS file to a dataset these faults were a quarter of all processor time. Asked for 2 MiB pages it faults 512 times
-//! less often.
+//! Hints to the operating system. The only `unsafe` code of the crate: two calls that change no data.
 //!
-//! The only `unsafe` code of the crate: one call that gives the kernel a hint.
+//! Large buffers in large pages: the kernel hands out memory in pages of 4 KiB, a fault for each; on the way from a LAS
+//! file to a dataset these faults were an eighth of all processor time. Asked for 2 MiB pages it faults 512 times less
+//! often. Early write-back: a dataset is synced before it gets its name; begun while it is still being built, that
+//! costs no waiting at the end.
+
+use std::fs::File;
 
 /// An empty buffer of that capacity, in large pages where the system has them.
 pub(crate) fn buffer(capacity: usize) -> Vec<u8> {
@@ -38,6 +41,20 @@ fn prefer_large_pages(buffer: &mut Vec<u8>) {
 
 #[cfg(not(target_os = "linux"))]
 fn prefer_large_pages(_buffer: &mut Vec<u8>) {}
+
+/// Asks the system to begin writing this range of a file to the disk, and does not wait.
+pub(crate) fn start_write_back(file: &File, offset: u64, len: usize) {
+    #[cfg(target_os = "linux")]
+    {
+        use std::os::fd::AsRawFd;
+        let (offset, len) = (offset as i64, len as i64);
+        // SAFETY: the descriptor is open while `file` is borrowed; the call touches no memory of ours, and a refusal is
+        // harmless because the file is synced later. Paid for by the whole-program benchmark (wall time).
+        unsafe { libc::sync_file_range(file.as_raw_fd(), offset, len, libc::SYNC_FILE_RANGE_WRITE) };
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = (file, offset, len);
+}
 
 #[cfg(test)]
 mod tests {

@@ -8,14 +8,14 @@ use crate::ReadError;
 
 /// An open file of known length.
 #[derive(Debug)]
-pub(super) struct Source {
+pub(crate) struct Source {
     file: File,
     path: PathBuf,
     len: u64,
 }
 
 impl Source {
-    pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
         let io = |e| ReadError::io(path, "opening", e);
         let file = File::open(path).map_err(io)?;
         let meta = file.metadata().map_err(io)?;
@@ -25,17 +25,17 @@ impl Source {
         Ok(Self { file, path: path.to_path_buf(), len: meta.len() })
     }
 
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Bytes of the file when it was opened.
-    pub(super) fn len(&self) -> u64 {
+    pub(crate) fn len(&self) -> u64 {
         self.len
     }
 
     /// Fills `buf` from `offset`.
-    pub(super) fn read_at(&self, offset: u64, buf: &mut [u8]) -> Result<(), ReadError> {
+    pub(crate) fn read_at(&self, offset: u64, buf: &mut [u8]) -> Result<(), ReadError> {
         read_exact_at(&self.file, buf, offset).map_err(|e| match e.kind() {
             io::ErrorKind::UnexpectedEof => {
                 ReadError::broken(&self.path, offset, format!("{} bytes expected, the file ends before", buf.len()))
@@ -46,14 +46,16 @@ impl Source {
     }
 
     /// `N` bytes from `offset`.
-    pub(super) fn array_at<const N: usize>(&self, offset: u64) -> Result<[u8; N], ReadError> {
+    #[cfg(any(feature = "e57", feature = "las", feature = "pcd"))]
+    pub(crate) fn array_at<const N: usize>(&self, offset: u64) -> Result<[u8; N], ReadError> {
         let mut buf = [0; N];
         self.read_at(offset, &mut buf)?;
         Ok(buf)
     }
 
     /// `len` bytes from `offset`, at most what the file holds from there: the allocation never exceeds the file.
-    pub(super) fn vec_at(&self, offset: u64, len: u64) -> Result<Vec<u8>, ReadError> {
+    #[cfg(any(feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+    pub(crate) fn vec_at(&self, offset: u64, len: u64) -> Result<Vec<u8>, ReadError> {
         let len = len.min(self.len.saturating_sub(offset));
         let mut buf = vec![0; usize::try_from(len).unwrap_or(0)];
         self.read_at(offset, &mut buf)?;
@@ -61,7 +63,7 @@ impl Source {
     }
 
     /// `len` bytes from `offset` into the front of `buf`, which grows but never shrinks (so that it is zeroed once).
-    pub(super) fn slice_at<'a>(&self, offset: u64, len: u64, buf: &'a mut Vec<u8>) -> Result<&'a [u8], ReadError> {
+    pub(crate) fn slice_at<'a>(&self, offset: u64, len: u64, buf: &'a mut Vec<u8>) -> Result<&'a [u8], ReadError> {
         let end = offset.checked_add(len).filter(|end| *end <= self.len);
         let Some(len) = end.and_then(|_| usize::try_from(len).ok()) else {
             return Err(ReadError::broken(&self.path, offset, format!("{len} bytes expected, the file ends before")));
@@ -75,13 +77,15 @@ impl Source {
     }
 
     /// A sequential reader over `offset..end`.
-    pub(super) fn reader(&self, offset: u64, end: u64) -> SourceReader<'_> {
+    #[cfg(feature = "las")]
+    pub(crate) fn reader(&self, offset: u64, end: u64) -> SourceReader<'_> {
         SourceReader { source: self, next: offset, end: end.min(self.len), buf: Vec::new(), at: 0 }
     }
 }
 
 /// A buffered reader of a part of a [`Source`].
-pub(super) struct SourceReader<'a> {
+#[cfg(feature = "las")]
+pub(crate) struct SourceReader<'a> {
     source: &'a Source,
     next: u64,
     end: u64,
@@ -90,8 +94,10 @@ pub(super) struct SourceReader<'a> {
 }
 
 /// Large enough that a read costs little beside decoding, small beside a batch.
+#[cfg(feature = "las")]
 const READER_BUFFER: u64 = 256 * 1024;
 
+#[cfg(feature = "las")]
 impl io::Read for SourceReader<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.buf.len() {

@@ -1,0 +1,184 @@
+//! Where a scan stands: rotation and translation, in double precision.
+
+use ::e57::{CartesianBounds, PointCloud, SphericalBounds};
+
+use crate::Aabb;
+
+/// From the scan's own coordinates to those of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Pose {
+    /// Rows of the rotation matrix; `None` leaves coordinates bit for bit.
+    rotation: Option<[[f64; 3]; 3]>,
+    translation: [f64; 3],
+}
+
+impl Pose {
+    /// The pose of a scan. `Err` holds a pose without rotation and why the file's cannot be one.
+    pub(super) fn new(cloud: &PointCloud) -> (Self, Option<&'static str>) {
+        let Some(transform) = &cloud.transform else { return (Self::identity(), None) };
+        let t = &transform.translation;
+        let q = &transform.rotation;
+        let translation = [t.x, t.y, t.z];
+        let norm = [q.w, q.x, q.y, q.z].iter().fold(0.0f64, |sum, v| sum.hypot(*v));
+        if !norm.is_finite() || norm == 0.0 {
+            return (Self { rotation: None, translation }, Some("the rotation is no quaternion; it is left out"));
+        }
+        let note = ((norm - 1.0).abs() > 1e-6).then_some("the rotation is no unit quaternion; it is normalised");
+        // a quaternion within rounding of 1 is one: dividing by its norm would only add noise
+        let by = if (norm - 1.0).abs() <= 4.0 * f64::EPSILON { 1.0 } else { norm };
+        let [w, x, y, z] = [q.w / by, q.x / by, q.y / by, q.z / by];
+        let is_identity = x == 0.0 && y == 0.0 && z == 0.0;
+        let rotation = [
+            [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), w * w + y * y - x * x - z * z, 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w + z * z - x * x - y * y],
+        ];
+        (Self { rotation: (!is_identity).then_some(rotation), translation }, note)
+    }
+
+    fn identity() -> Self {
+        Self { rotation: None, translation: [0.0; 3] }
+    }
+
+    /// Moves points, one slice an axis, of equal length.
+    pub(super) fn apply(&self, xyz: [&mut [f64]; 3]) {
+        let [x, y, z] = xyz;
+        if self.rotation.is_some() {
+            self.rotate([&mut *x, &mut *y, &mut *z]);
+        }
+        for (axis, by) in [x, y, z].into_iter().zip(self.translation) {
+            if by != 0.0 {
+                axis.iter_mut().for_each(|v| *v += by);
+            }
+        }
+    }
+
+    /// Turns directions.
+    pub(super) fn rotate(&self, xyz: [&mut [f64]; 3]) {
+        let Some(r) = &self.rotation else { return };
+        let [x, y, z] = xyz;
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            let p = [*x, *y, *z];
+            [*x, *y, *z] = r.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2]);
+        }
+    }
+
+    /// The box around a box that is moved.
+    fn moved(&self, bounds: &Aabb) -> Aabb {
+        let mut out = Aabb::EMPTY;
+        for corner in 0..8 {
+            let mut p: [[f64; 1]; 3] =
+                std::array::from_fn(|a| [if corner >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] }]);
+            let [x, y, z] = &mut p;
+            self.apply([x, y, z]);
+            out.grow(p.map(|[v]| v));
+        }
+        out
+    }
+
+    /// What the file declares of a scan's bounds, in the file's coordinates: the moved box, the box around the largest
+    /// range, or nothing.
+    pub(super) fn bounds_declared(&self, cloud: &PointCloud) -> Option<Aabb> {
+        let cartesian = cloud.cartesian_bounds.as_ref().and_then(cartesian_box);
+        let bounds = cartesian.or_else(|| cloud.spherical_bounds.as_ref().and_then(range_box))?;
+        let moved = self.moved(&bounds);
+        (!moved.is_empty() && moved.extent().iter().all(|e| e.is_finite())).then_some(moved)
+    }
+}
+
+fn cartesian_box(b: &CartesianBounds) -> Option<Aabb> {
+    let bounds = Aabb { min: [b.x_min?, b.y_min?, b.z_min?], max: [b.x_max?, b.y_max?, b.z_max?] };
+    // writers without a bound write the largest double
+    (!bounds.is_empty() && bounds.extent().iter().all(|e| *e < 1e100)).then_some(bounds)
+}
+
+fn range_box(b: &SphericalBounds) -> Option<Aabb> {
+    let range = b.range_max.filter(|r| (0.0..1e100).contains(r))?;
+    Some(Aabb { min: [-range; 3], max: [range; 3] })
+}
+
+/// Turns range, azimuth and elevation into x, y and z, in place (ASTM E2807 §6.4: azimuth from +x towards +y,
+/// elevation from the xy plane).
+pub(super) fn spherical_to_cartesian(xyz: [&mut [f64]; 3]) {
+    let [x, y, z] = xyz;
+    for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+        let (range, (sin_az, cos_az), (sin_el, cos_el)) = (*x, y.sin_cos(), z.sin_cos());
+        *x = range * cos_el * cos_az;
+        *y = range * cos_el * sin_az;
+        *z = range * sin_el;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::e57::{Quaternion, Transform, Translation};
+
+    fn pose(q: [f64; 4], t: [f64; 3]) -> (Pose, Option<&'static str>) {
+        let cloud = cloud(q, t);
+        Pose::new(&cloud)
+    }
+
+    fn cloud(q: [f64; 4], t: [f64; 3]) -> PointCloud {
+        let mut cloud = PointCloud::default();
+        let rotation = Quaternion { w: q[0], x: q[1], y: q[2], z: q[3] };
+        cloud.transform = Some(Transform { rotation, translation: Translation { x: t[0], y: t[1], z: t[2] } });
+        cloud
+    }
+
+    fn moved(pose: &Pose, p: [f64; 3]) -> [f64; 3] {
+        let [mut x, mut y, mut z] = p.map(|v| [v]);
+        pose.apply([&mut x, &mut y, &mut z]);
+        [x[0], y[0], z[0]]
+    }
+
+    #[test]
+    fn a_quarter_turn_about_z_takes_x_to_y_whatever_the_length_of_the_quaternion() {
+        for length in [1.0, 7.0, 1e-200] {
+            let half = std::f64::consts::FRAC_1_SQRT_2 * length;
+            let (pose, note) = pose([half, 0.0, 0.0, half], [10.0, 20.0, 30.0]);
+            let p = moved(&pose, [1.0, 0.0, 2.0]);
+            assert!(p.iter().zip([10.0, 21.0, 32.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{p:?}");
+            assert_eq!(note.is_some(), length != 1.0);
+        }
+    }
+
+    #[test]
+    fn no_rotation_leaves_every_bit_and_nonsense_is_told() {
+        for w in [1.0, -1.0, 3.0] {
+            let (pose, _) = pose([w, 0.0, 0.0, 0.0], [0.0; 3]);
+            assert_eq!(moved(&pose, [0.1, -0.2, 1e300]), [0.1, -0.2, 1e300]);
+        }
+        for q in [[0.0; 4], [f64::NAN, 0.0, 0.0, 1.0], [f64::INFINITY; 4]] {
+            let (pose, note) = pose(q, [1.0, 0.0, 0.0]);
+            assert_eq!((moved(&pose, [0.5; 3]), note.is_some()), ([1.5, 0.5, 0.5], true));
+        }
+    }
+
+    #[test]
+    fn declared_bounds_are_moved_with_the_scan() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let mut cloud = cloud([half, 0.0, 0.0, half], [100.0, 0.0, 0.0]);
+        let mut bounds = CartesianBounds::default();
+        (bounds.x_min, bounds.y_min, bounds.z_min) = (Some(0.0), Some(0.0), Some(0.0));
+        (bounds.x_max, bounds.y_max, bounds.z_max) = (Some(1.0), Some(2.0), Some(3.0));
+        cloud.cartesian_bounds = Some(bounds);
+        let b = Pose::new(&cloud).0.bounds_declared(&cloud).unwrap();
+        let expected = Aabb { min: [98.0, 0.0, 0.0], max: [100.0, 1.0, 3.0] };
+        assert!((0..3).all(|a| (b.min[a] - expected.min[a]).abs() < 1e-9 && (b.max[a] - expected.max[a]).abs() < 1e-9));
+        if let Some(b) = &mut cloud.cartesian_bounds {
+            b.z_max = Some(f64::MAX);
+        }
+        assert_eq!(Pose::new(&cloud).0.bounds_declared(&cloud), None);
+    }
+
+    #[test]
+    fn azimuth_turns_from_x_to_y_and_elevation_lifts() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let (mut x, mut y, mut z) = ([2.0, 2.0], [quarter, 0.0], [0.0, quarter]);
+        spherical_to_cartesian([&mut x, &mut y, &mut z]);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(near(x[0], 0.0) && near(y[0], 2.0) && near(z[0], 0.0));
+        assert!(near(x[1], 0.0) && near(y[1], 0.0) && near(z[1], 2.0));
+    }
+}

@@ -1,0 +1,101 @@
+//! Colour and intensity to 16 bits: which values become 0 and 65,535.
+//!
+//! The first that says something counts:
+//! 1. the limits that the scan declares (`colorLimits`, `intensityLimits`);
+//! 2. the range of the field in the prototype, for colours that of all three together, so that no channel is
+//!    stretched more than another;
+//! 3. the usual range ([0, 1], [0, 255] or [0, 65535]) that holds a sample of the values, else what the sample spans;
+//!    then a warning tells so.
+
+use ::e57::{ColorLimits, IntensityLimits, RecordValue};
+
+use super::fields::{Encoding, Field};
+
+/// `value ↦ (value − low) · factor`, rounded and kept within 0 and 65,535; NaN becomes 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scaling {
+    low: f64,
+    factor: f64,
+}
+
+impl Scaling {
+    /// `low` becomes 0 and `high` (> `low`) 65,535.
+    pub(super) fn new((low, high): (f64, f64)) -> Self {
+        Self { low, factor: 65_535.0 / (high - low) }
+    }
+
+    #[inline(always)]
+    pub(super) fn apply(self, value: f64) -> u16 {
+        // a cast saturates
+        ((value - self.low) * self.factor + 0.5) as u16
+    }
+}
+
+/// The declared range of intensity.
+pub(super) fn intensity(limits: Option<&IntensityLimits>, field: &Field) -> Option<(f64, f64)> {
+    let limits = limits?;
+    range(limits.intensity_min.as_ref(), limits.intensity_max.as_ref(), field)
+}
+
+/// The declared ranges of red, green and blue.
+pub(super) fn colours(limits: Option<&ColorLimits>, fields: [&Field; 3]) -> Option<[(f64, f64); 3]> {
+    let limits = limits?;
+    let red = range(limits.red_min.as_ref(), limits.red_max.as_ref(), fields[0])?;
+    let green = range(limits.green_min.as_ref(), limits.green_max.as_ref(), fields[1])?;
+    Some([red, green, range(limits.blue_min.as_ref(), limits.blue_max.as_ref(), fields[2])?])
+}
+
+/// A range, if the limits make one. A scaled integer limit has the scale of its field.
+fn range(low: Option<&RecordValue>, high: Option<&RecordValue>, field: &Field) -> Option<(f64, f64)> {
+    let meant = |value: &RecordValue| match (value, field.encoding) {
+        (RecordValue::Single(v), _) => f64::from(*v),
+        (RecordValue::Double(v), _) => *v,
+        (RecordValue::ScaledInteger(v), Encoding::Scaled { scale, offset, .. }) => *v as f64 * scale + offset,
+        (RecordValue::ScaledInteger(v) | RecordValue::Integer(v), _) => *v as f64,
+    };
+    let range = (meant(low?), meant(high?));
+    // writers without limits write 0 and 0, or the ends of their type
+    (range.0 < range.1 && range.0 > -1e30 && range.1 < 1e30).then_some(range)
+}
+
+/// The union of the ranges, if all fields have one.
+pub(super) fn union(fields: &[&Field]) -> Option<(f64, f64)> {
+    let ranges = fields.iter().map(|f| f.range).collect::<Option<Vec<_>>>()?;
+    Some(ranges.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |u, r| (u.0.min(r.0), u.1.max(r.1))))
+}
+
+/// The range to take for sampled values between `low` and `high`.
+pub(super) fn usual((low, high): (f64, f64), is_float: bool) -> (f64, f64) {
+    let usual = if is_float { &[1.0, 255.0, 65_535.0][..] } else { &[255.0, 65_535.0] };
+    match usual.iter().find(|u| low >= 0.0 && high <= **u) {
+        Some(u) => (0.0, *u),
+        None if low < high => (low, high),
+        None if low.is_finite() => (low.min(0.0), high.max(0.0)),
+        None => (0.0, 1.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_and_middle_of_a_range() {
+        let s = Scaling::new((0.0, 255.0));
+        assert_eq!([0.0, 1.0, 128.0, 255.0].map(|v| s.apply(v)), [0, 257, 32_896, 65_535]);
+        let s = Scaling::new((-66.0, 66.0));
+        assert_eq!([-66.0, 0.0, 66.0, 67.0, -1e9, f64::NAN].map(|v| s.apply(v)), [0, 32_768, 65_535, 65_535, 0, 0]);
+        let s = Scaling::new((0.0, 65_535.0));
+        assert!((0..=u16::MAX).all(|v| s.apply(f64::from(v)) == v));
+    }
+
+    #[test]
+    fn a_sample_chooses_the_usual_range_that_holds_it() {
+        assert_eq!(usual((0.1, 0.7), true), (0.0, 1.0));
+        assert_eq!(usual((0.0, 1.0), false), (0.0, 255.0));
+        assert_eq!(usual((3.0, 256.0), true), (0.0, 65_535.0));
+        assert_eq!(usual((-2048.0, 2047.0), true), (-2048.0, 2047.0));
+        assert_eq!(usual((-3.0, -3.0), true), (-3.0, 0.0));
+        assert_eq!(usual((f64::INFINITY, f64::NEG_INFINITY), true), (0.0, 1.0));
+    }
+}

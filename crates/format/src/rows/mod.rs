@@ -1,0 +1,48 @@
+//! Points stored as rows of numbers, binary or text: what PLY, PCD, XYZ, PTS, PTX and OFF have in common.
+//!
+//! A reader parses its header into a [`Schema`] (which number of a row goes where) and a [`Storage`] (how rows lie in
+//! the file), cuts the file into pieces with [`binary::pieces`] or [`lines::index`], and leaves the rest to [`RowScan`].
+//!
+//! Positions are world coordinates in double precision. A number written as text keeps its decimals even where the
+//! header declares single precision. NaN and infinite positions pass; what to do with them is the caller's policy.
+
+pub(crate) mod ascii;
+pub(crate) mod binary;
+pub(crate) mod lines;
+mod names;
+mod number;
+mod probe;
+mod scan;
+mod schema;
+
+pub(crate) use names::{Role, las_type, role};
+pub(crate) use number::Endian;
+pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};
+pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage};
+pub(crate) use schema::{Field, MAX_FIELDS, Property, Rule, Schema, Target};
+
+/// Advice for files that end early.
+pub(crate) const CUT_SHORT: &str = "it was cut short; copy or export it again";
+/// Advice for files whose header cannot be.
+pub(crate) const EXPORT_AGAIN: &str = "export it again from its source";
+
+/// Warns if the file holds another number of points than it declares; returns the number to read.
+pub(crate) fn reconcile(declared: u64, there: u64, warnings: &mut Vec<String>) -> u64 {
+    if there < declared {
+        let missing = declared - there;
+        warnings.push(format!(
+            "the header declares {declared} points, {there} whole ones are there: {missing} are missing"
+        ));
+    }
+    declared.min(there)
+}
+
+/// The kind of number that positions are, for people: it bounds what they resolve.
+pub(crate) fn precision(ty: crate::AttributeType) -> &'static str {
+    use crate::AttributeType as T;
+    match ty {
+        T::Float32 => "float32",
+        T::Float64 => "float64",
+        _ => "integer",
+    }
+}

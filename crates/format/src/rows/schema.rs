@@ -1,0 +1,271 @@
+//! Which number of a row goes to which column.
+
+use super::names::{self, Role, role};
+use crate::{Attribute, AttributeType};
+
+/// More numbers in a row than any scan has; a header that says more is refused.
+pub(crate) const MAX_FIELDS: usize = 4096;
+
+/// A column as the file declares it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Property {
+    pub(crate) role: Role,
+    pub(crate) name: String,
+    pub(crate) ty: AttributeType,
+    /// Numbers a row, side by side.
+    pub(crate) elements: usize,
+    /// Bytes from the start of the record to the first one; unused in text.
+    pub(crate) at: usize,
+    /// A list: `ty` is the type of its length; `elements` is 1. It is passed over.
+    pub(crate) list: bool,
+}
+
+impl Property {
+    /// One number, with the role that its name has.
+    pub(crate) fn new(name: &str, ty: AttributeType) -> Self {
+        Self { role: role(name), name: name.to_owned(), ty, elements: 1, at: 0, list: false }
+    }
+}
+
+/// One number of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Field {
+    pub(crate) at: usize,
+    pub(crate) ty: AttributeType,
+    pub(crate) target: Target,
+}
+
+/// Where a number goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Target {
+    /// Nowhere.
+    Skip,
+    /// Nowhere, and it says how many numbers of the row follow it there (text only).
+    List,
+    /// A position.
+    Axis(usize),
+    /// Element of a column.
+    Value { column: usize, element: usize, rule: Rule },
+    /// The bits of one number to three elements of a column, and to an alpha column.
+    Packed { column: usize, alpha: Option<usize> },
+}
+
+/// How a number becomes an element of its column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rule {
+    /// Type and value stay.
+    Keep,
+    /// The column's type is another one: rounded if it is an integer's; an error if out of range.
+    Convert,
+    /// 0–1 becomes 0–65535; an error if out of range.
+    Unit,
+    /// −2048…2047 becomes 0–4095 (PTS intensity).
+    Shift,
+}
+
+/// All columns, and the numbers of a row in file order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Schema {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) fields: Vec<Field>,
+    /// True without a z: all z are 0.
+    pub(crate) flat: bool,
+}
+
+impl Schema {
+    /// Colour comes first, then intensity, classification, normals and the rest in file order.
+    ///
+    /// `Err` says what is missing. A missing z alone is no error.
+    pub(crate) fn new(properties: &[Property], warnings: &mut Vec<String>) -> Result<Self, String> {
+        let count = properties.iter().try_fold(0usize, |sum, p| sum.checked_add(p.elements));
+        if count.is_none_or(|n| n > MAX_FIELDS) {
+            return Err(format!("a row has more than {MAX_FIELDS} numbers"));
+        }
+        let mut builder = Builder { properties, schema: Self::default(), targets: vec![Vec::new(); properties.len()] };
+        builder.axes(warnings)?;
+        builder.colours();
+        builder.singles();
+        builder.normals();
+        builder.rest();
+        Ok(builder.finish())
+    }
+}
+
+struct Builder<'a> {
+    properties: &'a [Property],
+    schema: Schema,
+    /// Of each property, one for each element; empty until it is assigned.
+    targets: Vec<Vec<Target>>,
+}
+
+impl Builder<'_> {
+    /// The first unassigned scalar of that role.
+    fn find(&self, role: &Role) -> Option<usize> {
+        let is_it = |(p, t): (&Property, &Vec<Target>)| p.role == *role && p.elements == 1 && !p.list && t.is_empty();
+        self.properties.iter().zip(&self.targets).position(is_it)
+    }
+
+    fn find_three(&self, role: fn(usize) -> Role) -> Option<[usize; 3]> {
+        Some([self.find(&role(0))?, self.find(&role(1))?, self.find(&role(2))?])
+    }
+
+    fn axes(&mut self, warnings: &mut Vec<String>) -> Result<(), String> {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            match self.find(&Role::Axis(axis)) {
+                Some(i) => self.targets[i] = vec![Target::Axis(axis)],
+                None if axis == 2 => {
+                    self.schema.flat = true;
+                    warnings.push("there is no z; it is 0 for every point".to_owned());
+                }
+                None => return Err(format!("there is no {name}")),
+            }
+        }
+        Ok(())
+    }
+
+    fn colours(&mut self) {
+        if let Some(found) = self.find_three(Role::Colour) {
+            let column = self.add("rgb", AttributeType::UInt16, 3);
+            for (element, i) in found.into_iter().enumerate() {
+                let float = matches!(self.properties[i].ty, AttributeType::Float32 | AttributeType::Float64);
+                let rule = if float { Rule::Unit } else { Rule::Convert };
+                self.targets[i] = vec![Target::Value { column, element, rule }];
+            }
+        } else if let Some(i) = self.find(&Role::PackedColour)
+            && self.properties[i].ty.size() == 4
+        {
+            let column = self.add("rgb", AttributeType::UInt16, 3);
+            let with_alpha = self.properties[i].name.eq_ignore_ascii_case("rgba");
+            let alpha = with_alpha.then(|| self.add("alpha", AttributeType::UInt8, 1));
+            self.targets[i] = vec![Target::Packed { column, alpha }];
+        }
+    }
+
+    fn singles(&mut self) {
+        if let Some(i) = self.find(&Role::Intensity) {
+            let ty = match self.properties[i].ty {
+                AttributeType::UInt8 | AttributeType::UInt16 => AttributeType::UInt16,
+                AttributeType::Int8 | AttributeType::Int16 | AttributeType::Float32 => AttributeType::Float32,
+                _ => AttributeType::Float64,
+            };
+            self.single(i, "intensity", ty);
+        }
+        if let Some(i) = self.find(&Role::Classification) {
+            self.single(i, "classification", AttributeType::UInt8);
+        }
+    }
+
+    fn normals(&mut self) {
+        if let Some(found) = self.find_three(Role::Normal) {
+            for (i, name) in found.into_iter().zip(["NormalX", "NormalY", "NormalZ"]) {
+                self.single(i, name, AttributeType::Float32);
+            }
+        }
+    }
+
+    fn rest(&mut self) {
+        for i in 0..self.properties.len() {
+            let Property { role, name, ty, elements, list, .. } = &self.properties[i];
+            if !self.targets[i].is_empty() {
+                continue;
+            }
+            if *list || *role == Role::Padding {
+                self.targets[i] = vec![if *list { Target::List } else { Target::Skip }; *elements];
+                continue;
+            }
+            let column = self.add(names::other_name(name, *ty), *ty, *elements);
+            let value = |element| Target::Value { column, element, rule: Rule::Keep };
+            self.targets[i] = (0..*elements).map(value).collect();
+        }
+    }
+
+    fn single(&mut self, i: usize, name: &str, ty: AttributeType) {
+        let column = self.add(name, ty, 1);
+        let rule = if self.properties[i].ty == ty { Rule::Keep } else { Rule::Convert };
+        self.targets[i] = vec![Target::Value { column, element: 0, rule }];
+    }
+
+    /// Adds an attribute, with a number behind its name if that is taken; returns its index.
+    fn add(&mut self, name: &str, ty: AttributeType, elements: usize) -> usize {
+        let base = if name.is_empty() { "unnamed" } else { name };
+        let taken = |name: &str, s: &Schema| name == "position" || s.attributes.iter().any(|a| a.name == name);
+        let mut free = base.to_owned();
+        for n in 2.. {
+            if !taken(&free, &self.schema) {
+                break;
+            }
+            free = format!("{base} {n}");
+        }
+        self.schema.attributes.push(Attribute::new(free, ty, elements));
+        self.schema.attributes.len() - 1
+    }
+
+    fn finish(mut self) -> Schema {
+        for (property, targets) in self.properties.iter().zip(&self.targets) {
+            for (element, target) in targets.iter().enumerate() {
+                let at = property.at + element * property.ty.size();
+                self.schema.fields.push(Field { at, ty: property.ty, target: *target });
+            }
+        }
+        self.schema
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use AttributeType::{Float32, Float64, Int32, UInt8};
+
+    fn schema(list: &[(&str, AttributeType)]) -> Result<Schema, String> {
+        let properties: Vec<_> = list.iter().map(|(name, ty)| Property::new(name, *ty)).collect();
+        Schema::new(&properties, &mut Vec::new())
+    }
+
+    fn names(s: &Schema) -> Vec<String> {
+        s.attributes.iter().map(|a| format!("{} {}x{}", a.name, a.ty.potree_name(), a.elements)).collect()
+    }
+
+    #[test]
+    fn colour_comes_first_and_the_rest_keeps_its_order() {
+        let s = schema(&[
+            ("b", UInt8),
+            ("scalar_Intensity", Float32),
+            ("z", Float32),
+            ("y", Float32),
+            ("x", Float64),
+            ("nx", Float64),
+            ("ny", Float64),
+            ("nz", Float64),
+            ("g", UInt8),
+            ("r", UInt8),
+            ("intensity", Int32),
+            ("quality", Int32),
+        ])
+        .unwrap();
+        assert_eq!(
+            names(&s).join(", "),
+            "rgb uint16x3, intensity doublex1, NormalX floatx1, NormalY floatx1, NormalZ floatx1, \
+             scalar_Intensity floatx1, quality int32x1"
+        );
+        assert_eq!(s.fields[0].target, Target::Value { column: 0, element: 2, rule: Rule::Convert });
+    }
+
+    #[test]
+    fn incomplete_colours_and_taken_names_stay_attributes_of_their_own() {
+        let s = schema(&[("x", Float32), ("y", Float32), ("z", Float32), ("red", UInt8), ("a", UInt8), ("a", UInt8)]);
+        assert_eq!(names(&s.unwrap()), ["red uint8x1", "a uint8x1", "a 2 uint8x1"]);
+    }
+
+    #[test]
+    fn without_z_it_is_flat_and_without_x_it_is_nothing() {
+        assert!(schema(&[("x", Float32), ("y", Float32)]).unwrap().flat);
+        assert_eq!(schema(&[("y", Float32), ("z", Float32)]), Err("there is no x".to_owned()));
+    }
+
+    #[test]
+    fn a_row_of_very_many_numbers_is_refused() {
+        let huge = Property { elements: usize::MAX, ..Property::new("h", Float32) };
+        let list = [Property::new("x", Float32), Property::new("y", Float32), huge];
+        assert!(Schema::new(&list, &mut Vec::new()).is_err());
+    }
+}

@@ -1,0 +1,151 @@
+//! Files of libE57Format against what it reads from them (`fixtures/e57/expected.tsv`).
+
+use std::collections::BTreeMap;
+
+use pointmill_format::{AttributeType, Wanted, e57};
+
+use crate::common::{self, Cloud};
+
+/// Points, of these not NaN; of the latter sum, minimum, maximum, first, last.
+type Row = [f64; 7];
+
+/// By file and column; exact but for integers beyond 2^53.
+fn expected() -> BTreeMap<String, BTreeMap<String, Row>> {
+    let text = std::fs::read_to_string(common::fixtures().join("expected.tsv")).unwrap();
+    let mut files = BTreeMap::<String, BTreeMap<String, Row>>::new();
+    for line in text.lines().filter(|l| !l.starts_with('#')) {
+        let mut fields = line.split('\t');
+        let (file, column) = (fields.next().unwrap(), fields.next().unwrap());
+        let numbers: Vec<f64> = fields.map(|f| f.parse().unwrap()).collect();
+        files.entry(file.to_owned()).or_default().insert(column.to_owned(), numbers.try_into().unwrap());
+    }
+    files
+}
+
+fn row(values: &[f64]) -> Row {
+    let ok: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+    let (min, max) = ok.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    [values.len() as f64, ok.len() as f64, ok.iter().sum(), min, max, ok[0], ok[ok.len() - 1]]
+}
+
+/// Sums and rotations round differently: 1e-9 of the largest value.
+fn same(seen: &Row, expected: &Row) -> bool {
+    let size = expected[3].abs().max(expected[4].abs()).max(1e-3);
+    let exact = seen[..2] == expected[..2];
+    exact
+        && (seen[2] - expected[2]).abs() <= 1e-9 * size * expected[1].max(1.0)
+        && (3..7).all(|i| (seen[i] - expected[i]).abs() <= 1e-9 * size)
+}
+
+#[test]
+fn every_fixture_gives_the_positions_that_libe57format_reads() {
+    let expected = expected();
+    for path in common::all_fixtures() {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let cloud = common::read(&path).unwrap();
+        assert!(cloud.errors.is_empty(), "{name}: {:?}", cloud.errors);
+        let Some(expected) = expected.get(name) else {
+            assert_eq!((cloud.len(), name), (0, "no_scans.e57"));
+            continue;
+        };
+        for (axis, values) in ["x", "y", "z"].iter().zip(&cloud.xyz) {
+            let (seen, expected) = (row(values), &expected[*axis]);
+            assert!(same(&seen, expected), "{name} {axis}: {seen:?}, expected {expected:?}");
+        }
+    }
+}
+
+/// The values of one scan, told apart by the scan index.
+fn of_scan(cloud: &Cloud, name: &str, scan: f64) -> Vec<f64> {
+    let index = cloud.column("point source id");
+    cloud.column(name).iter().zip(index).filter(|(_, i)| **i == scan).map(|(v, _)| *v).collect()
+}
+
+#[test]
+fn extra_fields_come_as_they_are_stored() {
+    let expected = expected();
+    let mut checked = 0;
+    for (file, columns) in &expected {
+        let cloud = common::read(&common::fixtures().join(file)).unwrap();
+        for (column, expected) in columns.iter().filter(|(c, _)| c.contains('/')) {
+            let (scan, field) = column.split_once('/').unwrap();
+            let name = match field {
+                "nor:class" => "class 2",
+                field => field.rsplit(':').next().unwrap(),
+            };
+            let is_own = |prefix: &str| name.starts_with(prefix);
+            let special = ["cartesian", "spherical", "color", "intensity", "normal", "is", "timeStamp"];
+            if special.into_iter().any(is_own) {
+                continue;
+            }
+            checked += 1;
+            let seen = row(&of_scan(&cloud, name, scan.parse().unwrap()));
+            assert!(same(&seen, expected), "{file} {column}: {seen:?}, expected {expected:?}");
+        }
+    }
+    assert_eq!(checked, 17 + 3 + 4, "widths, normals, scans");
+}
+
+#[test]
+fn columns_have_their_names_types_and_meaning() {
+    let attributes = |file: &str| common::read(&common::fixtures().join(file)).unwrap().info.attributes;
+    let names = |file: &str| attributes(file).iter().map(|a| a.name.clone()).collect::<Vec<_>>().join(", ");
+    assert_eq!(
+        names("scans.e57"),
+        "rgb, intensity, point source id, rowIndex, columnIndex, returnIndex, returnCount, timeStamp"
+    );
+    assert_eq!(names("normals.e57"), "point source id, NormalX, NormalY, NormalZ, class, class 2, reflectance");
+    let of = |file: &str, name: &str| attributes(file).into_iter().find(|a| a.name == name).unwrap();
+    let scaled = of("normals.e57", "class 2");
+    assert_eq!((scaled.ty, scaled.scale[0], scaled.offset[0]), (AttributeType::Int16, 0.25, 10.0));
+    assert_eq!(of("normals.e57", "class").ty, AttributeType::UInt8);
+    assert_eq!(of("normals.e57", "reflectance").ty, AttributeType::Float32);
+    assert_eq!(of("scans.e57", "timeStamp").ty, AttributeType::Float64, "single in one scan, double in another");
+    assert_eq!(of("widths.e57", "w64").ty, AttributeType::Int64);
+    assert_eq!(of("widths.e57", "w0").ty, AttributeType::UInt8);
+    assert_eq!((of("scans.e57", "rgb").ty, of("scans.e57", "rgb").elements), (AttributeType::UInt16, 3));
+}
+
+#[test]
+fn rows_and_columns_come_only_if_asked_for() {
+    let scan = e57::open(&common::fixtures().join("scans.e57")).unwrap();
+    assert!(!scan.info().attributes.iter().any(|a| a.name.ends_with("Index") && a.name != "returnIndex"));
+}
+
+#[test]
+fn a_selection_of_columns_leaves_the_others_empty_and_changes_no_value() {
+    for name in ["scans.e57", "normals.e57", "packets.e57"] {
+        let scan = e57::open(&common::fixtures().join(name)).unwrap();
+        let all = common::read_scan(scan.as_ref(), &Wanted::all(scan.info()));
+        for i in 0..all.columns.len() {
+            let mut wanted = Wanted::positions(scan.info());
+            wanted.0[i] = true;
+            let one = common::read_scan(scan.as_ref(), &wanted);
+            let bits = |xyz: &[Vec<f64>; 3]| xyz.concat().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&one.xyz), bits(&all.xyz), "{name}");
+            for (j, column) in one.columns.iter().enumerate() {
+                let text = |c: &[f64]| format!("{c:?}");
+                let same = text(column) == text(&all.columns[j]);
+                assert!(if j == i { same } else { column.is_empty() }, "{name}: {}", all.info.attributes[j].name);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_stands_around_the_points_is_told() {
+    let info = |file: &str| e57::open(&common::fixtures().join(file)).unwrap().info().clone();
+    let scans = info("scans.e57");
+    assert_eq!((scans.format.as_str(), scans.points_declared, scans.lattice), ("E57 1.0, 3 scans", 600, None));
+    assert_eq!(scans.bounds_declared, None, "two scans declare none");
+    assert_eq!(scans.warnings, ["scan 2: the rotation is no unit quaternion; it is normalised"]);
+    let empty = info("empty_scans.e57");
+    assert_eq!(empty.crs.wkt.as_deref(), Some("PROJCS[\"Höhe & <Breite>\",GEOGCS[\"WGS 84\"],UNIT[\"metre\",1]]"));
+    assert_eq!(empty.warnings, ["2 images are in the file; they are not read"]);
+    assert_eq!(info("no_scans.e57").warnings, ["the file has no scans"]);
+    assert_eq!(info("no_z.e57").warnings, ["scan 0: its points have no z; it is taken as 0"]);
+    assert_eq!(info("packets.e57").warnings, ["scan 0: the field note holds text; it is not read"]);
+    for quiet in ["spherical.e57", "both_systems.e57", "normals.e57", "widths.e57", "constant.e57"] {
+        assert!(info(quiet).warnings.is_empty(), "{quiet}: {:?}", info(quiet).warnings);
+    }
+}

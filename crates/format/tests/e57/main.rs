@@ -1,0 +1,10 @@
+//! E57 as its users meet it: files of libE57Format and others read right, damaged ones told and survived.
+#![cfg(feature = "e57")]
+
+mod common;
+mod corpus;
+mod damage;
+mod golden;
+mod mutation;
+mod oracle;
+mod values;
