@@ -120,3 +120,13 @@ fn a_pipe_in_a_folder_is_left_out() {
     }
     dir.succeed(["convert", "scans", "-o", "out", "-q"]);
 }
+
+#[test]
+fn scans_that_no_lattice_can_hold_together_are_refused() {
+    let dir = Dir::new();
+    dir.write("scans/a.las", &Las::terrain(3000, 1).bytes());
+    let mut far = Las::terrain(3000, 1);
+    far.offset[0] = 1e300;
+    dir.write("scans/b.las", &far.bytes());
+    dir.run(["convert", "scans", "-o", "out", "-q"]).failed_with(4, &["too far apart"]);
+}

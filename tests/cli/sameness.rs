@@ -34,6 +34,9 @@ fn in_memory_or_through_temporary_files() {
     let scarce = bytes(&dir, &["scans", "--memory", "92MiB", "--threads", "1"]);
     assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "92 MiB hold 600,000 points?");
     assert!(ample == scarce, "the datasets differ");
+    if let Some(peak) = dir.report("out")["peak_memory_bytes"].as_u64() {
+        assert!(peak <= 92 << 20, "the resident set rose to {} MiB", peak >> 20);
+    }
     dir.validate("out", &["scans"]);
 }
 

@@ -149,7 +149,11 @@ fn read(
             }
         }
     }
-    Err(ConvertError::Internal("the bounds of the inputs change from pass to pass".into()))
+    Err(ConvertError::Unsupported(
+        "the inputs lie too far apart for one lattice of 31 bits; leave out the one whose offset or scale is wrong, or \
+         convert them apart"
+            .into(),
+    ))
 }
 
 fn nothing_to_convert(job: &Job, stats: &Stats) -> ConvertError {
