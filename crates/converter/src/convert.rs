@@ -1,5 +1,6 @@
 //! A run, all passes in order.
 
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -213,7 +214,12 @@ fn build(
             let result = if events.stop_requested() {
                 Err(ConvertError::Interrupted)
             } else {
-                builder.build(chunk, buffer).and_then(|built: BuiltChunk| committer.submit(index, built))
+                // A panic must not leave the other threads waiting for this chunk.
+                let build = AssertUnwindSafe(|| {
+                    builder.build(chunk, buffer).and_then(|built: BuiltChunk| committer.submit(index, built))
+                });
+                std::panic::catch_unwind(build)
+                    .unwrap_or_else(|_| Err(ConvertError::Internal(format!("building node {} failed", chunk.key))))
             };
             events.advance(chunk.points);
             if let Err(error) = result {

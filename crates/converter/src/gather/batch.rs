@@ -22,6 +22,10 @@ const TILE_POINTS: usize = 512;
 /// gathered cell by cell.
 const SLICE_POINTS: usize = 8_192;
 
+/// Points in no spatial order touch many cells; whole batches are then grouped at once, or the lists of segments would
+/// grow as large as the points.
+const MIN_POINTS_PER_SEGMENT: usize = 64;
+
 /// One thread's part of the pass.
 pub(crate) struct Worker<'a> {
     pass: &'a Pass<'a>,
@@ -84,8 +88,11 @@ impl<'a> Worker<'a> {
         // Identity, if nothing was left out: then the rows of a slice are consecutive.
         let selection = std::mem::take(&mut self.selection);
         let mut outcome = Ok(());
-        for start in (0..kept).step_by(SLICE_POINTS) {
-            let range = start..(start + SLICE_POINTS).min(kept);
+        let mut start = 0;
+        while start < kept {
+            let is_scattered = self.grouping.groups.len() * MIN_POINTS_PER_SEGMENT > self.grouping.order.len();
+            let range = start..if is_scattered { kept } else { (start + SLICE_POINTS).min(kept) };
+            start = range.end;
             let rows = if filtered { Rows::Selected(&selection[range]) } else { Rows::Consecutive(range) };
             outcome = self.take_slice(source, batch, &rows);
             if outcome.is_err() {
