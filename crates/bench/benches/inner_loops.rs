@@ -1,4 +1,4 @@
-//! The loops in which the time goes, one thread each: reading, encoding; to come: Morton sort, sampling.
+//! The loops in which the time goes, one thread each: reading, Morton sort, sampling, encoding.
 //!
 //! Data: the generated aerial scene of this crate. What the numbers do not show: disks (the files are in the page
 //! cache), page faults of a whole run, and how the parts share memory bandwidth. Compare with another run on the same
@@ -9,6 +9,8 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pointmill_bench::las_file;
 use pointmill_bench::scene::{Random, Scene};
+use pointmill_converter::Sampling;
+use pointmill_converter::bench_api::{Chunk, Sample};
 use pointmill_format::potree2::{BrotliScratch, encode_brotli};
 use pointmill_format::{Attribute, AttributeType, Scratch, Wanted, las};
 
@@ -52,27 +54,48 @@ fn positions_of(batch: &pointmill_format::PointBatch) -> usize {
     batch.positions.len()
 }
 
-/// One node's records under BROTLI; 2 is pointmill's default quality, 6 what PotreeConverter uses.
+/// One node's records under BROTLI; 5 is pointmill's default quality, 6 what PotreeConverter uses.
 fn brotli_encode(c: &mut Criterion) {
     const POINTS: u64 = 10_000;
     let attributes = attributes();
     let records = node_records(POINTS);
     let mut group = c.benchmark_group("brotli_encode");
     group.throughput(Throughput::Elements(POINTS));
-    for quality in [1, 2, 4, 6] {
+    for quality in [1, 2, 4, 5, 6] {
         let (mut scratch, mut out) = (BrotliScratch::default(), Vec::new());
         group.bench_function(format!("quality_{quality}"), |b| {
-            b.iter(|| encode_brotli(&attributes, black_box(&records), quality, &mut scratch, &mut out).expect("valid"));
+            b.iter(|| {
+                out.clear();
+                encode_brotli(&attributes, black_box(&records), quality, &mut scratch, &mut out).expect("valid");
+            });
         });
         eprintln!("brotli_encode/quality_{quality}: {:.2} bytes/point", out.len() as f64 / POINTS as f64);
     }
     group.finish();
 }
 
-// Morton sort goes here, as `morton_sort`: keys of the scene's points in acquisition order, sorted with their indices.
-// Sampling goes here, as `sampling`: eight children's points to one inner node, for poisson, grid and random.
-// Encoding DEFAULT goes here, as `default_encode`: columns gathered into interleaved records, in the order of a node.
-// All three wait for entry points in the converter, which owns these loops.
+/// A chunk of the scene in acquisition order: its Morton sort, the sample of an inner node above all of it, and its
+/// records gathered into DEFAULT payloads.
+fn chunk(c: &mut Criterion) {
+    const POINTS: u64 = 40_000;
+    let mut attributes = attributes();
+    attributes.remove(0); // the position
+    let mut chunk = Chunk::new(node_records(POINTS), attributes).expect("a scene has points");
+    let points = chunk.sort();
+    let candidates = chunk.trees();
+    let mut group = c.benchmark_group("chunk");
+    group.throughput(Throughput::Elements(points as u64));
+    group.bench_function("morton_sort", |b| b.iter(|| chunk.sort()));
+    let kinds = [("poisson", Sampling::Poisson), ("grid", Sampling::Grid), ("random", Sampling::Random { seed: 0 })];
+    for (name, sampling) in kinds {
+        let mut sample = Sample::new(sampling);
+        group.bench_function(format!("sample_{name}"), |b| b.iter(|| sample.choose(0, black_box(&candidates))));
+        eprintln!("chunk/sample_{name}: {} of {points} taken", sample.choose(0, &candidates));
+    }
+    let mut out = Vec::new();
+    group.bench_function("encode_default", |b| b.iter(|| chunk.encode_default(&mut out)));
+    group.finish();
+}
 
 /// Point format 3 as pointmill lays it out in a node, 35 bytes.
 fn attributes() -> Vec<Attribute> {
@@ -119,5 +142,5 @@ fn node_records(points: u64) -> Vec<u8> {
     out
 }
 
-criterion_group! { name = benches; config = Criterion::default().sample_size(20); targets = las_parse, brotli_encode }
+criterion_group! { name = benches; config = Criterion::default().sample_size(20); targets = las_parse, chunk, brotli_encode }
 criterion_main!(benches);

@@ -12,6 +12,8 @@
 //! The bytes depend on the points and the settings alone: not on threads, memory, chunks or the order of the inputs.
 
 mod axis;
+#[doc(hidden)]
+pub mod bench_api;
 mod budget;
 mod build;
 mod checksum;

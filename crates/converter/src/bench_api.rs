@@ -1,0 +1,76 @@
+//! The inner loops, for `crates/bench` alone: no promise is made about these.
+
+use pointmill_format::{Attribute, Lattice, NodeKey};
+
+use crate::build::sort::{Point, SortScratch, sort};
+use crate::checksum::Checksum;
+use crate::grid::{Cube, LatticeBounds};
+use crate::plan::{Encoding, Sampling};
+use crate::records::{OutputLayout, RecordFrame, position};
+use crate::sample::Sampler;
+use crate::schema::Schema;
+use crate::write::payload::PayloadWriter;
+
+/// The records of a chunk, as the converter holds them while it builds the chunk.
+pub struct Chunk {
+    frame: RecordFrame,
+    records: Vec<u8>,
+    points: Vec<Point>,
+    scratch: SortScratch,
+    writer: PayloadWriter,
+}
+
+impl Chunk {
+    /// `records`: three `i32` of position, then `attributes`, packed. `None` if there are none.
+    pub fn new(records: Vec<u8>, attributes: Vec<Attribute>) -> Option<Self> {
+        let schema = Schema::new(attributes);
+        let mut bounds = LatticeBounds::EMPTY;
+        for record in records.chunks_exact(schema.stride) {
+            let q = position(record).map(i64::from);
+            bounds.union(&LatticeBounds { min: q, max: q });
+        }
+        let lattice = Lattice { scale: [0.01; 3], offset: [0.0; 3] };
+        let cube = Cube::around(&bounds, &lattice).ok().filter(|_| !bounds.is_empty())?;
+        let frame = RecordFrame { stride: schema.stride, cube, base: [0; 3] };
+        let kept: Vec<usize> = (0..schema.attributes.len()).collect();
+        let writer = PayloadWriter::new(OutputLayout::new(&schema, &kept, &frame), Encoding::Default);
+        Some(Self { frame, records, points: Vec::new(), scratch: SortScratch::default(), writer })
+    }
+
+    /// Morton order of all records; returns their number.
+    pub fn sort(&mut self) -> usize {
+        sort(&self.records, &self.frame, 0, &mut self.scratch, &mut self.points);
+        self.points.len()
+    }
+
+    /// Tree coordinates in the order of the last sort.
+    pub fn trees(&self) -> Vec<[u32; 3]> {
+        self.points.iter().map(|p| p.t).collect()
+    }
+
+    /// The DEFAULT payload of all records, in the order of the last sort, checksum included; returns its bytes.
+    pub fn encode_default(&mut self, out: &mut Vec<u8>) -> usize {
+        out.clear();
+        let (records, stride) = (&self.records, self.frame.stride);
+        let ordered = self.points.iter().map(|p| &records[p.record as usize * stride..][..stride]);
+        let written = self.writer.write(NodeKey::ROOT, ordered, out, &mut Checksum::default());
+        written.map_or(0, |entry| entry.byte_size as usize)
+    }
+}
+
+/// Chooses from candidates in Morton order, as an inner node of `level` does.
+pub struct Sample(Sampler);
+
+impl Sample {
+    /// A sampler of that kind.
+    pub fn new(sampling: Sampling) -> Self {
+        Self(Sampler::new(sampling))
+    }
+
+    /// The number of candidates that the node takes.
+    pub fn choose(&mut self, level: u8, candidates: &[[u32; 3]]) -> usize {
+        self.0.begin();
+        self.0.offer(candidates.iter().copied());
+        self.0.choose(NodeKey { level, ..NodeKey::ROOT }).iter().filter(|taken| **taken).count()
+    }
+}
