@@ -2,7 +2,7 @@
 //!
 //! Every position becomes integers on the job lattice once, and stays so. The octree works in *tree coordinates*: 31-bit
 //! fractions of the root cube, equal steps on all axes, so that the cell at level `l` is `t >> (31 - l)`, spacing is a
-//! power of two, and octants, distances and Morton order are exact.
+//! power of two, and octants and Morton order are exact.
 
 use pointmill_format::{Lattice, NodeKey};
 
