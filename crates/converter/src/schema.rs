@@ -141,6 +141,8 @@ mod tests {
             points_declared: 0,
             bounds_declared: None,
             lattice: None,
+            resolution: Default::default(),
+            parts: vec![],
             attributes,
             crs: Crs::default(),
             file_bytes: 0,
