@@ -4,7 +4,7 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
-use pointmill_format::Aabb;
+use pointmill_format::{Aabb, OpenOptions};
 
 use crate::quantities::{parse_bounds, parse_bytes};
 
@@ -31,12 +31,55 @@ pub(crate) enum Command {
 /// Where points come from.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct InputArgs {
-    /// Scans (LAS, LAZ): files, folders (searched recursively) or globs
+    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF): files, folders (searched recursively) or globs
     #[arg(value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// Reads more inputs from LIST, one a line; empty lines and lines that begin with # are skipped
     #[arg(long, value_name = "LIST")]
     pub(crate) files_from: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+}
+
+/// What files do not say of themselves.
+#[derive(Debug, Default, ClapArgs)]
+pub(crate) struct ReadingArgs {
+    /// Columns of text scans in file order, as in x,y,z,r,g,b,i: x y z, r g b, i (intensity), c (classification), nx ny
+    /// nz; - leaves one out, any other name makes an attribute, its type after a colon [default: found out]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "How scans are read"
+    )]
+    pub(crate) columns: Option<Vec<String>>,
+    /// What stands between the fields of text scans: one character, or tab, space, comma, semicolon [default: found out]
+    #[arg(long, value_name = "CHAR", value_parser = parse_separator, help_heading = "How scans are read")]
+    pub(crate) separator: Option<char>,
+    /// Keeps rowIndex and columnIndex of E57 scans as attributes
+    #[arg(long, help_heading = "How scans are read")]
+    pub(crate) row_column: bool,
+}
+
+impl ReadingArgs {
+    /// For the readers.
+    pub(crate) fn options(&self) -> OpenOptions {
+        OpenOptions { columns: self.columns.clone(), separator: self.separator, keep_row_column: self.row_column }
+    }
+}
+
+fn parse_separator(text: &str) -> Result<char, String> {
+    match text {
+        "tab" | "\\t" => Ok('\t'),
+        "space" | "blank" => Ok(' '),
+        "comma" => Ok(','),
+        "semicolon" => Ok(';'),
+        _ => {
+            let mut chars = text.chars();
+            chars.next().filter(|_| chars.next().is_none()).ok_or_else(|| "one character is expected".to_owned())
+        }
+    }
 }
 
 #[derive(Debug, ClapArgs)]
@@ -152,6 +195,8 @@ pub(crate) struct ValidateArgs {
     /// Proves that every point of these scans is in the dataset exactly once: files, folders or globs
     #[arg(long, value_name = "INPUT", num_args = 1..)]
     pub(crate) against: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     /// Leaves out spacing, coverage and quality figures, which take most of the time
     #[arg(long)]
     pub(crate) fast: bool,
@@ -173,6 +218,8 @@ pub(crate) struct InfoArgs {
     /// Decodes every point: counts them and measures bounds and the range of each attribute
     #[arg(long)]
     pub(crate) deep: bool,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     /// Prints one JSON array on standard output, an object for each scan or dataset
     #[arg(long)]
     pub(crate) json: bool,

@@ -15,7 +15,7 @@ use crate::chunks::{self, Chunk};
 use crate::describe::{Description, HIERARCHY_STEP, choose_attributes, resolve_crs};
 use crate::error::ConvertError;
 use crate::events::{Events, Phase};
-use crate::gather::{Gathered, Outcome, Stats, gather};
+use crate::gather::{Gathered, Outcome, Stats, gather, outliers};
 use crate::grid::{Cube, LatticeBounds};
 use crate::job::Job;
 use crate::plan::Plan;
@@ -49,6 +49,11 @@ pub fn convert(plan: &Plan, events: &dyn Events) -> Result<Report, ConvertError>
 
     let mut gathered = read(plan, &mut job, &budget, &temp_dir, &pool, events, &mut clock)?;
 
+    if let Some(outliers) = outliers::find(&gathered, &job) {
+        let line = outliers.line(job.is_held_back());
+        events.warning(&line);
+        job.warnings.push(line);
+    }
     clock.phase(Phase::Build, gathered.stats.points);
     let description = Description::new(plan, &job, &gathered.stats, &gathered.cube)?;
     let frame = RecordFrame { stride: job.schema.stride, cube: gathered.cube, base: gathered.base };
@@ -139,13 +144,16 @@ fn read(
                 events.warning(line);
                 hint = Some(bounds);
                 if let Err(too_fine) = Cube::around(&bounds, &job.lattice) {
+                    let fine = job.lattice;
                     job.coarsen(too_fine.coarser_by);
                     let line = format!("coordinate step {:?}: {}", job.lattice.scale, job.lattice_reason);
                     events.warning(&line);
                     job.warnings.push(line);
-                    let rescale = |v: i64| v >> too_fine.coarser_by;
-                    hint =
-                        Some(LatticeBounds { min: bounds.min.map(rescale), max: bounds.max.map(|v| rescale(v) + 1) });
+                    let [min, max] = [bounds.min, bounds.max].map(|q| {
+                        let world = fine.world(q);
+                        [0, 1, 2].map(|a| job.lattice.quantize(a, world[a]))
+                    });
+                    hint = Some(LatticeBounds { min: min.map(|v| v - 1), max: max.map(|v| v + 1) });
                 }
             }
         }

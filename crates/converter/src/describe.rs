@@ -259,7 +259,7 @@ pub(crate) fn resolve_crs(plan: &Plan, job: &Job, warnings: &mut Vec<String>) ->
 pub(crate) fn grid_report(job: &Job, cube: &Cube) -> GridReport {
     let mut why = job.lattice_reason.clone();
     if !job.is_lossless() {
-        why.push_str("; some inputs do not lie on it, their coordinates are rounded");
+        why.push_str("; coordinates that do not lie on it are rounded");
     }
     GridReport { scale: job.lattice.scale, offset: cube.offset(&job.lattice), cube_side: cube.side, why }
 }

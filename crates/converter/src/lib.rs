@@ -28,6 +28,7 @@ mod file_at;
 mod gather;
 mod grid;
 mod job;
+mod lattice;
 pub mod memory;
 mod morton;
 mod os_hints;

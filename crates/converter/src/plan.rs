@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
-use pointmill_format::Aabb;
+use pointmill_format::{Aabb, OpenOptions};
 
 /// The settings of a conversion. `Plan::new` gives the defaults of the command line.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Scans to read, files only (folders and globs are already expanded), any order.
     pub inputs: Vec<PathBuf>,
+    /// What text and E57 files do not say of themselves.
+    pub open: OpenOptions,
     /// The folder to make.
     pub output: PathBuf,
     /// Name of the cloud in the metadata.
@@ -136,6 +138,7 @@ impl Plan {
     pub fn new(inputs: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             inputs,
+            open: OpenOptions::default(),
             output,
             name: String::new(),
             sampling: Sampling::Poisson,

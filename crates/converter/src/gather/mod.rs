@@ -3,6 +3,7 @@
 
 mod batch;
 mod columns;
+pub(crate) mod outliers;
 mod partition;
 mod stats;
 mod store;
