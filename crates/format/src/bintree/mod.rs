@@ -23,13 +23,22 @@
 
 mod encode;
 mod header;
+mod json;
+mod leaf_points;
 mod node;
 mod preorder;
+mod read_header;
+mod read_index;
 mod record_layout;
+mod source;
+mod tree;
 mod write_index;
 
 pub use encode::{LeafEncoder, class_value, leaf_center};
 pub use header::{Header, Layout, SplitRule};
+pub use leaf_points::LeafPoints;
 pub use node::{INDEX_FILE, MAX_DEPTH, Node, NodeKind, PACKED_FILE, leaf_file_name};
 pub use record_layout::{CORE_BYTES, PlacedAttribute, RecordLayout};
+pub use source::{ByteSource, Folder, Memory};
+pub use tree::Bintree;
 pub use write_index::IndexWriter;

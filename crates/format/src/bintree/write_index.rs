@@ -68,12 +68,8 @@ impl<W: Write> IndexWriter<W> {
         write!(self.out, "{start}{{\"min\":{min},\"max\":{max},\"count\":{}", node.count)?;
         match node.kind {
             NodeKind::Inner { axis, split, high } => {
-                write!(
-                    self.out,
-                    ",\"axis\":{axis},\"split\":{},\"children\":[{},{high}]",
-                    numbers(&[split]).trim_matches(['[', ']']),
-                    index + 1
-                )
+                let split = Value::from(split);
+                write!(self.out, ",\"axis\":{axis},\"split\":{split},\"children\":[{},{high}]", index + 1)
             }
             NodeKind::Degenerate { high } => {
                 write!(self.out, ",\"axis\":-1,\"degenerate\":true,\"children\":[{},{high}]", index + 1)
