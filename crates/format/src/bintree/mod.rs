@@ -21,12 +21,16 @@
 //! write a dataset: [`RecordLayout`] places the columns, [`LeafEncoder`] makes the bytes of leaves, [`IndexWriter`]
 //! writes `index.json` node by node.
 
+mod camera;
 mod encode;
 mod header;
 mod json;
+mod leaf_cache;
 mod leaf_points;
 mod node;
+mod pick;
 mod preorder;
+mod query;
 mod read_header;
 mod read_index;
 mod record_layout;
@@ -34,10 +38,12 @@ mod source;
 mod tree;
 mod write_index;
 
+pub use camera::{Frustum, Material, distance_range, switch_distance};
 pub use encode::{LeafEncoder, class_value, leaf_center};
 pub use header::{Header, Layout, SplitRule};
 pub use leaf_points::LeafPoints;
 pub use node::{INDEX_FILE, MAX_DEPTH, Node, NodeKind, PACKED_FILE, leaf_file_name};
+pub use pick::{Hit, Picker, Ray};
 pub use record_layout::{CORE_BYTES, PlacedAttribute, RecordLayout};
 pub use source::{ByteSource, Folder, Memory};
 pub use tree::Bintree;
