@@ -117,20 +117,25 @@ impl NearestPoints {
                     let point = (block * BLOCK_POINTS + i) as u32;
                     let neighbour = Neighbour { position, class, leaf: leaf.leaf, point, distance2 };
                     // Not a number is near nothing.
-                    if !(distance2 <= limit2) {
-                        continue;
-                    }
-                    if found.len() < count {
-                        found.push(neighbour);
-                    } else if found.peek().is_some_and(|farthest| neighbour < *farthest) {
-                        found.pop();
-                        found.push(neighbour);
+                    if distance2 <= limit2 {
+                        keep(&mut found, neighbour, count);
                     }
                 }
             }
         }
         Ok(found.into_sorted_vec())
     }
+}
+
+/// Adds `neighbour` if it is among the nearest `count`.
+fn keep(found: &mut BinaryHeap<Neighbour>, neighbour: Neighbour, count: usize) {
+    if found.len() == count {
+        if found.peek().is_none_or(|farthest| *farthest <= neighbour) {
+            return;
+        }
+        found.pop();
+    }
+    found.push(neighbour);
 }
 
 /// The squared distance beyond which nothing is wanted any more.

@@ -78,6 +78,8 @@ fn node_faults_are_told_by_number_and_byte() {
         ("\"min\":[997.0,", "\"min\":[", "expected ','"),
         ("\"axis\":0", "\"axis\":3", "axis has to be"),
         ("\"axis\":0", "\"axis\":-1", "node 0 has axis -1, but is not degenerate"),
+        ("\"axis\":-1", "\"axis\":1", "node 11 is degenerate, but has an axis"),
+        ("\"degenerate\":true", "\"degenerate\":false", "node 11 has axis -1, but is not degenerate"),
         ("\"split\":1002.346,", "", "node 0 has no split"),
         ("\"file\":\"n00.bin\"", "\"file\":\"../n00.bin\"", "its place in the tree has the name n00.bin"),
         ("\"file\":\"n00.bin\"", "\"file\":\"/etc/passwd\"", "is in the file \"/etc/passwd\""),
