@@ -32,7 +32,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
                 Ok(found) => {
                     found.notes.iter().for_each(|note| tell(note));
                     for file in &found.files {
-                        let (told, fault) = match scan(file, args.deep) {
+                        let (told, fault) = match scan(file, args) {
                             Ok((told, fault)) => (Ok(told), fault),
                             Err(failure) => (Err(failure), None),
                         };
@@ -73,9 +73,9 @@ fn dataset_folder(path: &Path) -> Option<PathBuf> {
     is_metadata.then(|| path.parent().map(Path::to_path_buf)).flatten()
 }
 
-fn scan(file: &Path, deep: bool) -> Result<(Told, Option<Failure>), Failure> {
-    let scan = pointmill_format::las::open(file)?;
-    let (measured, fault) = match deep.then(|| measure(&*scan)) {
+fn scan(file: &Path, args: &InfoArgs) -> Result<(Told, Option<Failure>), Failure> {
+    let scan = pointmill_format::open_scan(file, &args.reading.options())?;
+    let (measured, fault) = match args.deep.then(|| measure(&*scan)) {
         Some((measured, fault)) => (Some(measured), fault.map(Failure::from)),
         None => (None, None),
     };

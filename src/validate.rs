@@ -14,7 +14,7 @@ use crate::text;
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
     require_dataset(&args.dataset)?;
-    let mut options = Options { neighbourhoods: !args.fast, ..Options::default() };
+    let mut options = Options { neighbourhoods: !args.fast, open: args.reading.options(), ..Options::default() };
     if !args.against.is_empty() {
         let found = inputs::expand(&args.against)?;
         if !args.talk.quiet {

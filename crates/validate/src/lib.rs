@@ -22,7 +22,8 @@
 //! * Boxes and the tight box: 4 ulps of the cube's largest coordinate on the axis; everything else about positions is
 //!   exact, on integers.
 //! * Distances (spacing, coverage): one step of the lattice.
-//! * Sides of the cube against each other, spacing against side / 128: 10⁻⁹, relative.
+//! * Sides of the cube against each other: 10⁻⁹, relative, and two ulps of its largest coordinate; spacing against
+//!   side / 128: 10⁻⁹, relative.
 //! * Attributes, counts, byte ranges, checksums: none.
 //!
 //! # Memory
@@ -44,7 +45,7 @@ mod walk;
 use std::path::{Path, PathBuf};
 
 use pointmill_format::potree2::{ByteSource, Dataset, DatasetFile, Encoding, Folder};
-use pointmill_format::{ErrorKind, ReadError};
+use pointmill_format::{ErrorKind, OpenOptions, ReadError};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -64,6 +65,8 @@ use walk::{Task, Walked, walk};
 pub struct Options {
     /// The scans that the dataset was made from, files only; empty: no comparison.
     pub against: Vec<PathBuf>,
+    /// What text and E57 files do not say of themselves; as they were opened for the conversion.
+    pub open: OpenOptions,
     /// Worker threads; 0: one for each core.
     pub threads: usize,
     /// What caches and the search for differing records may use, bytes. A guide, not a ceiling for the process.
@@ -76,7 +79,14 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { against: Vec::new(), threads: 0, memory_bytes: 512 << 20, max_problems: 20, neighbourhoods: true }
+        Self {
+            against: Vec::new(),
+            open: OpenOptions::default(),
+            threads: 0,
+            memory_bytes: 512 << 20,
+            max_problems: 20,
+            neighbourhoods: true,
+        }
     }
 }
 
@@ -149,7 +159,7 @@ fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Ou
     let geometry = Geometry { lattice: metadata.lattice, cube: metadata.cube, spacing: metadata.spacing };
     let against = match options.against.as_slice() {
         [] => None,
-        paths => Some(Against::open(paths, metadata)?),
+        paths => Some(Against::open(paths, &options.open, metadata)?),
     };
 
     let mut tree = tree::walk(&source, metadata.first_chunk_size, &findings)?;

@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use pointmill_format::ReadError;
 use pointmill_format::potree2::{Dataset, Metadata, NodePoints};
+use pointmill_format::{OpenOptions, ReadError};
 use serde::Serialize;
 
 use crate::ProgressFn;
@@ -179,9 +179,9 @@ impl Against {
     ///
     /// # Errors
     /// A file that cannot be opened or is not a scan.
-    pub(crate) fn open(paths: &[PathBuf], metadata: &Metadata) -> Result<Self, ReadError> {
+    pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, metadata: &Metadata) -> Result<Self, ReadError> {
         let rules = Rules::new(metadata);
-        let sources = Sources::open(paths, &rules)?;
+        let sources = Sources::open(paths, options, &rules)?;
         Ok(Self { sources, sums: Sums { rules, total: Mutex::default(), blocks: Mutex::default() } })
     }
 

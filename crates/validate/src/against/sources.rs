@@ -4,7 +4,10 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-use pointmill_format::{Column, PointBatch, Positions, ReadError, Scan, Scratch, Wanted, las, with_column};
+use pointmill_format::{
+    Attribute, AttributeType, Column, OpenOptions, PointBatch, Positions, ReadError, Scan, Scratch, Wanted, open_scan,
+    with_column,
+};
 use rayon::prelude::*;
 
 use super::block::{BLOCK_POINTS, Block, append_words};
@@ -34,8 +37,9 @@ pub(crate) struct Sources {
 
 impl Sources {
     /// Opens the files; decodes nothing.
-    pub(crate) fn open(paths: &[PathBuf], rules: &Rules) -> Result<Self, ReadError> {
-        let list = paths.iter().map(|p| Ok(Source::new(las::open(p)?, rules))).collect::<Result<Vec<_>, _>>()?;
+    pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, rules: &Rules) -> Result<Self, ReadError> {
+        let list =
+            paths.iter().map(|p| Ok(Source::new(open_scan(p, options)?, rules))).collect::<Result<Vec<_>, _>>()?;
         let pieces = list.iter().enumerate();
         let pieces = pieces.flat_map(|(i, s)| (0..s.scan.pieces().len()).map(move |piece| (i, piece))).collect();
         let points = list.iter().flat_map(|s| s.scan.pieces()).map(|p| p.points).sum();
@@ -114,8 +118,7 @@ impl Source {
     fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
         let info = scan.info();
         let find = |name: &str| info.attributes.iter().position(|a| a.name == name);
-        let columns =
-            rules.attributes.iter().map(|a| find(&a.name).map(|i| (i, info.attributes[i].elements))).collect();
+        let columns = rules.attributes.iter().map(|a| column_of(a, &info.attributes, rules.foreign)).collect();
         let classification = rules.classes.is_some().then(|| find("classification")).flatten();
         let constants: Vec<_> =
             rules.constants.iter().filter_map(|(name, value)| Some((find(name)?, value.clone()))).collect();
@@ -154,8 +157,8 @@ impl Source {
             let column = self.classification.map(|i| &batch.columns[i]);
             for (i, keep) in block.keep.iter_mut().enumerate() {
                 // a scan without classes has never been classified: class 0
-                let class = column.map_or(0, |c| with_column!(c, v => v.get(start + i).map_or(0, |v| *v as u8)));
-                *keep &= classes.contains(&class);
+                let class = column.map_or(0.0, |c| with_column!(c, v => v.get(start + i).map_or(0.0, |v| *v as f64)));
+                *keep &= classes.iter().any(|c| f64::from(*c) == class);
             }
         }
         for ((column, value), deviating) in self.constants.iter().zip(&self.deviating) {
@@ -197,6 +200,32 @@ impl Source {
             }
         }
     }
+}
+
+/// The column of a scan, and its elements, that an attribute of the dataset was filled from.
+///
+/// Scans that mean different things by one name (another type, another scale) have attributes of their own; those after
+/// the first are called "name (2)", "name (3)", …. Wide integers are stored as doubles.
+fn column_of(stored: &Attribute, columns: &[Attribute], foreign: bool) -> Option<(usize, usize)> {
+    let named = |c: &&Attribute| {
+        let suffix = stored.name.strip_prefix(&*c.name);
+        let is_number = |n: &str| n.parse::<u32>().is_ok_and(|n| n >= 2);
+        suffix.is_some_and(|s| {
+            s.is_empty() || s.strip_prefix(" (").and_then(|s| s.strip_suffix(')')).is_some_and(is_number)
+        })
+    };
+    let same = |c: &&Attribute| {
+        let ty = match c.ty {
+            AttributeType::Int64 | AttributeType::UInt64 => AttributeType::Float64,
+            other => other,
+        };
+        // other converters do as they like with types
+        foreign
+            || ty == stored.ty && c.elements == stored.elements && c.scale == stored.scale && c.offset == stored.offset
+    };
+    let exact = columns.iter().position(|c| c.name == stored.name && same(&c));
+    let found = exact.or_else(|| columns.iter().position(|c| named(&c) && same(&c)));
+    found.map(|i| (i, columns[i].elements))
 }
 
 #[allow(clippy::unnecessary_cast)] // one body for every type of column

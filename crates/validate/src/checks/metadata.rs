@@ -48,7 +48,10 @@ fn geometry(root: &Value, judge: &Judge) {
     let corners = vector(&root["boundingBox"]["min"]).zip(vector(&root["boundingBox"]["max"]));
     let sides = corners.map(|(min, max)| [0, 1, 2].map(|a| max[a] - min[a]));
     let side = sides.map_or(f64::NAN, |s| s[0]);
-    let cubic = sides.is_some_and(|s| side > 0.0 && s.iter().all(|v| (v - side).abs() <= RELATIVE * side));
+    // Far from 0 the corners themselves are rounded: by half an ulp each.
+    let farthest = corners.map_or(0.0, |(min, max)| min.iter().chain(&max).fold(0.0f64, |far, v| far.max(v.abs())));
+    let tolerance = RELATIVE * side + 2.0 * f64::EPSILON * farthest;
+    let cubic = sides.is_some_and(|s| side > 0.0 && s.iter().all(|v| (v - side).abs() <= tolerance));
     judge.that(cubic, "boundingBox", "a cube with sides above 0", &root["boundingBox"]);
     if let (Some((min, max)), Some(offset), Some(scale)) = (corners, offset, scale) {
         judge.that(offset == min, "offset", &format!("boundingBox.min {min:?}"), &root["offset"]);
