@@ -57,7 +57,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
 fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
     let mut plan = Plan::new(inputs.files, args.output.clone());
-    plan.open = args.inputs.options();
+    plan.open = args.inputs.options()?;
     plan.name = name;
     plan.sampling = match (args.sampling, args.seed) {
         (SamplingArg::Random, seed) => Sampling::Random { seed: seed.unwrap_or(0) },

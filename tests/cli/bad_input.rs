@@ -42,9 +42,11 @@ fn a_folder_without_scans_says_what_is_there_instead() {
 fn a_file_that_was_named_and_is_no_scan_is_not_supported() {
     let dir = Dir::new();
     dir.write("notes.txt", b"hello");
-    dir.run(["convert", "notes.txt", "-o", "out"]).failed_with(4, &["notes.txt", "LAS"]);
+    let supported = ["notes.txt", "LAS, LAZ", "E57", "PLY", "PCD", "XYZ"];
+    dir.run(["convert", "notes.txt", "-o", "out"]).failed_with(4, &supported);
+    dir.run(["info", "notes.txt"]).failed_with(4, &supported);
     dir.write("cube.ply", b"ply\nformat ascii 1.0\n");
-    dir.run(["convert", "cube.ply", "-o", "out"]).failed_with(4, &["cube.ply", "PLY"]);
+    dir.run(["convert", "cube.ply", "-o", "out"]).failed_with(3, &["cube.ply", "end_header", "byte 21"]);
 }
 
 #[test]

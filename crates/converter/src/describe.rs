@@ -26,6 +26,8 @@ pub(crate) struct Description {
     /// Byte offset of the classification in a stored record, if it is one byte.
     pub(crate) class: Option<usize>,
     dropped: Vec<DroppedAttribute>,
+    /// Attributes that were dropped because all points agree, and on what.
+    constants: Vec<(String, Vec<f64>)>,
     /// Ranges of the output, by index of the schema.
     ranges: Vec<Range>,
     crs: ResolvedCrs,
@@ -67,11 +69,15 @@ impl Description {
             warnings.extend(mixed_depths(job, stats, &depths, rgb));
         }
         let (kept, dropped) = choose_attributes(&plan.attributes, job, &ranges)?;
+        let constants = match plan.attributes {
+            AttributeChoice::Scene => constants(job, &ranges),
+            AttributeChoice::All | AttributeChoice::List(_) => Vec::new(),
+        };
         let crs = resolve_crs(plan, job, &mut warnings)?;
         let grid = grid_report(job, cube);
         let class = job.schema.find("classification");
         let class = class.filter(|&i| job.schema.attributes[i].size() == 1).map(|i| job.schema.offsets[i]);
-        Ok(Self { kept, widen_rgb, class, dropped, ranges, crs, grid, warnings })
+        Ok(Self { kept, widen_rgb, class, dropped, constants, ranges, crs, grid, warnings })
     }
 
     pub(crate) fn metadata(
@@ -144,9 +150,10 @@ impl Description {
         if let Some(wkt) = &self.crs.wkt {
             own.insert("wkt".into(), wkt.clone().into());
         }
-        if !self.dropped.is_empty() {
-            let dropped = self.dropped.iter().map(|d| (d.name.clone(), d.why.clone().into()));
-            own.insert("attributesDropped".into(), Map::from_iter(dropped).into());
+        // Those that were not asked for are no matter of the dataset: which there were depends on the kind of the scans.
+        let constants: Map<_, _> = self.constants.iter().map(|(name, values)| (name.clone(), json!(values))).collect();
+        if !constants.is_empty() {
+            own.insert("attributesDropped".into(), constants.into());
         }
         own.into()
     }
@@ -305,6 +312,12 @@ pub(crate) fn choose_attributes(
             Ok((kept, dropped))
         }
     }
+}
+
+/// Names and values of the attributes that all points agree on.
+fn constants(job: &Job, ranges: &[Range]) -> Vec<(String, Vec<f64>)> {
+    let attributes = job.schema.attributes.iter().zip(ranges);
+    attributes.filter_map(|(a, range)| Some((a.name.clone(), range.constant()?.to_vec()))).collect()
 }
 
 fn mixed_depths(job: &Job, stats: &Stats, eight: &[bool], rgb: usize) -> Option<String> {
