@@ -58,7 +58,7 @@ pub(crate) fn expand(typed: &[PathBuf], options: &OpenOptions) -> Result<Inputs,
     if typed.is_empty() {
         return Err(Failure::Usage("no input: name scans, folders or globs, or pass --files-from LIST".to_owned()));
     }
-    let mut search = Search { has_columns: options.columns.is_some(), ..Search::default() };
+    let mut search = Search { options: options.clone(), ..Search::default() };
     for path in typed {
         search.add_typed(path)?;
     }
@@ -71,8 +71,7 @@ struct Search {
     found: BTreeMap<PathBuf, PathBuf>,
     repeated: Vec<PathBuf>,
     no_scans: Vec<PathBuf>,
-    /// Columns of text were named.
-    has_columns: bool,
+    options: OpenOptions,
 }
 
 impl Search {
@@ -87,15 +86,11 @@ impl Search {
 
     /// A file that was named must be a scan.
     fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
-        match kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? {
-            Kind::Scan => self.add_scan(path),
-            Kind::NoScan if self.has_columns && path.is_file() => self.add_scan(path),
-            Kind::NoScan => {
-                let supported = supported_scans();
-                let line = format!("{}: this is no scan that is known here; supported are {supported}", path.display());
-                return Err(Failure::Unsupported(line));
-            }
+        if kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? == Kind::NoScan {
+            // the readers say why, unless columns were named that make it one
+            pointmill_format::open_scan(path, &self.options)?;
         }
+        self.add_scan(path);
         Ok(())
     }
 
@@ -321,13 +316,13 @@ mod tests {
     #[test]
     fn a_file_whose_columns_are_named_is_taken_for_text() {
         let dir = folder();
+        fs::write(dir.path().join("flat.dat"), "1 2\n3 4\n").unwrap();
         let named = OpenOptions { columns: Some(vec!["x".into(), "y".into()]), ..OpenOptions::default() };
-        assert_eq!(names(&expand(&[dir.path().join("notes.txt")], &named).unwrap()), ["notes.txt"]);
-        assert_eq!(
-            names(&expand(&[dir.path().join("*.txt")], &named).unwrap()),
-            ["matrix.txt"],
-            "a glob brings others"
-        );
+        let code = |name: &str| expand(&[dir.path().join(name)], &named).map_err(|e| e.code());
+        assert_eq!(names(&code("flat.dat").unwrap()), ["flat.dat"]);
+        assert_eq!(code("notes.txt").unwrap_err(), 3);
+        assert_eq!(names(&expand(&[dir.path().join("*.dat")], &named).unwrap()), ["b.dat"], "a glob brings others");
+        assert_eq!(find(&[dir.path().join("flat.dat")]).unwrap_err().code(), 3, "without columns");
     }
 
     #[test]

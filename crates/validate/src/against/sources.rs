@@ -184,7 +184,8 @@ impl Source {
             if rules.foreign {
                 block.truncated[axis].push(truncated);
             }
-            block.keep[i] &= bounds.0 <= world && world <= bounds.1; // false for NaN
+            // a point without a finite position is none
+            block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
         };
         match (&batch.positions, self.scan.info().lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
