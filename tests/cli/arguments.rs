@@ -92,3 +92,18 @@ fn every_sampling_and_encoding_holds_every_point() {
         dir.validate(&out, &["a.las"]);
     }
 }
+
+#[test]
+fn what_a_scene_drops_as_constant_is_checked_by_the_validator() {
+    let dir = Dir::new();
+    let mut scan = Las::terrain(500, 1).bytes();
+    dir.write("a.las", &scan);
+    dir.succeed(["convert", "a.las", "-q", "-o", "out", "--attributes", "scene"]);
+    let metadata = std::fs::read(dir.path("out/metadata.json")).unwrap();
+    let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
+    assert_eq!(metadata["pointmill"]["attributesDropped"]["user data"], serde_json::json!([7.0]), "{metadata:#}");
+    dir.validate("out", &["a.las"]);
+    scan[227 + 34 * 3 + 17] = 8; // the user data of the fourth point
+    dir.write("a.las", &scan);
+    dir.run(["validate", "out", "--against", "a.las"]).failed_with(7, &["against"]);
+}
