@@ -305,7 +305,7 @@ impl<'a> Json<'a> {
                     }
                     self.advance()?;
                     closing.push(if byte == b'{' { b'}' } else { b']' });
-                    if self.into_next(&mut closing, true)? {
+                    if self.next_in(&mut closing, true)? {
                         continue;
                     }
                 }
@@ -318,7 +318,7 @@ impl<'a> Json<'a> {
                 if closing.is_empty() {
                     return Ok(());
                 }
-                if self.into_next(&mut closing, false)? {
+                if self.next_in(&mut closing, false)? {
                     break;
                 }
             }
@@ -326,7 +326,7 @@ impl<'a> Json<'a> {
     }
 
     /// In the innermost bracket: true if another value comes, whose key was taken; else the bracket was closed.
-    fn into_next(&mut self, closing: &mut Vec<u8>, first: bool) -> Result<bool, Fault> {
+    fn next_in(&mut self, closing: &mut Vec<u8>, first: bool) -> Result<bool, Fault> {
         let Some(&close) = closing.last() else { return Ok(false) };
         let another = match close {
             b'}' => self.key(first)?.is_some(),

@@ -23,10 +23,13 @@
 
 mod camera;
 mod encode;
+mod exercise;
 mod header;
 mod json;
 mod leaf_cache;
 mod leaf_points;
+#[cfg(feature = "rstar")]
+mod nearest;
 mod node;
 mod pick;
 mod preorder;
@@ -40,8 +43,12 @@ mod write_index;
 
 pub use camera::{Frustum, Material, distance_range, switch_distance};
 pub use encode::{LeafEncoder, class_value, leaf_center};
+#[doc(hidden)]
+pub use exercise::exercise;
 pub use header::{Header, Layout, SplitRule};
 pub use leaf_points::LeafPoints;
+#[cfg(feature = "rstar")]
+pub use nearest::{LeafBox, NearestPoints, Neighbour};
 pub use node::{INDEX_FILE, MAX_DEPTH, Node, NodeKind, PACKED_FILE, leaf_file_name};
 pub use pick::{Hit, Picker, Ray};
 pub use record_layout::{CORE_BYTES, PlacedAttribute, RecordLayout};

@@ -10,29 +10,29 @@ use pointmill_format::{Aabb, Lattice};
 
 /// A lattice point; `id` tells everything else of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
-    pub q: [i32; 3],
-    pub id: u32,
+pub(crate) struct Point {
+    pub(crate) q: [i32; 3],
+    pub(crate) id: u32,
 }
 
 /// What a dataset is made with.
-pub struct Builder<'a> {
-    pub header: Header,
+pub(crate) struct Builder<'a> {
+    pub(crate) header: Header,
     /// The class of a point.
-    pub class: &'a dyn Fn(u32) -> f64,
+    pub(crate) class: &'a dyn Fn(u32) -> f64,
     /// Fills the bytes of a record behind the core.
-    pub extras: &'a dyn Fn(u32, &mut [u8]),
+    pub(crate) extras: &'a dyn Fn(u32, &mut [u8]),
 }
 
 /// The nodes in preorder and the bytes of all leaves behind one another.
 #[derive(Default)]
-pub struct Built {
-    pub nodes: Vec<Node>,
-    pub leaves: Vec<u8>,
+pub(crate) struct Built {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) leaves: Vec<u8>,
 }
 
 /// A header for points on `lattice`, the core alone.
-pub fn header(points: u64, capacity: u64, layout: Layout, lattice: Lattice) -> Header {
+pub(crate) fn header(points: u64, capacity: u64, layout: Layout, lattice: Lattice) -> Header {
     Header {
         generator: "a test".into(),
         name: "made".into(),
@@ -50,7 +50,7 @@ pub fn header(points: u64, capacity: u64, layout: Layout, lattice: Lattice) -> H
 
 impl Builder<'_> {
     /// The files of a dataset.
-    pub fn files(&self, points: &mut [Point]) -> Memory {
+    pub(crate) fn files(&self, points: &mut [Point]) -> Memory {
         let built = self.build(points);
         let mut files = Memory::new();
         let stride = self.header.record.stride();
@@ -76,7 +76,7 @@ impl Builder<'_> {
         files
     }
 
-    pub fn build(&self, points: &mut [Point]) -> Built {
+    pub(crate) fn build(&self, points: &mut [Point]) -> Built {
         let mut built = Built::default();
         if !points.is_empty() {
             self.node(points, 0, &mut built);
@@ -185,7 +185,7 @@ impl Builder<'_> {
     }
 }
 
-pub fn box_of(points: &[Point]) -> ([i32; 3], [i32; 3]) {
+pub(crate) fn box_of(points: &[Point]) -> ([i32; 3], [i32; 3]) {
     let fold = |pick: fn(i32, i32) -> i32| {
         points.iter().skip(1).fold(points[0].q, |m, p| [0, 1, 2].map(|a| pick(m[a], p.q[a])))
     };

@@ -4,6 +4,8 @@
 mod build;
 mod golden;
 mod hostile;
+#[cfg(feature = "rstar")]
+mod nearest;
 mod queries;
 mod round_trip;
 mod util;
