@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod against;
+mod bintree;
 mod check;
 mod finding;
 mod format;
@@ -32,10 +33,11 @@ use pointmill_format::{OpenOptions, ReadError};
 use serde::Serialize;
 
 pub use against::AgainstSummary;
+pub use bintree::LeafQuality;
 pub use check::Check;
 pub use finding::{CheckResult, Finding, Severity};
 pub use format::{Format, Located, locate};
-pub use place::Place;
+pub use place::{BinaryNode, Place};
 pub use potree2::LevelQuality;
 
 /// What to check, and with what means.
@@ -102,6 +104,8 @@ pub struct Outcome {
     pub problems: Vec<Finding>,
     /// One entry a level of an octree; empty for other formats.
     pub quality: Vec<LevelQuality>,
+    /// Of a binary tree whose index could be read.
+    pub leaves: Option<LeafQuality>,
     /// The comparison with the sources, if there was one.
     pub against: Option<AgainstSummary>,
 }
@@ -129,7 +133,8 @@ pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) ->
         .map_err(|e| ReadError::io(dataset, "starting threads", std::io::Error::other(e)))?;
     pool.install(|| match format {
         Format::Potree2 => potree2::run(&path, options, progress),
-        Format::Bintree | Format::Batches => {
+        Format::Bintree => bintree::run(&path, options, progress),
+        Format::Batches => {
             Err(ReadError::unsupported(&path, format!("datasets of the format {format} cannot be validated yet")))
         }
     })
