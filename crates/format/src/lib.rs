@@ -1,5 +1,6 @@
 //! Readers and writers of point-cloud formats, for renderers and for preprocessors.
 //!
+//! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
 //! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
@@ -28,6 +29,7 @@ mod rows;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 
+pub mod bintree;
 #[cfg(feature = "e57")]
 pub mod e57;
 #[cfg(feature = "las")]

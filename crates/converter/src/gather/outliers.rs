@@ -102,11 +102,12 @@ fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gather::Moments;
     use pointmill_format::NodeKey;
 
     fn cell(x: u32, points: u64) -> Cell {
         let key = NodeKey { level: 8, x, y: 3, z: 0 };
-        Cell { key, points, segments: vec![], is_one_place: false }
+        Cell { key, points, segments: vec![], is_one_place: false, moments: Moments::default() }
     }
 
     #[test]
