@@ -56,7 +56,7 @@ fn sections_that_leave_the_file_overlap_or_are_not_aligned_are_refused() {
     for (field, name) in
         [(120, "batches"), (128, "hi10"), (136, "mid10"), (144, "lo10"), (152, "colour"), (160, "originals")]
     {
-        for offset in [u64::MAX & !255, 1 << 40, 4096] {
+        for offset in [!255u64, 1 << 40, 4096] {
             assert_fault(&patched(field, &offset.to_le_bytes()), name);
         }
         for offset in [1, 257, 513] {
@@ -81,7 +81,7 @@ fn sections_that_leave_the_file_overlap_or_are_not_aligned_are_refused() {
 #[test]
 fn batch_tables_that_contradict_the_header_are_refused_with_the_batch() {
     for (at, field, part) in [
-        (256 + 12, 1u32, "6 points from 1, not 6 points from 0"),
+        (256 + 12, 1u32, "6 points from 1, not 6 from 0"),
         (256 + 28, 5, "5 points from 0, not 6"),
         (256 + 28, u32::MAX, "4294967295 points"),
         (256, f32::NAN.to_bits(), "inverted, below the origin or not finite"),
