@@ -1,6 +1,6 @@
 //! Mean-split binary trees: all points in leaves, tight boxes at every node (`docs/formats/bintree.md`).
 //!
-//! [`Bintree`] opens a dataset from a folder or from any [`ByteSource`] and keeps its nodes in memory, about 120 bytes
+//! [`Bintree`] opens a dataset from a folder or from any [`ByteSource`] and keeps its nodes in memory, about 100 bytes
 //! each; leaves are read one by one into [`LeafPoints`].
 //!
 //! ```no_run

@@ -7,7 +7,7 @@ use pointmill_format::bintree::{
     Bintree, Frustum, Hit, Layout, LeafPoints, Material, Picker, Ray, distance_range, switch_distance,
 };
 
-use crate::util::{FAR, Random, corridor, files_of, open, read_all};
+use crate::util::{FAR, Random, Told, corridor, files_of, open, read_all};
 
 fn cloud(n: usize, capacity: u64, seed: u64) -> Bintree {
     open(&files_of(&mut corridor(n, 400_000.0, seed), capacity, Layout::Packed, FAR)).unwrap()
@@ -46,6 +46,12 @@ fn boxes_tell_the_leaves_that_a_look_at_every_leaf_tells() {
         some += usize::from(!told.is_empty());
     }
     assert!(some > 50, "{some}");
+    for leaf in tree.leaves() {
+        let Aabb { min, max } = tree.nodes()[leaf as usize].bounds;
+        for touching in [Aabb { min: max, max: max.map(|v| v + 1.0) }, Aabb { min: min.map(|v| v - 1.0), max: min }] {
+            assert!(tree.leaves_in_box(&touching).contains(&leaf), "boxes are closed");
+        }
+    }
     let point = all[77].0;
     let mut found = 0;
     tree.points_in_box(&Aabb { min: point, max: point }, &mut scratch, |_, _, _| found += 1).unwrap();
@@ -107,7 +113,7 @@ fn draw_lists_tell_what_every_leaf_by_itself_tells() {
 }
 
 /// The first point that the ray meets, found by a look at all: distance along the ray, leaf and index.
-fn first_met(points: &[([f64; 3], f32, u32, u32)], o: [f64; 3], d: [f64; 3], r: f64, spread: f64) -> Option<f64> {
+fn first_met(points: &[Told], o: [f64; 3], d: [f64; 3], r: f64, spread: f64) -> Option<f64> {
     let length = d.iter().map(|v| v * v).sum::<f64>().sqrt();
     let d = d.map(|v| v / length);
     let along = |p: &[f64; 3]| (0..3).map(|a| (p[a] - o[a]) * d[a]).sum::<f64>();
@@ -155,7 +161,7 @@ fn picking_finds_the_point_that_a_look_at_every_point_finds() {
     assert!(hits > 700 && misses > 300, "{hits} {misses}");
 }
 
-fn check_hit(points: &[([f64; 3], f32, u32, u32)], hit: &Hit) {
+fn check_hit(points: &[Told], hit: &Hit) {
     let told = points.iter().find(|p| (p.2, p.3) == (hit.leaf, hit.point)).unwrap();
     assert_eq!((told.0, told.1), (hit.position, hit.class));
 }

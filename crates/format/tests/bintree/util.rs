@@ -75,8 +75,11 @@ pub(crate) fn corridor(n: usize, length: f64, seed: u64) -> Vec<Point> {
     (0..n as u32).map(point).collect()
 }
 
-/// All points: world position and class, in preorder of the leaves.
-pub(crate) fn read_all(tree: &Bintree) -> Result<Vec<([f64; 3], f32, u32, u32)>, ReadError> {
+/// A point as read: world position, class, leaf, index in the leaf.
+pub(crate) type Told = ([f64; 3], f32, u32, u32);
+
+/// All points, in preorder of the leaves.
+pub(crate) fn read_all(tree: &Bintree) -> Result<Vec<Told>, ReadError> {
     let (mut all, mut points) = (Vec::new(), LeafPoints::default());
     for leaf in tree.leaves() {
         tree.read_leaf(leaf, &mut points)?;

@@ -1,6 +1,8 @@
 //! A pull parser for JSON of any length: it holds one token and 64 KiB of text, knows the byte it is at, and never
 //! recurses, so that neither the size nor the depth of an index can do harm.
 
+mod scalars;
+
 use std::io;
 
 use super::ByteSource;
@@ -71,24 +73,55 @@ impl<'a> Json<'a> {
     }
 
     /// The next byte, if there is one; it stays.
+    #[inline]
     fn raw(&mut self) -> Result<Option<u8>, Fault> {
         if self.at == self.chunk.len() {
-            self.start += self.chunk.len() as u64;
-            self.at = 0;
-            self.chunk.resize(CHUNK.min(self.size.saturating_sub(self.start)) as usize, 0);
-            self.source.read_at(self.file, self.start, &mut self.chunk).map_err(Fault::Io)?;
+            self.refill()?;
         }
         Ok(self.chunk.get(self.at).copied())
     }
 
+    #[cold]
+    fn refill(&mut self) -> Result<(), Fault> {
+        self.start += self.chunk.len() as u64;
+        self.at = 0;
+        self.chunk.resize(CHUNK.min(self.size.saturating_sub(self.start)) as usize, 0);
+        self.source.read_at(self.file, self.start, &mut self.chunk).map_err(Fault::Io)
+    }
+
     fn advance(&mut self) -> Result<(), Fault> {
-        if let (Some(text), Some(&byte)) = (&mut self.captured, self.chunk.get(self.at)) {
-            text.push(byte);
+        self.pass(1)
+    }
+
+    /// Passes the next `count` bytes of the chunk.
+    #[inline]
+    fn pass(&mut self, count: usize) -> Result<(), Fault> {
+        let end = (self.at + count).min(self.chunk.len());
+        if let Some(text) = &mut self.captured {
+            text.extend_from_slice(&self.chunk[self.at..end]);
             if text.len() > MAX_TOKEN {
                 return self.broken("is a value of more than 16 MiB");
             }
         }
-        self.at += 1;
+        self.at = end;
+        Ok(())
+    }
+
+    /// Adds the bytes that come to the token, as long as they are `wanted`: run by run, as numbers and strings are most
+    /// of an index.
+    fn take_while(&mut self, wanted: impl Fn(u8) -> bool) -> Result<(), Fault> {
+        while self.raw()?.is_some() {
+            let rest = &self.chunk[self.at..];
+            let run = rest.iter().position(|b| !wanted(*b)).unwrap_or(rest.len());
+            self.token.extend_from_slice(&rest[..run]);
+            if self.token.len() > MAX_TOKEN {
+                return self.broken("is a string or number of more than 16 MiB");
+            }
+            self.pass(run)?;
+            if self.at < self.chunk.len() {
+                break;
+            }
+        }
         Ok(())
     }
 
@@ -146,144 +179,6 @@ impl<'a> Json<'a> {
         Ok(Some(std::str::from_utf8(&self.token).unwrap_or_default())) // `string` has checked it
     }
 
-    /// A string, without its escapes.
-    pub(super) fn string(&mut self) -> Result<&str, Fault> {
-        self.expect(b'"')?;
-        self.token.clear();
-        loop {
-            if self.token.len() > MAX_TOKEN {
-                return self.broken("is a string of more than 16 MiB");
-            }
-            match self.raw()? {
-                Some(b'"') => break,
-                Some(b'\\') => self.escape()?,
-                Some(byte) if byte >= 0x20 => {
-                    self.token.push(byte);
-                    self.advance()?;
-                }
-                Some(_) => return self.broken("there is a control character in a string"),
-                None => return self.broken("the text ends in a string: the file was cut short"),
-            }
-        }
-        self.advance()?;
-        let position = self.position();
-        std::str::from_utf8(&self.token).map_err(|_| Fault::Broken(position, "the string before is not UTF-8".into()))
-    }
-
-    fn escape(&mut self) -> Result<(), Fault> {
-        self.advance()?;
-        let byte = self.raw()?;
-        let character = match byte {
-            Some(b'"' | b'\\' | b'/') => char::from(byte.unwrap_or_default()),
-            Some(b'b') => '\u{8}',
-            Some(b'f') => '\u{c}',
-            Some(b'n') => '\n',
-            Some(b'r') => '\r',
-            Some(b't') => '\t',
-            Some(b'u') => {
-                let unit = self.unit()?;
-                let low = if (0xd800..0xdc00).contains(&unit) && self.raw()? == Some(b'\\') {
-                    self.advance()?;
-                    self.unit()?
-                } else {
-                    0
-                };
-                let units = if low == 0 { vec![unit] } else { vec![unit, low] };
-                let character = char::decode_utf16(units).next().and_then(Result::ok);
-                let Some(character) = character else { return self.broken("an escape is half a character") };
-                self.token.extend_from_slice(character.encode_utf8(&mut [0; 4]).as_bytes());
-                return Ok(());
-            }
-            _ => return self.broken("an escape in a string is not of JSON"),
-        };
-        self.token.extend_from_slice(character.encode_utf8(&mut [0; 4]).as_bytes());
-        self.advance()
-    }
-
-    /// `u` and four digits.
-    fn unit(&mut self) -> Result<u16, Fault> {
-        if self.raw()? != Some(b'u') {
-            return self.broken("an escape is half a character");
-        }
-        self.advance()?;
-        let mut unit = 0;
-        for _ in 0..4 {
-            let digit = self.raw()?.and_then(|b| char::from(b).to_digit(16));
-            let Some(digit) = digit else { return self.broken("an escape in a string is not of JSON") };
-            unit = unit << 4 | digit as u16;
-            self.advance()?;
-        }
-        Ok(unit)
-    }
-
-    /// A number as it is written.
-    fn number(&mut self) -> Result<&str, Fault> {
-        self.peek()?;
-        self.token.clear();
-        while let Some(byte @ (b'0'..=b'9' | b'-' | b'+' | b'.' | b'e' | b'E')) = self.raw()? {
-            self.token.push(byte);
-            self.advance()?;
-            if self.token.len() > MAX_TOKEN {
-                return self.broken("is a number of more than 16 MiB");
-            }
-        }
-        if !is_number(&self.token) {
-            return self.broken("expected a number");
-        }
-        Ok(std::str::from_utf8(&self.token).unwrap_or_default())
-    }
-
-    /// A number as the nearest double, which has to be finite.
-    pub(super) fn double(&mut self) -> Result<f64, Fault> {
-        let value = self.number()?.parse().ok().filter(|v: &f64| v.is_finite());
-        value.map_or_else(|| self.broken("a number is beyond the range of doubles"), Ok)
-    }
-
-    /// A whole number from 0 to 2^64 − 1.
-    pub(super) fn whole(&mut self) -> Result<u64, Fault> {
-        let value = self.number()?.parse().ok();
-        value.map_or_else(|| self.broken("expected a whole number, at least 0 and below 2^64"), Ok)
-    }
-
-    /// Three numbers.
-    pub(super) fn vector(&mut self) -> Result<[f64; 3], Fault> {
-        self.expect(b'[')?;
-        let mut values = [0.0; 3];
-        for (i, value) in values.iter_mut().enumerate() {
-            if i > 0 {
-                self.expect(b',')?;
-            }
-            *value = self.double()?;
-        }
-        self.expect(b']')?;
-        Ok(values)
-    }
-
-    fn literal(&mut self, word: &str) -> Result<(), Fault> {
-        for byte in word.bytes() {
-            if self.raw()? != Some(byte) {
-                return self.broken(format!("expected {word}"));
-            }
-            self.advance()?;
-        }
-        Ok(())
-    }
-
-    /// `true` or `false`.
-    pub(super) fn boolean(&mut self) -> Result<bool, Fault> {
-        let value = self.peek()? == b't';
-        self.literal(if value { "true" } else { "false" }).map(|()| value)
-    }
-
-    /// Passes `null` if it is what comes.
-    pub(super) fn null(&mut self) -> Result<bool, Fault> {
-        let null = self.peek()? == b'n';
-        if null {
-            self.literal("null")?;
-        }
-        Ok(null)
-    }
-
     /// Passes a value of any kind and gives its text, of at most 16 MiB.
     pub(super) fn value(&mut self) -> Result<Vec<u8>, Fault> {
         self.peek()?;
@@ -311,7 +206,7 @@ impl<'a> Json<'a> {
                 }
                 b'"' => self.string().map(|_| ())?,
                 b't' | b'f' => self.boolean().map(|_| ())?,
-                b'n' => self.literal("null")?,
+                b'n' => self.null().map(|_| ())?,
                 _ => self.number().map(|_| ())?,
             }
             loop {
@@ -337,28 +232,6 @@ impl<'a> Json<'a> {
         }
         Ok(another)
     }
-}
-
-/// True for numbers as JSON spells them.
-fn is_number(text: &[u8]) -> bool {
-    let digits = |text: &[u8]| text.iter().take_while(|b| b.is_ascii_digit()).count();
-    let mut rest = text.strip_prefix(b"-").unwrap_or(text);
-    match digits(rest) {
-        0 => return false,
-        n if n > 1 && rest[0] == b'0' => return false,
-        n => rest = &rest[n..],
-    }
-    if let Some(fraction) = rest.strip_prefix(b".") {
-        match digits(fraction) {
-            0 => return false,
-            n => rest = &fraction[n..],
-        }
-    }
-    if let Some(exponent) = rest.strip_prefix(b"e").or(rest.strip_prefix(b"E")) {
-        let exponent = exponent.strip_prefix(b"-").or(exponent.strip_prefix(b"+")).unwrap_or(exponent);
-        return digits(exponent) == exponent.len() && !exponent.is_empty();
-    }
-    rest.is_empty()
 }
 
 #[cfg(test)]
