@@ -4,6 +4,7 @@ mod arguments;
 mod bad_input;
 mod bad_output;
 mod cut_short;
+mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
