@@ -61,10 +61,14 @@ fn points_lines(report: &Report) -> Vec<String> {
 
 fn coordinates_line(report: &Report) -> String {
     let change = &report.coordinate_change;
-    if change.max.iter().all(|v| *v == 0.0) {
-        return format!("coordinates are unchanged, step {}", numbers(&report.grid.scale));
-    }
     let step = numbers(&report.grid.scale);
+    if change.max.iter().all(|v| *v == 0.0) {
+        return format!("coordinates are unchanged, step {step}");
+    }
+    // 0.07 read as a double and 7 steps of 0.01 differ in the last bits
+    if change.max.iter().zip(&report.grid.scale).all(|(max, step)| *max <= step * 1e-6) {
+        return format!("coordinates are unchanged but for the rounding of doubles, step {step}");
+    }
     format!(
         "coordinates moved by at most {} (root mean square {}), step {step}",
         numbers(&change.max),
