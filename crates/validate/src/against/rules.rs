@@ -1,5 +1,8 @@
 //! What was asked of the conversion, as the dataset's metadata records it, applied by own code.
 
+use std::fmt;
+use std::sync::Arc;
+
 use pointmill_format::{Aabb, Attribute, Lattice};
 use serde_json::Value;
 
@@ -12,6 +15,16 @@ pub(crate) enum RgbDepth {
     Eight,
     /// Stored as they are.
     Sixteen,
+}
+
+/// Positions that a dataset stores so coarsely that its lattice's integers do not come back: records are compared by
+/// what has to be stored for an integer position then.
+pub(crate) trait StoredPositions: fmt::Debug + Send + Sync {
+    /// What stands for the lattice point `step`: three words, equal exactly if what is stored is.
+    fn stored(&self, step: [i64; 3]) -> [i64; 3];
+
+    /// World coordinates of what is stored.
+    fn world(&self, stored: [i64; 3]) -> [f64; 3];
 }
 
 /// How values of a source's column become those of the dataset.
@@ -36,6 +49,8 @@ pub(crate) struct Rules {
     pub(crate) rgb_as_bytes: bool,
     /// The dataset's lattice.
     pub(crate) lattice: Lattice,
+    /// Blocks have these instead of integers on the lattice.
+    pub(crate) stored: Option<Arc<dyn StoredPositions>>,
     /// World coordinate of the job lattice's integer 0.
     lattice_offset: [f64; 3],
     /// The job lattice's coordinate of the dataset's integer 0.
@@ -72,6 +87,7 @@ impl Rules {
             rgb,
             rgb_as_bytes: false,
             lattice,
+            stored: None,
             lattice_offset,
             shift,
             rgb_depth: match own["rgbDepth"].as_str() {
@@ -86,6 +102,11 @@ impl Rules {
             foreign: own.is_null(),
             constants: constants(&own["attributesDropped"]),
         }
+    }
+
+    /// World coordinates of a record of a block.
+    pub(crate) fn world(&self, position: [i64; 3]) -> [f64; 3] {
+        self.stored.as_ref().map_or_else(|| self.lattice.world(position), |stored| stored.world(position))
     }
 
     /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.

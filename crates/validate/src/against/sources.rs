@@ -146,6 +146,12 @@ impl Source {
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
+        if let Some(stored) = &rules.stored {
+            for i in 0..points {
+                let words = stored.stored(block.position(i));
+                words.into_iter().enumerate().for_each(|(axis, word)| block.positions[axis][i] = word);
+            }
+        }
         for (i, attribute) in rules.attributes.iter().enumerate() {
             let column = self.columns[i].map(|(c, elements)| (&batch.columns[c], elements));
             let words = &mut block.words[i];
