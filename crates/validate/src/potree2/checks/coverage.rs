@@ -6,10 +6,11 @@
 use pointmill_format::NodeKey;
 use serde_json::json;
 
-use crate::expect::Geometry;
-use crate::finding::{Check, Finding, Findings};
-use crate::grid::{Grid, square};
-use crate::quality::Tally;
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::expect::Geometry;
+use crate::potree2::grid::{Grid, square};
+use crate::potree2::quality::Tally;
 
 /// How far a point may be from the nearest one drawn, in spacings of the level; one lattice step is allowed on top.
 pub(crate) const LIMIT: f64 = 2.0;

@@ -1,7 +1,8 @@
 //! Payload ranges: right size, aligned, disjoint, and together exactly `octree.bin`.
 
-use crate::finding::{Check, Finding, Findings};
-use crate::tree::{Tree, TreeNode};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::tree::{Tree, TreeNode};
 
 /// Checks all ranges and marks the nodes whose payload may be read.
 ///

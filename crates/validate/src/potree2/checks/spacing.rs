@@ -3,10 +3,11 @@
 use pointmill_format::NodeKey;
 use serde_json::json;
 
-use crate::expect::Geometry;
-use crate::finding::{Check, Finding, Findings};
-use crate::grid::{Grid, Origin, square};
-use crate::quality::Tally;
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::expect::Geometry;
+use crate::potree2::grid::{Grid, Origin, square};
+use crate::potree2::quality::Tally;
 
 /// What inner nodes promise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +40,7 @@ pub(crate) fn pairs(key: NodeKey, grid: &Grid, geometry: &Geometry, tally: &Tall
     let spacing = geometry.spacing_at(key.level);
     let allowed_squared = square((spacing - geometry.step()).max(0.0));
     let (mut close, mut closest, mut looked_at) = (0, f64::INFINITY, 0);
-    let mut node = crate::quality::NodeFigures::default();
+    let mut node = crate::potree2::quality::NodeFigures::default();
     for (i, _) in grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own) {
         let (own_squared, across_squared) = grid.nearest_by_origin(i, RINGS);
         looked_at += 1;

@@ -5,7 +5,8 @@ use std::collections::HashSet;
 use pointmill_format::AttributeType;
 use serde_json::{Value, json};
 
-use crate::finding::{Check, Finding, Findings};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
 
 /// Sides of the cube, and spacing against side, agree within this, relative.
 const RELATIVE: f64 = 1e-9;

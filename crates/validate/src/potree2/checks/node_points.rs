@@ -5,8 +5,9 @@ use std::cmp::Ordering;
 use pointmill_format::NodeKey;
 use serde_json::json;
 
-use crate::expect::{Geometry, morton_cmp};
-use crate::finding::{Check, Finding, Findings};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::expect::{Geometry, morton_cmp};
 
 /// Stored coordinates below 0 (read as unsigned by some clients: 2^31 and more).
 pub(crate) fn coordinates(key: NodeKey, positions: &[Vec<i32>; 3], findings: &Findings) {

@@ -13,14 +13,16 @@ use pointmill_format::{ErrorKind, ReadError};
 use rayon::prelude::*;
 
 use crate::against::Sums;
-use crate::cache::{Cache, Positions};
-use crate::checks::spacing::Sampling;
-use crate::checks::{coverage, node_points, ranges, spacing};
-use crate::expect::Geometry;
-use crate::finding::{Check, Finding, Findings};
-use crate::grid::{Grid, Origin, Site};
-use crate::quality::Tally;
-use crate::tree::{Tree, TreeNode};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::cache::{Cache, Positions};
+use crate::potree2::checks::spacing::Sampling;
+use crate::potree2::checks::{coverage, node_points, ranges, spacing};
+use crate::potree2::expect::Geometry;
+use crate::potree2::grid::{Grid, Origin, Site};
+use crate::potree2::quality::Tally;
+use crate::potree2::records::fill_blocks;
+use crate::potree2::tree::{Tree, TreeNode};
 use crate::{Progress, ProgressFn};
 
 /// What to walk over, and how.
@@ -61,8 +63,8 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
         scratch: Mutex::default(),
         seen: Mutex::new(ranges::Seen::new(task.dataset.metadata())),
         tallies: (0..levels).map(|_| Tally::default()).collect(),
-        pairs: Findings::new(task.max_problems),
-        cells: Findings::new(task.max_problems),
+        pairs: Findings::new(task.findings.format(), task.max_problems),
+        cells: Findings::new(task.findings.format(), task.max_problems),
         unreadable: AtomicU64::new(0),
         done: AtomicU64::new(0),
         stop: AtomicBool::new(false),
@@ -157,7 +159,7 @@ impl Walk<'_> {
             seen.add(points);
             self.seen.lock().unwrap_or_else(PoisonError::into_inner).merge(&seen);
             if let Some(sums) = task.sums {
-                sums.add_node(points);
+                sums.add(|block, sink| fill_blocks(points, sums.rules(), block, sink));
             }
             task.neighbourhoods.then(|| {
                 let mut positions = transpose(points);

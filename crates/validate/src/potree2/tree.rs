@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, HashMap, VecDeque};
 use pointmill_format::potree2::{ByteSource, DatasetFile, NodeRecord};
 use pointmill_format::{NodeKey, ReadError};
 
-use crate::finding::{Check, Finding, Findings};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
 
 /// A node with the record that locates its payload.
 #[derive(Debug, Clone, Copy)]

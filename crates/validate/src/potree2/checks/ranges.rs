@@ -4,8 +4,9 @@ use pointmill_format::potree2::{AttributeStats, Metadata, NodePoints};
 use pointmill_format::{Column, with_column};
 use serde_json::json;
 
-use crate::expect::Geometry;
-use crate::finding::{Check, Finding, Findings};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::expect::Geometry;
 
 /// Smallest and largest values seen. NaN and infinities are neither: JSON cannot write them.
 #[derive(Debug, Clone)]

@@ -1,7 +1,8 @@
 //! What the records of the hierarchy promise beyond their bytes: types, counts, depth.
 
-use crate::finding::{Check, Finding, Findings};
-use crate::tree::Tree;
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::tree::Tree;
 
 /// Types, empty nodes, depth and the sum of points. `points` and `depth` are what the metadata says.
 pub(crate) fn check(tree: &Tree, points: u64, depth: u32, findings: &Findings) {
