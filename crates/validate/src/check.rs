@@ -24,6 +24,19 @@ pub enum Check {
     Spacing,
     Coverage,
     Against,
+    Header,
+    Sections,
+    Description,
+    BatchRecords,
+    Blocks,
+    PlaneWords,
+    Quantisation,
+    BatchBoxes,
+    StorageOrder,
+    Levels,
+    Colours,
+    Originals,
+    Errors,
 }
 
 impl Check {
@@ -46,6 +59,19 @@ impl Check {
         Self::Spacing,
         Self::Coverage,
         Self::Against,
+        Self::Header,
+        Self::Sections,
+        Self::Description,
+        Self::BatchRecords,
+        Self::Blocks,
+        Self::PlaneWords,
+        Self::Quantisation,
+        Self::BatchBoxes,
+        Self::StorageOrder,
+        Self::Levels,
+        Self::Colours,
+        Self::Originals,
+        Self::Errors,
     ];
 
     /// The checks of Potree 2.0.
@@ -66,6 +92,26 @@ impl Check {
         Self::Histogram,
         Self::Spacing,
         Self::Coverage,
+        Self::Against,
+    ];
+
+    /// The checks of quantised batches.
+    pub(crate) const BATCHES: &[Self] = &[
+        Self::Header,
+        Self::Sections,
+        Self::Description,
+        Self::BatchRecords,
+        Self::Blocks,
+        Self::PlaneWords,
+        Self::Quantisation,
+        Self::BatchBoxes,
+        Self::TightBox,
+        Self::StorageOrder,
+        Self::Levels,
+        Self::Colours,
+        Self::Originals,
+        Self::Errors,
+        Self::AttributeRanges,
         Self::Against,
     ];
 
@@ -94,6 +140,19 @@ impl Check {
             Self::Spacing => "spacing",
             Self::Coverage => "coverage",
             Self::Against => "against",
+            Self::Header => "header",
+            Self::Sections => "sections",
+            Self::Description => "description",
+            Self::BatchRecords => "batch-records",
+            Self::Blocks => "blocks",
+            Self::PlaneWords => "plane-words",
+            Self::Quantisation => "quantisation",
+            Self::BatchBoxes => "batch-boxes",
+            Self::StorageOrder => "order",
+            Self::Levels => "levels",
+            Self::Colours => "colours",
+            Self::Originals => "originals",
+            Self::Errors => "errors",
         }
     }
 
@@ -119,6 +178,19 @@ impl Check {
             Self::Spacing => "inner nodes are sampled as promised: no pair closer than the spacing of the level",
             Self::Coverage => "no hole: every point is within two spacings of a point drawn at each level above it",
             Self::Against => "every point and attribute of the sources is in the dataset exactly once",
+            Self::Header => "the header is in range and agrees with itself",
+            Self::Sections => "sections are in order on multiples of 256 bytes, zeros between them, nothing behind them",
+            Self::Description => "the description is complete and agrees with header and sections",
+            Self::BatchRecords => "batches have the points, the first point and a box that their slot asks for",
+            Self::Blocks => "every compressed block is one zstd frame of exactly its batches",
+            Self::PlaneWords => "bits 30 and 31 of all plane words are 0",
+            Self::Quantisation => "every position is that of a point of the source's lattice, encoded in its box",
+            Self::BatchBoxes => "batch boxes are float32, rounded outwards, and tight on each face",
+            Self::StorageOrder => "points ascend by Morton code, X, Y, Z, colour, attributes once the swap is undone",
+            Self::Levels => "exactly the points nearest to the centres of cells of level 0, 1, 2 have that level",
+            Self::Colours => "points below level 3 show the mean of their cell, greys follow from intensities",
+            Self::Originals => "originals ascend and are those of exactly the points below level 3",
+            Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }
     }
 }

@@ -222,6 +222,11 @@ impl Findings {
         self.checked[check.index()].store(0, Ordering::Relaxed);
     }
 
+    /// Says why a check was not done in full; what it found stays.
+    pub(crate) fn note(&self, check: Check, why: impl Into<String>) {
+        self.slot(check).skipped = Some(why.into());
+    }
+
     /// Errors of a check so far.
     pub(crate) fn found(&self, check: Check) -> u64 {
         self.slot(check).found

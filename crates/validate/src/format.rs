@@ -45,7 +45,8 @@ impl Format {
     pub const fn checks(self) -> &'static [Check] {
         match self {
             Self::Potree2 => Check::POTREE2,
-            Self::Bintree | Self::Batches => &[],
+            Self::Bintree => &[],
+            Self::Batches => Check::BATCHES,
         }
     }
 }

@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod against;
+mod batches;
 mod check;
 mod finding;
 mod format;
@@ -129,7 +130,8 @@ pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) ->
         .map_err(|e| ReadError::io(dataset, "starting threads", std::io::Error::other(e)))?;
     pool.install(|| match format {
         Format::Potree2 => potree2::run(&path, options, progress),
-        Format::Bintree | Format::Batches => {
+        Format::Batches => batches::run(&path, options, progress),
+        Format::Bintree => {
             Err(ReadError::unsupported(&path, format!("datasets of the format {format} cannot be validated yet")))
         }
     })
