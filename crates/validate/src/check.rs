@@ -179,7 +179,9 @@ impl Check {
             Self::Coverage => "no hole: every point is within two spacings of a point drawn at each level above it",
             Self::Against => "every point and attribute of the sources is in the dataset exactly once",
             Self::Header => "the header is in range and agrees with itself",
-            Self::Sections => "sections are in order on multiples of 256 bytes, zeros between them, nothing behind them",
+            Self::Sections => {
+                "sections are in order on multiples of 256 bytes, zeros between them, nothing behind them"
+            }
             Self::Description => "the description is complete and agrees with header and sections",
             Self::BatchRecords => "batches have the points, the first point and a box that their slot asks for",
             Self::Blocks => "every compressed block is one zstd frame of exactly its batches",

@@ -2,12 +2,12 @@
 
 use pointmill_format::ReadError;
 
+use super::batch_records::Box32;
 use super::blocks::{Cache, Column};
 use super::bytes::u32_at;
 use super::formulas::{BATCH, decode, distance_squared, morton, power};
 use super::originals::Entry;
 use super::positions::{Axis, Recovered};
-use super::batch_records::Box32;
 use super::walk::Task;
 
 /// The bytes of one batch.

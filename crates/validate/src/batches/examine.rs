@@ -48,11 +48,7 @@ pub(crate) struct Seen {
 
 /// Examines a batch.
 pub(crate) fn examine(task: &Task<'_>, raw: &Raw) -> (Seen, Points) {
-    let grid = Grid {
-        cell: task.header.cell,
-        exponent: task.header.exponent(),
-        bits: task.header.morton_bits(),
-    };
+    let grid = Grid { cell: task.header.cell, exponent: task.header.exponent(), bits: task.header.morton_bits() };
     let bits = task.header.bits();
     let axes = axes(task, raw);
     let points = Points::new(raw, &axes, bits);
@@ -164,10 +160,9 @@ fn originals(task: &Task<'_>, raw: &Raw, flags: &mut [u8]) -> Vec<u32> {
     }
     let absent: Vec<usize> = (0..raw.len()).filter(|i| missing[*i]).collect();
     absent.iter().for_each(|i| flags[*i] |= COLOUR_UNKNOWN);
-    for (wrong, expected, found) in [
-        (absent, "an entry, its level is below 3", "none"),
-        (surplus, "no entry, its level is 3 or more", "one"),
-    ] {
+    for (wrong, expected, found) in
+        [(absent, "an entry, its level is below 3", "none"), (surplus, "no entry, its level is 3 or more", "one")]
+    {
         if let Some(first) = wrong.first() {
             let values = [expected.into(), found.into()];
             points_finding(task, raw, Check::Originals, "original", wrong.len() as u64, *first, values);

@@ -119,8 +119,7 @@ mod tests {
         assert_eq!(morton([52_428; 3]), 0x0000_fc0f_c0fc_0fc0);
         assert_eq!(morton([471_859, 104_857, 52_428]), 0x004b_d0bd_0bd0_bd0b);
         for v in [[1, 0, 0], [0, 1, 0], [0, 0, 1], [u32::MAX, 0x8000_0001, 0x0012_3456], [u32::MAX; 3]] {
-            let slow =
-                (0..32).fold(0u128, |c, k| (0..3).fold(c, |c, a| c | u128::from(v[a] >> k & 1) << (3 * k + a)));
+            let slow = (0..32).fold(0u128, |c, k| (0..3).fold(c, |c, a| c | u128::from(v[a] >> k & 1) << (3 * k + a)));
             assert_eq!(morton(v), slow);
         }
     }

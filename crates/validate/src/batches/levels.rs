@@ -24,9 +24,9 @@ struct Cell {
     sums: [u64; 3],
     nearest: f64,
     candidate: Member,
-    /// Points of this level, and the last of them that was not the candidate when it came.
+    /// Points of this level, the first and the last of them.
     of_level: u64,
-    last_of_level: Option<Member>,
+    ends_of_level: Option<[Member; 2]>,
     /// Positions, and so membership and distances, are not certain.
     uncertain: bool,
     /// The colour of a point before averaging is lost.
@@ -79,7 +79,7 @@ impl Levels {
                 nearest: f64::INFINITY,
                 candidate: member,
                 of_level: 0,
-                last_of_level: None,
+                ends_of_level: None,
                 uncertain: self.uncertain_before,
                 colour_unknown: false,
             });
@@ -96,7 +96,7 @@ impl Levels {
         }
         if member.word >> 24 == level as u32 {
             cell.of_level += 1;
-            cell.last_of_level = Some(member);
+            cell.ends_of_level = Some([cell.ends_of_level.map_or(member, |[first, _]| first), member]);
         }
         cell.uncertain |= uncertain;
         cell.colour_unknown |= batch.flags[i] & COLOUR_UNKNOWN != 0;
@@ -139,18 +139,11 @@ impl Levels {
             fault(cell.candidate, why, stored);
         }
         let others = cell.of_level - u64::from(stored == level as u32);
-        if let (1.., Some(member)) = (others, cell.last_of_level) {
+        if let (1.., Some([first, last])) = (others, cell.ends_of_level) {
             let nearest = cell.candidate.index;
-            if member.index == nearest {
-                // the candidate came last of several; the others are told of as a number
-                let subject = format!("points of level {level} in the cell of point {nearest}");
-                let finding = Finding::new(Check::Levels, subject, 1, cell.of_level).points(others);
-                findings.push(finding.at(Place::Batch(member.batch)));
-            } else {
-                let expected = format!("above {level}: point {nearest} is nearer to the centre or comes first");
-                fault(member, expected, level as u32);
-                findings.more(Check::Levels, others - 1);
-            }
+            let expected = format!("above {level}: point {nearest} is nearer to the centre or comes first");
+            fault(if last.index == nearest { first } else { last }, expected, level as u32);
+            findings.more(Check::Levels, others - 1);
         }
         if stored == level as u32 && self.averaged && !cell.colour_unknown {
             findings.checked(Check::Colours, 1);

@@ -106,12 +106,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
 
 /// True if the planes tell every point's lattice integers, by the boxes. Planes that are absent though they would have
 /// told them are worth a word: a writer that was not asked to leave them out should not have.
-fn lattice_is_told(
-    header: &Header,
-    description: &Description,
-    boxes: &[Option<Box32>],
-    findings: &Findings,
-) -> bool {
+fn lattice_is_told(header: &Header, description: &Description, boxes: &[Option<Box32>], findings: &Findings) -> bool {
     let fine = |bounds: &Box32, bits: u32| {
         (0..3).all(|a| Axis::new(&description.lattice, header.origin, bounds, a, bits).is_fine())
     };
@@ -205,12 +200,8 @@ fn compare(
         findings.skip(Check::Against, format!("{} batches could not be read", walked.unreadable));
         return Ok(None);
     }
-    let context = Context {
-        records: &Records { task },
-        findings,
-        progress: task.progress,
-        memory_bytes: options.memory_bytes,
-    };
+    let context =
+        Context { records: &Records { task }, findings, progress: task.progress, memory_bytes: options.memory_bytes };
     let summary = against.compare(&context)?;
     let mut parts = Vec::new();
     if !positions {

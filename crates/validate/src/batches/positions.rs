@@ -5,8 +5,8 @@
 
 use pointmill_format::Lattice;
 
-use super::formulas::{decode, encode, ulp};
 use super::batch_records::Box32;
+use super::formulas::{decode, encode, ulp};
 
 /// What q says about X of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

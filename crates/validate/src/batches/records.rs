@@ -79,14 +79,7 @@ fn original_colours(raw: &Raw) -> Vec<u32> {
 }
 
 /// Hands over a batch's records in blocks. `colours`: before averaging.
-pub(crate) fn fill(
-    raw: &Raw,
-    points: &Points,
-    colours: &[u32],
-    rules: &Rules,
-    block: &mut Block,
-    sink: &mut Sink<'_>,
-) {
+pub(crate) fn fill(raw: &Raw, points: &Points, colours: &[u32], rules: &Rules, block: &mut Block, sink: &mut Sink<'_>) {
     for start in (0..raw.len()).step_by(BLOCK_POINTS) {
         let range = start..(start + BLOCK_POINTS).min(raw.len());
         block.reset(rules.attributes.len());

@@ -5,6 +5,7 @@ use pointmill_format::ReadError;
 use rayon::prelude::*;
 
 use super::batch::Raw;
+use super::batch_records::Box32;
 use super::blocks::{Cache, Column, Reported};
 use super::bytes::Bytes;
 use super::description::Description;
@@ -16,7 +17,6 @@ use super::levels::Levels;
 use super::order::Key;
 use super::originals::Originals;
 use super::ranges::Ranges;
-use super::batch_records::Box32;
 use super::records::fill;
 use crate::against::Sums;
 use crate::check::Check;
