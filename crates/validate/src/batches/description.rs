@@ -10,6 +10,9 @@ use super::header::{HEADER_BYTES, Header};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
+/// Of the page.
+const MAX_ATTRIBUTES: usize = 256;
+
 /// What is needed of the description.
 #[derive(Debug, Clone)]
 pub(crate) struct Description {
@@ -89,7 +92,7 @@ pub(crate) fn read(bytes: &Bytes, header: &Header, findings: &Findings) -> Resul
         _ => {
             let found = json.get("colour").cloned().unwrap_or_default();
             fault(findings, "colour", r#""rgb", "intensity" or "none""#, found);
-            Colour::None
+            Colour::Rgb // of which nothing else is known
         }
     };
     let errors = errors(json.get("errors"), header, findings);
@@ -138,6 +141,10 @@ fn attributes(value: Option<&Value>, header: &Header, findings: &Findings) -> Op
         fault(findings, "attributes", "an array", value.cloned().unwrap_or_default());
         return None;
     };
+    if list.len() > MAX_ATTRIBUTES {
+        fault(findings, "attributes", format!("at most {MAX_ATTRIBUTES}"), list.len());
+        return None;
+    }
     let mut names = HashSet::new();
     let mut out = Vec::new();
     for (i, value) in list.iter().enumerate() {

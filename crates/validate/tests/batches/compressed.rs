@@ -2,10 +2,10 @@
 
 use pointmill_validate::Check;
 
-use super::cloud::{Parts, assert_only, broken, check, terrain};
+use super::cloud::{Parts, assert_only, broken, check, good};
 
 fn compressed(k: usize) -> Parts {
-    Parts { block: Some(k), ..terrain().parts() }
+    Parts { block: Some(k), ..good() }
 }
 
 #[test]
