@@ -14,9 +14,9 @@ use crate::text;
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
     require_dataset(&args.dataset)?;
-    let mut options = Options { neighbourhoods: !args.fast, open: args.reading.options(), ..Options::default() };
+    let mut options = Options { neighbourhoods: !args.fast, open: args.reading.options()?, ..Options::default() };
     if !args.against.is_empty() {
-        let found = inputs::expand(&args.against)?;
+        let found = inputs::expand(&args.against, &options.open)?;
         if !args.talk.quiet {
             found.notes.iter().for_each(|note| tell(note));
         }

@@ -1,19 +1,22 @@
 //! What the headers say, put together: open inputs, one lattice, one schema.
 
-use pointmill_format::{Aabb, ErrorKind, Lattice, ReadError, Scan, open_scan};
+use pointmill_format::{Aabb, ErrorKind, Lattice, ReadError, Scan, Wanted, open_scan};
 
 use crate::axis::{AxisMap, SourceMap};
 use crate::error::ConvertError;
 use crate::events::Events;
 use crate::lattice::{self, Choice, Extent, Steps};
+use crate::needs;
 use crate::plan::{OnFault, Plan};
 use crate::schema::Schema;
 
 /// A scan, and how its points become the job's.
 pub(crate) struct Source {
     pub(crate) scan: Box<dyn Scan>,
-    /// Where each of its columns goes in the schema.
-    pub(crate) columns: Vec<usize>,
+    /// Where each of its columns goes in the schema; `None`: no output needs it.
+    pub(crate) columns: Vec<Option<usize>>,
+    /// The columns to decode: those, and what the filter looks at.
+    pub(crate) wanted: Wanted,
     /// From its coordinates to the job lattice.
     pub(crate) map: SourceMap,
 }
@@ -21,7 +24,10 @@ pub(crate) struct Source {
 /// Everything known before the first point is decoded.
 pub(crate) struct Job {
     pub(crate) sources: Vec<Source>,
+    /// What is read: the attributes that some output needs.
     pub(crate) schema: Schema,
+    /// Names of the attributes of the inputs that no output needs.
+    pub(crate) unread: Vec<String>,
     pub(crate) lattice: Lattice,
     /// Why this lattice, for people.
     pub(crate) lattice_reason: String,
@@ -74,7 +80,11 @@ impl Job {
         warnings: Vec<String>,
     ) -> Result<Self, ConvertError> {
         let infos: Vec<_> = scans.iter().map(|s| s.info()).collect();
-        let (schema, columns) = Schema::union(&infos);
+        let (all, columns) = Schema::union(&infos);
+        let needed = needs::needed(plan, &all)?;
+        let unread = all.attributes.iter().zip(&needed).filter(|(_, needed)| !**needed);
+        let unread = unread.map(|(a, _)| a.name.clone()).collect();
+        let (schema, places) = all.reduce(&needed);
         let extents: Vec<_> = scans.iter().map(|s| Extent::of(&**s)).collect();
         let expected = extents.iter().flatten().fold(Aabb::EMPTY, |all, e| all.union(&e.bounds));
         let mut hint = (!expected.is_empty()).then_some(expected);
@@ -91,6 +101,7 @@ impl Job {
         let mut job = Self {
             sources: Vec::new(),
             schema,
+            unread,
             lattice,
             lattice_reason: reason,
             steps,
@@ -104,7 +115,11 @@ impl Job {
             .zip(columns)
             .map(|(scan, columns)| {
                 let map = SourceMap::new(scan.info().lattice.as_ref(), &job.lattice);
-                Source { scan, columns, map }
+                let columns: Vec<Option<usize>> = columns.into_iter().map(|c| places[c]).collect();
+                let class =
+                    |i: usize| plan.filter.classes.is_some() && scan.info().attributes[i].name == "classification";
+                let wanted = Wanted(columns.iter().enumerate().map(|(i, c)| c.is_some() || class(i)).collect());
+                Source { scan, columns, wanted, map }
             })
             .collect();
         Ok(job)

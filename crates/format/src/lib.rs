@@ -1,6 +1,7 @@
 //! Readers and writers of point-cloud formats, for renderers and for preprocessors.
 //!
 //! * [`batches`]: quantised batches with levels of detail, mapped as they stand (cargo features `mmap`, `zstd`), and written.
+//! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
 //! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
@@ -30,6 +31,7 @@ mod rows;
 mod source;
 
 pub mod batches;
+pub mod bintree;
 #[cfg(feature = "e57")]
 pub mod e57;
 #[cfg(feature = "las")]

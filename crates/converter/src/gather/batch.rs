@@ -227,7 +227,8 @@ impl<'a> Worker<'a> {
     fn unfiltered_colour(&mut self, source: usize, batch: &PointBatch) {
         let job = self.pass.job;
         let places = &job.sources[source].columns;
-        let colour = batch.columns.iter().zip(places).find(|(_, place)| Some(**place) == job.schema.rgb());
+        let Some(rgb) = job.schema.rgb() else { return };
+        let colour = batch.columns.iter().zip(places).find(|(_, place)| **place == Some(rgb));
         if let Some((column, _)) = colour {
             self.stats.sources[source].rgb_unfiltered.include(column, None);
         }
@@ -238,7 +239,8 @@ impl<'a> Worker<'a> {
         let job = self.pass.job;
         let rgb = job.schema.rgb();
         let columns = &job.sources[source].columns;
-        for (column, &place) in batch.columns.iter().zip(columns) {
+        for (column, place) in batch.columns.iter().zip(columns) {
+            let Some(place) = *place else { continue };
             if Some(place) == rgb {
                 self.stats.sources[source].rgb.include(column, selection);
             } else {
@@ -253,7 +255,7 @@ impl<'a> Worker<'a> {
                 }
             }
         }
-        for place in (0..job.schema.attributes.len()).filter(|p| !columns.contains(p)) {
+        for place in (0..job.schema.attributes.len()).filter(|p| !columns.contains(&Some(*p))) {
             // What this source does not have is stored as zeros.
             if Some(place) == rgb {
                 self.stats.sources[source].rgb.add(0.0);
@@ -306,8 +308,14 @@ impl<'a> Worker<'a> {
     }
 
     fn note_segments(&mut self, block: u32, mut start: u32) {
+        let mut first = 0;
         for &(cell, count) in &self.grouping.groups {
-            self.segments.entry(cell).or_default().push(Segment { block, start, count });
+            let part = self.segments.entry(cell).or_default();
+            part.segments.push(Segment { block, start, count });
+            if self.pass.wants_moments {
+                part.moments.add_rows(&self.q, &self.grouping.order[first..first + count as usize]);
+            }
+            first += count as usize;
             start += count;
         }
     }

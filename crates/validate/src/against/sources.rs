@@ -171,7 +171,8 @@ impl Source {
             }
         }
         for ((column, value), deviating) in self.constants.iter().zip(&self.deviating) {
-            let count = count_deviating(&batch.columns[*column], start, value, &block.keep);
+            let is_rgb = self.scan.info().attributes[*column].name == "rgb";
+            let count = count_deviating(&batch.columns[*column], start, value, &block.keep, is_rgb);
             deviating.fetch_add(count, Relaxed);
         }
     }
@@ -192,7 +193,8 @@ impl Source {
             if rules.foreign {
                 block.truncated[axis].push(truncated);
             }
-            block.keep[i] &= bounds.0 <= world && world <= bounds.1; // false for NaN
+            // a point without a finite position is none
+            block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
         };
         match (&batch.positions, self.scan.info().lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
@@ -245,12 +247,14 @@ fn column_of(stored: &Attribute, columns: &[Attribute], any_type: bool) -> Optio
     found.map(|i| (i, columns[i].elements))
 }
 
+/// Points that are kept and have another value. `is_rgb`: 8-bit values may stand for 16-bit ones.
 #[allow(clippy::unnecessary_cast)] // one body for every type of column
-fn count_deviating(column: &Column, start: usize, value: &[f64], keep: &[bool]) -> u64 {
+fn count_deviating(column: &Column, start: usize, value: &[f64], keep: &[bool], is_rgb: bool) -> u64 {
     let elements = value.len().max(1);
+    let differs = |v: f64, constant: f64| v != constant && !(is_rgb && v * 257.0 == constant);
     with_column!(column, values => {
         let points = values.chunks_exact(elements).skip(start).zip(keep);
-        points.filter(|(v, keep)| **keep && v.iter().zip(value).any(|(v, c)| *v as f64 != *c)).count() as u64
+        points.filter(|(v, keep)| **keep && v.iter().zip(value).any(|(v, c)| differs(*v as f64, *c))).count() as u64
     })
 }
 
