@@ -108,7 +108,8 @@ impl Rules {
 /// The grey of `v` among values from `lo` to `hi`.
 pub(crate) fn grey(v: u64, [lo, hi]: [u64; 2]) -> u64 {
     let span = hi.saturating_sub(lo);
-    if span == 0 { 255 } else { (v.clamp(lo, hi) - lo).saturating_mul(255).saturating_add(span / 2) / span }
+    let scaled = (v.min(hi).saturating_sub(lo)).saturating_mul(255).saturating_add(span / 2);
+    scaled.checked_div(span).unwrap_or(255)
 }
 
 fn constants(dropped: &Value) -> Vec<(String, Vec<f64>)> {

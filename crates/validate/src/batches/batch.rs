@@ -102,7 +102,7 @@ impl Points {
         for (a, axis) in axes.iter().enumerate() {
             points.x[a].reserve_exact(n);
             points.r[a].reserve_exact(n);
-            for i in 0..n {
+            for (i, foreign) in foreign.iter_mut().enumerate() {
                 let x = match axis.recover(raw.q(i, a as u32) >> (30 - bits)) {
                     Recovered::Exact(x) => x,
                     Recovered::Ambiguous(x) => {
@@ -111,7 +111,7 @@ impl Points {
                         x
                     }
                     Recovered::Foreign(x) => {
-                        foreign[i] = true;
+                        *foreign = true;
                         x
                     }
                 };
@@ -164,14 +164,12 @@ impl Grid {
 
 /// The corners of the cell that point `i` is known to be in, widened by what rounding may hide.
 pub(crate) fn corners(raw: &Raw, i: usize, bits: u32) -> [[f64; 3]; 2] {
-    let mut out = [[0.0; 3]; 2];
-    for axis in 0..3 {
+    let cells = [0, 1, 2].map(|axis| {
         let (m, s) = (raw.bounds.min(axis), raw.bounds.side(axis));
         let t = raw.q(i, axis as u32) >> (30 - bits);
         let middle = decode(t, m, s, bits);
         let half = s / power(bits as i32 + 1) + 2.0 * raw.bounds.rounding(axis);
-        out[0][axis] = (middle - half).max(m);
-        out[1][axis] = (middle + half).min(f64::from(raw.bounds.max[axis]));
-    }
-    out
+        [(middle - half).max(m), (middle + half).min(f64::from(raw.bounds.max[axis]))]
+    });
+    [0, 1].map(|side| cells.map(|cell| cell[side]))
 }

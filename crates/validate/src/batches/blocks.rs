@@ -13,7 +13,8 @@ use super::sections::{beyond, raw_bytes, slot_range};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
-/// A decompressed block larger than this is refused: it would be a hostile file, or an attribute of kilobytes a point.
+/// Decompressed blocks of all sections larger than this together are refused: it would be a hostile file, or one of
+/// kilobytes a point.
 const MAX_BLOCK_BYTES: u64 = 1 << 30;
 
 /// A section of one entry a point.
@@ -74,10 +75,6 @@ pub(crate) fn open(
     if count != header.batches.div_ceil(k) {
         return fault("block count", header.batches.div_ceil(k).to_string(), count.to_string());
     }
-    if k.min(header.batches) * BATCH * stride > MAX_BLOCK_BYTES {
-        let what = format!("blocks of {name} hold {} bytes each", k * BATCH * stride);
-        return Err(ReadError::unsupported(&bytes.path, what).advise("write it with fewer batches a block"));
-    }
     let head = 16 + 8 * count;
     if head > room {
         beyond(findings, name, offset, head, bytes.len);
@@ -97,6 +94,23 @@ pub(crate) fn open(
         return Ok(None);
     }
     Ok(Some(column(last, Some(Table { batches_a_block: k, begins }))))
+}
+
+/// Refuses columns whose blocks would not fit into memory side by side.
+///
+/// # Errors
+/// They would not.
+pub(crate) fn require_memory(bytes: &Bytes, header: &Header, columns: &[&Column]) -> Result<(), ReadError> {
+    let block = |column: &&Column| {
+        let batches = column.table.as_ref().map_or(0, |t| t.batches_a_block.min(header.batches));
+        batches * BATCH * column.stride
+    };
+    let needed: u64 = columns.iter().map(block).sum();
+    if needed <= MAX_BLOCK_BYTES {
+        return Ok(());
+    }
+    let what = format!("the blocks of one place in all sections hold {needed} bytes, of {MAX_BLOCK_BYTES} allowed");
+    Err(ReadError::unsupported(&bytes.path, what).advise("write the file with fewer batches a block"))
 }
 
 /// Decompressed blocks by column and number; `None`: the block is broken.

@@ -78,6 +78,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         paths => Some(Against::open(paths, &options.open, records::rules(&header, &description, positions))?),
     };
     let columns = batch::columns(&sections);
+    blocks::require_memory(&bytes, &header, &columns)?;
     let task = Task {
         bytes: &bytes,
         header: &header,
@@ -146,9 +147,9 @@ fn conclude(task: &Task<'_>, walked: &Walked) {
         None => walked.ranges.check(description, findings),
     }
     if let Some(why) = blind.as_ref().or(uncertain.as_ref()) {
-        findings.note(Check::StorageOrder, format!("in part: {why}"));
-        findings.note(Check::Quantisation, format!("in part: {why}"));
-        findings.note(Check::BatchBoxes, format!("in part: {why}"));
+        findings.note(Check::StorageOrder, why.clone());
+        findings.note(Check::Quantisation, why.clone());
+        findings.note(Check::BatchBoxes, why.clone());
     }
     levels_skipped(task, walked, blind.or(uncertain));
     if !header.compressed() {
@@ -209,6 +210,9 @@ fn compare(
     }
     if task.header.averaged() && task.originals.is_none() {
         parts.push("colours, whose originals are absent");
+    }
+    if task.description.colour == Colour::Intensity && task.description.intensity_range.is_none() {
+        parts.push("greys, whose range is not told");
     }
     if !parts.is_empty() {
         findings.note(Check::Against, format!("counts and attributes, without {}", parts.join(" and ")));

@@ -30,6 +30,8 @@ pub(crate) fn rules(header: &Header, description: &Description, positions: bool)
     attributes.extend(colour.iter().map(|(attribute, _)| attribute.clone()));
     let mut rules = Rules::new(attributes, description.lattice, &description.json);
     rules.rgb_as_bytes = true;
+    // not an extra attribute of that name
+    rules.rgb = colour.as_ref().filter(|(a, _)| a.elements == 3).map(|_| rules.attributes.len() - 1);
     rules.compare_positions = positions;
     if let (Some((_, conversion)), Some(last)) = (colour, rules.conversions.last_mut()) {
         *last = conversion;

@@ -151,15 +151,14 @@ impl<'a, 'b> State<'a, 'b> {
         if let Some(levels) = &mut self.levels {
             levels.add(&seen, self.task.findings);
         }
-        if let Some([first, last]) = seen.ends.take() {
-            if let Some(before) = self.last.replace(last)
-                && before.is_behind(&first)
-            {
-                let subject = format!("place of point {}", first.index);
-                let expected = format!("behind {}", before.describe());
-                let finding = Finding::new(Check::StorageOrder, subject, expected, first.describe());
-                self.task.findings.push(finding.points(1).at(Place::Batch(seen.number as u32)));
-            }
+        if let Some([first, last]) = seen.ends.take()
+            && let Some(before) = self.last.replace(last)
+            && before.is_behind(&first)
+        {
+            let subject = format!("place of point {}", first.index);
+            let expected = format!("behind {}", before.describe());
+            let finding = Finding::new(Check::StorageOrder, subject, expected, first.describe());
+            self.task.findings.push(finding.points(1).at(Place::Batch(seen.number as u32)));
         }
         let walked = &mut self.walked;
         walked.foreign += seen.foreign;
