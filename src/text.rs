@@ -6,7 +6,7 @@ use std::path::Path;
 
 use pointmill_converter::{Estimate, Plan, Report};
 use pointmill_format::{Attribute, Crs};
-use pointmill_validate::{Format, LevelQuality, Outcome};
+use pointmill_validate::{Format, LeafQuality, LevelQuality, Outcome};
 
 use crate::convert::points_left_out;
 use crate::quantities::{bytes, count, number, numbers, plural, rate, seconds};
@@ -145,6 +145,7 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
         }
     }
     out.push_str(&quality(&outcome.quality, verbose));
+    out.push_str(&outcome.leaves.as_ref().map(leaves).unwrap_or_default());
     out + &problems(outcome)
 }
 
@@ -182,6 +183,22 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
         );
     }
     out
+}
+
+/// Sizes of the leaves of a binary tree.
+fn leaves(leaves: &LeafQuality) -> String {
+    if leaves.leaves == 0 {
+        return String::new();
+    }
+    let LeafQuality { points_min, points_mean, points_max, depth, volume, largest_error, largest_bound, .. } = leaves;
+    format!(
+        "  {} of {} to {} points, {} on average, down to depth {depth}; volume of their boxes {volume:.0}\n  \
+         positions are off by {largest_error:.1e} at most, {largest_bound:.1e} is allowed\n",
+        if leaves.leaves == 1 { "1 leaf".to_owned() } else { format!("{} leaves", count(leaves.leaves)) },
+        count(*points_min),
+        count(*points_max),
+        count(points_mean.round() as u64),
+    )
 }
 
 /// One problem a line.

@@ -223,7 +223,7 @@ impl Findings {
         self.checked[check.index()].store(0, Ordering::Relaxed);
     }
 
-    /// Says why a check was not done in full; what it found stays.
+    /// Says that a check was not fully done, and keeps what it found.
     pub(crate) fn note(&self, check: Check, why: impl Into<String>) {
         self.slot(check).skipped = Some(why.into());
     }

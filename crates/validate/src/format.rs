@@ -45,7 +45,7 @@ impl Format {
     pub const fn checks(self) -> &'static [Check] {
         match self {
             Self::Potree2 => Check::POTREE2,
-            Self::Bintree => &[],
+            Self::Bintree => Check::BINTREE,
             Self::Batches => Check::BATCHES,
         }
     }

@@ -21,6 +21,7 @@
 
 mod against;
 mod batches;
+mod bintree;
 mod check;
 mod finding;
 mod format;
@@ -33,10 +34,11 @@ use pointmill_format::{OpenOptions, ReadError};
 use serde::Serialize;
 
 pub use against::AgainstSummary;
+pub use bintree::LeafQuality;
 pub use check::Check;
 pub use finding::{CheckResult, Finding, Severity};
 pub use format::{Format, Located, locate};
-pub use place::Place;
+pub use place::{BinaryNode, Place};
 pub use potree2::LevelQuality;
 
 /// What to check, and with what means.
@@ -103,6 +105,8 @@ pub struct Outcome {
     pub problems: Vec<Finding>,
     /// One entry a level of an octree; empty for other formats.
     pub quality: Vec<LevelQuality>,
+    /// Of a binary tree whose index could be read.
+    pub leaves: Option<LeafQuality>,
     /// The comparison with the sources, if there was one.
     pub against: Option<AgainstSummary>,
 }
@@ -130,9 +134,7 @@ pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) ->
         .map_err(|e| ReadError::io(dataset, "starting threads", std::io::Error::other(e)))?;
     pool.install(|| match format {
         Format::Potree2 => potree2::run(&path, options, progress),
+        Format::Bintree => bintree::run(&path, options, progress),
         Format::Batches => batches::run(&path, options, progress),
-        Format::Bintree => {
-            Err(ReadError::unsupported(&path, format!("datasets of the format {format} cannot be validated yet")))
-        }
     })
 }

@@ -224,7 +224,7 @@ fn whole_class(bits: u64) -> u64 {
 /// The column of a scan, and its elements, that an attribute of the dataset was filled from.
 ///
 /// Scans that mean different things by one name (another type, another scale) have attributes of their own; those after
-/// the first are called "name (2)", "name (3)", …. Wide integers are stored as doubles.
+/// the first are called "name (2)", "name (3)", …. Wide integers may be stored as doubles.
 fn column_of(stored: &Attribute, columns: &[Attribute], any_type: bool) -> Option<(usize, usize)> {
     let named = |c: &&Attribute| {
         let suffix = stored.name.strip_prefix(&*c.name);
@@ -238,9 +238,9 @@ fn column_of(stored: &Attribute, columns: &[Attribute], any_type: bool) -> Optio
             AttributeType::Int64 | AttributeType::UInt64 => AttributeType::Float64,
             other => other,
         };
+        let same_type = ty == stored.ty || c.ty == stored.ty;
         // other converters do as they like with types
-        any_type
-            || ty == stored.ty && c.elements == stored.elements && c.scale == stored.scale && c.offset == stored.offset
+        any_type || same_type && c.elements == stored.elements && c.scale == stored.scale && c.offset == stored.offset
     };
     let exact = columns.iter().position(|c| c.name == stored.name && same(&c));
     let found = exact.or_else(|| columns.iter().position(|c| named(&c) && same(&c)));

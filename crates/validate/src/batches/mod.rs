@@ -241,6 +241,7 @@ fn finish(findings: Findings, header: Option<&Header>) -> Outcome {
         checks,
         problems,
         quality: Vec::new(),
+        leaves: None,
         against: None,
     }
 }

@@ -106,6 +106,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         checks,
         problems,
         quality,
+        leaves: None,
         against: summary,
     })
 }
@@ -138,6 +139,7 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: ReadError) -> R
         checks,
         problems,
         quality: Vec::new(),
+        leaves: None,
         against: None,
     })
 }
