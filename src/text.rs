@@ -6,7 +6,7 @@ use std::path::Path;
 
 use pointmill_converter::{Estimate, Plan, Report};
 use pointmill_format::{Attribute, Crs};
-use pointmill_validate::{LeafQuality, LevelQuality, Outcome};
+use pointmill_validate::{Format, LeafQuality, LevelQuality, Outcome};
 
 use crate::convert::points_left_out;
 use crate::quantities::{bytes, count, number, numbers, plural, rate, seconds};
@@ -118,11 +118,17 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
 /// What a validation found: checks, quality by level, problems.
 pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> String {
     let mut out = printable(&dataset.to_string_lossy());
-    let (points, nodes) = (plural(outcome.points, "point"), plural(outcome.nodes, "node"));
+    let nodes = match (outcome.format, outcome.nodes) {
+        (Format::Batches, 1) => "1 batch".to_owned(),
+        (Format::Batches, n) => format!("{} batches", count(n)),
+        (_, n) => plural(n, "node"),
+    };
+    let points = plural(outcome.points, "point");
     let _ = writeln!(out, ": {} {}, {points} in {nodes}", outcome.format, outcome.encoding.unwrap_or_default());
     for check in &outcome.checks {
         let verdict = match (check.ok, &check.skipped) {
             (false, _) => "BROKEN",
+            (true, Some(_)) if check.checked > 0 => "in part",
             (true, Some(_)) => "skipped",
             (true, None) => "ok",
         };
