@@ -1,5 +1,6 @@
 //! Readers and writers of point-cloud formats, for renderers and for preprocessors.
 //!
+//! * [`batches`]: quantised batches with levels of detail, mapped as they stand (cargo features `mmap`, `zstd`), and written.
 //! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
@@ -10,7 +11,7 @@
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
 //! found in a file are never trusted; an allocation is bounded by the size of the file that asks for it.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a module of its own
 
 mod aabb;
 mod attributes;
@@ -29,6 +30,7 @@ mod rows;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 
+pub mod batches;
 pub mod bintree;
 #[cfg(feature = "e57")]
 pub mod e57;

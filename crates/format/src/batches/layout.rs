@@ -1,0 +1,261 @@
+//! Where everything of a file will lie, before anything is written (`docs/formats/batches.md`, §1.1).
+
+use crate::{Aabb, Attribute};
+
+use super::describe::{AttributeEntry, Description};
+use super::{
+    BATCH_POINTS, Flags, Grid, HEADER_BYTES, Header, MAX_POINTS, Precision, Sections, WriteError, align, batch_count,
+    swap_slot,
+};
+
+/// A range of the file, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)] // the names say it
+pub struct Section {
+    pub offset: u64,
+    pub bytes: u64,
+}
+
+impl Section {
+    /// The first byte behind it.
+    pub const fn end(&self) -> u64 {
+        self.offset.saturating_add(self.bytes)
+    }
+}
+
+/// Places of all sections of a file that is not compressed.
+///
+/// Planes lie behind colours and attributes: a writer that finds out at the end that it does not need lo10 (or mid10)
+/// takes [`Self::with_precision`], **cuts the file at [`Self::end_of_points`]** (what it wrote behind must not
+/// stay in the gaps), and goes on with the originals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// N.
+    pub points: u64,
+    /// B.
+    pub batches: u32,
+    /// Records, 32 bytes a slot.
+    pub records: Section,
+    /// 4 bytes a point, as mid10, lo10 and colour.
+    pub hi10: Section,
+    /// Colour words.
+    pub colour: Section,
+    /// Extra attributes, in the order in which they were given.
+    pub attributes: Vec<Section>,
+    /// `None` if left out.
+    pub mid10: Option<Section>,
+    /// `None` if left out.
+    pub lo10: Option<Section>,
+    /// Where the originals begin; their number is known at the end.
+    pub originals: u64,
+    described: Vec<Attribute>,
+}
+
+/// The end of a file: what there is to write when all points are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finish {
+    /// The fields of the header.
+    pub header: Header,
+    /// The header's 256 bytes, for the start of the file.
+    pub header_bytes: [u8; HEADER_BYTES as usize],
+    /// The description, complete.
+    pub description: Description,
+    /// Its text, for [`Self::description_offset`]; the file ends with it.
+    pub description_bytes: Vec<u8>,
+    /// Where the text belongs.
+    pub description_offset: u64,
+}
+
+impl Layout {
+    /// The layout of `points` points with these extra attributes and planes.
+    ///
+    /// # Errors
+    /// [`WriteError::TooManyPoints`]; [`WriteError::Input`] for attributes of the same name or with 0 or more than 256
+    /// elements.
+    pub fn new(points: u64, attributes: &[Attribute], precision: Precision) -> Result<Self, WriteError> {
+        if points > MAX_POINTS {
+            return Err(WriteError::TooManyPoints(points));
+        }
+        for (i, a) in attributes.iter().enumerate() {
+            if a.elements == 0 || a.elements as u64 > AttributeEntry::MAX_ELEMENTS {
+                return Err(WriteError::input(format!("attribute \"{}\" has {} elements", a.name, a.elements)));
+            }
+            if attributes[..i].iter().any(|b| b.name == a.name) {
+                return Err(WriteError::input(format!("two attributes are named \"{}\"", a.name)));
+            }
+        }
+        Ok(Self::place(points, attributes.to_vec(), precision))
+    }
+
+    fn place(points: u64, described: Vec<Attribute>, precision: Precision) -> Self {
+        let mut end = HEADER_BYTES;
+        let mut section = |bytes: u64| {
+            let section = Section { offset: align(end), bytes };
+            end = section.end();
+            section
+        };
+        let batches = batch_count(points);
+        let records = section(32 * u64::from(batches));
+        let (hi10, colour) = (section(4 * points), section(4 * points));
+        let attributes = described.iter().map(|a| section(points * a.size() as u64)).collect();
+        let mid10 = (precision >= Precision::Twenty).then(|| section(4 * points));
+        let lo10 = (precision >= Precision::Thirty).then(|| section(4 * points));
+        let originals = section(0).offset;
+        Self { points, batches, records, hi10, colour, attributes, mid10, lo10, originals, described }
+    }
+
+    /// The same file with other planes: what lies before mid10 stays where it is.
+    #[must_use]
+    pub fn with_precision(self, precision: Precision) -> Self {
+        Self::place(self.points, self.described, precision)
+    }
+
+    /// The planes that have a place.
+    pub fn precision(&self) -> Precision {
+        match (self.mid10, self.lo10) {
+            (None, _) => Precision::Ten,
+            (_, None) => Precision::Twenty,
+            _ => Precision::Thirty,
+        }
+    }
+
+    /// The first byte behind the last section that has one entry a point.
+    pub fn end_of_points(&self) -> u64 {
+        let attributes = self.attributes.last().unwrap_or(&self.colour);
+        self.lo10.or(self.mid10).unwrap_or(*attributes).end()
+    }
+
+    /// The slot of Morton batch `batch`, and the storage index of its first point.
+    pub fn slot(&self, batch: u32) -> (u32, u32) {
+        let slot = swap_slot(batch, self.batches);
+        // N < 2^32: no slot begins behind it
+        (slot, slot.saturating_mul(BATCH_POINTS))
+    }
+
+    /// Where the record of `slot` belongs.
+    pub fn record_offset(&self, slot: u32) -> u64 {
+        self.records.offset + 32 * u64::from(slot)
+    }
+
+    /// Where the entry of storage index `first_point` belongs, in a section with `size` bytes a point.
+    pub fn point_offset(section: Section, size: u64, first_point: u32) -> u64 {
+        section.offset + size * u64::from(first_point)
+    }
+
+    /// Bytes of an originals section with so many entries.
+    pub const fn originals_bytes(count: u64) -> u64 {
+        8 + 8 * count
+    }
+
+    /// Header and description of the finished file, with batches swapped, levels, averaged colours and originals.
+    ///
+    /// `tight`: the box of all points, world (empty for none). `originals`: entries of the originals section. Of
+    /// `description` this sets `attributes` (type, place; `min` and `max` of entries with the same name are kept) and
+    /// leaves out `errors` of planes that are not there.
+    ///
+    /// # Errors
+    /// [`WriteError::Input`] for a lattice that is not finite or not > 0, and numbers that JSON cannot hold.
+    pub fn finish(
+        &self,
+        grid: &Grid,
+        tight: &Aabb,
+        originals: u64,
+        mut description: Description,
+    ) -> Result<Finish, WriteError> {
+        let told = std::mem::take(&mut description.attributes);
+        description.attributes = self.entries(&told);
+        description.errors = description.errors.up_to(self.precision());
+        let text = description.to_json();
+        if let Err(e) = Description::from_json(text.as_bytes(), "description".as_ref(), 0) {
+            return Err(WriteError::input(format!("{}: not a number, infinite, or a scale that is not > 0", e.what)));
+        }
+        let description_offset = align(self.originals + Self::originals_bytes(originals));
+        let header = Header {
+            points: self.points,
+            batches: self.batches,
+            grid: *grid,
+            tight: if tight.is_empty() { Aabb { min: [0.0; 3], max: [0.0; 3] } } else { *tight },
+            flags: Flags(Flags::SWAPPED | Flags::LOD | Flags::AVERAGED | Flags::ORIGINALS),
+            sections: Sections {
+                batches: self.records.offset,
+                hi10: self.hi10.offset,
+                mid10: self.mid10.map(|s| s.offset),
+                lo10: self.lo10.map(|s| s.offset),
+                colour: self.colour.offset,
+                originals: Some(self.originals),
+                description: description_offset,
+            },
+            description_bytes: text.len() as u64,
+        };
+        let header_bytes = header.encode();
+        Ok(Finish { header, header_bytes, description, description_bytes: text.into_bytes(), description_offset })
+    }
+
+    fn entries(&self, told: &[AttributeEntry]) -> Vec<AttributeEntry> {
+        let placed = self.described.iter().zip(&self.attributes);
+        placed
+            .map(|(attribute, section)| {
+                let mut entry = AttributeEntry::new(attribute, section.offset, section.bytes);
+                if let Some(told) = told.iter().find(|t| t.name == entry.name) {
+                    entry.min.clone_from(&told.min);
+                    entry.max.clone_from(&told.max);
+                }
+                entry
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{AttributeType, Lattice};
+
+    fn attributes() -> Vec<Attribute> {
+        vec![Attribute::new("intensity", AttributeType::UInt16, 1), Attribute::new("normal", AttributeType::Float32, 3)]
+    }
+
+    #[test]
+    fn sections_follow_each_other_at_multiples_of_256() {
+        let layout = Layout::new(10_241, &attributes(), Precision::Thirty).unwrap();
+        let (mid10, lo10) = (layout.mid10.unwrap(), layout.lo10.unwrap());
+        let order = [layout.records, layout.hi10, layout.colour, layout.attributes[0], layout.attributes[1], mid10, lo10];
+        assert_eq!(order.map(|s| s.bytes), [64, 40_964, 40_964, 20_482, 122_892, 40_964, 40_964]);
+        let mut end = 256;
+        for section in order {
+            assert_eq!(section.offset, align(end));
+            end = section.end();
+        }
+        assert_eq!((layout.end_of_points(), layout.originals), (end, align(end)));
+    }
+
+    #[test]
+    fn planes_dropped_at_the_end_leave_everything_else_in_place() {
+        let all = Layout::new(99, &attributes(), Precision::Thirty).unwrap();
+        let one = all.clone().with_precision(Precision::Ten);
+        assert_eq!(one, Layout::new(99, &attributes(), Precision::Ten).unwrap());
+        assert_eq!((&one.attributes, one.hi10, one.colour), (&all.attributes, all.hi10, all.colour));
+        assert_eq!(one.originals, all.mid10.unwrap().offset);
+    }
+
+    #[test]
+    fn requests_that_do_not_fit_are_refused() {
+        assert!(matches!(Layout::new(1 << 32, &[], Precision::Ten), Err(WriteError::TooManyPoints(_))));
+        assert!(Layout::new((1 << 32) - 1, &attributes(), Precision::Thirty).is_ok());
+        let twice = [attributes(), attributes()].concat();
+        assert!(matches!(Layout::new(1, &twice, Precision::Ten), Err(WriteError::Input(_))));
+        let mut none = attributes();
+        none[0].elements = 0;
+        assert!(matches!(Layout::new(1, &none, Precision::Ten), Err(WriteError::Input(_))));
+    }
+
+    #[test]
+    fn numbers_that_json_cannot_hold_are_refused() {
+        let layout = Layout::new(0, &[], Precision::Ten).unwrap();
+        let grid = Grid::new(&Aabb::EMPTY, 1.0).unwrap();
+        let mut description = Description::new(Lattice { scale: [1.0; 3], offset: [0.0; 3] });
+        assert!(layout.finish(&grid, &Aabb::EMPTY, 0, description.clone()).is_ok());
+        description.source_step[1] = f64::NAN;
+        assert!(matches!(layout.finish(&grid, &Aabb::EMPTY, 0, description), Err(WriteError::Input(_))));
+    }
+}
