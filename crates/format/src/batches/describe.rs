@@ -93,6 +93,9 @@ impl AttributeEntry {
     /// More elements a point than any attribute has.
     pub(crate) const MAX_ELEMENTS: u64 = 256;
 
+    /// More attributes than any file has.
+    pub(crate) const MAX_ATTRIBUTES: usize = 256;
+
     /// The entry of an attribute whose values will be at `offset`; `min` and `max` are left empty.
     pub fn new(attribute: &Attribute, offset: u64, bytes: u64) -> Self {
         let unless = |values: &[f64], usual: f64| match values.iter().all(|v| *v == usual) {
@@ -115,7 +118,8 @@ impl AttributeEntry {
     /// Name, type and scaling; `None` if the type is unknown or elements are not 1 … 256.
     pub fn attribute(&self) -> Option<Attribute> {
         let ty = AttributeType::from_potree_name(&self.type_name)?;
-        let elements = usize::try_from(self.elements).ok().filter(|_| (1..=Self::MAX_ELEMENTS).contains(&self.elements))?;
+        let elements =
+            usize::try_from(self.elements).ok().filter(|_| (1..=Self::MAX_ELEMENTS).contains(&self.elements))?;
         let mut attribute = Attribute::new(self.name.as_str(), ty, elements);
         for (told, usual) in [(&self.value_scale, &mut attribute.scale), (&self.value_offset, &mut attribute.offset)] {
             if told.len() == elements {

@@ -76,12 +76,7 @@ pub fn encode_batch(first_point: u32, positions: [&[f64]; 3], out: &mut EncodedB
         return Err(WriteError::input(format!("{found:?} coordinates are no batch; it has 1 to 10240 on each axis")));
     }
     let [x, y, z] = positions.map(range);
-    out.record = BatchRecord {
-        min: [x.0, y.0, z.0],
-        first_point,
-        max: [x.1, y.1, z.1],
-        points: points as u32,
-    };
+    out.record = BatchRecord { min: [x.0, y.0, z.0], first_point, max: [x.1, y.1, z.1], points: points as u32 };
     for plane in [&mut out.hi10, &mut out.mid10, &mut out.lo10] {
         plane.clear();
         plane.resize(points, 0);

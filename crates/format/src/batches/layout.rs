@@ -70,11 +70,14 @@ impl Layout {
     /// The layout of `points` points with these extra attributes and planes.
     ///
     /// # Errors
-    /// [`WriteError::TooManyPoints`]; [`WriteError::Input`] for attributes of the same name or with 0 or more than 256
-    /// elements.
+    /// [`WriteError::TooManyPoints`]; [`WriteError::Input`] for more than 256 attributes, two of the same name, or one with
+    /// 0 or more than 256 elements.
     pub fn new(points: u64, attributes: &[Attribute], precision: Precision) -> Result<Self, WriteError> {
         if points > MAX_POINTS {
             return Err(WriteError::TooManyPoints(points));
+        }
+        if attributes.len() > AttributeEntry::MAX_ATTRIBUTES {
+            return Err(WriteError::input(format!("{} attributes are too many; 256 are allowed", attributes.len())));
         }
         for (i, a) in attributes.iter().enumerate() {
             if a.elements == 0 || a.elements as u64 > AttributeEntry::MAX_ELEMENTS {
@@ -219,7 +222,8 @@ mod tests {
     fn sections_follow_each_other_at_multiples_of_256() {
         let layout = Layout::new(10_241, &attributes(), Precision::Thirty).unwrap();
         let (mid10, lo10) = (layout.mid10.unwrap(), layout.lo10.unwrap());
-        let order = [layout.records, layout.hi10, layout.colour, layout.attributes[0], layout.attributes[1], mid10, lo10];
+        let order =
+            [layout.records, layout.hi10, layout.colour, layout.attributes[0], layout.attributes[1], mid10, lo10];
         assert_eq!(order.map(|s| s.bytes), [64, 40_964, 40_964, 20_482, 122_892, 40_964, 40_964]);
         let mut end = 256;
         for section in order {

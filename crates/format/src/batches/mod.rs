@@ -30,6 +30,9 @@
 //!
 //! Sections are handed out without copying, so the host has to be little-endian; others are refused when a file is opened.
 
+mod aligned;
+mod blocks;
+mod check;
 mod clod;
 mod colour;
 mod describe;
@@ -38,13 +41,20 @@ mod error;
 mod grid;
 mod header;
 mod layout;
+#[cfg(feature = "mmap")]
+mod map;
 mod morton;
 mod order;
+mod points;
 mod precision;
+mod read;
 mod record;
 mod write;
 
+pub use aligned::AlignedBytes;
+pub use blocks::BlockScratch;
 #[cfg(feature = "zstd")]
+pub use blocks::{DEFAULT_BATCHES_PER_BLOCK, compress};
 pub use clod::{keeps, target_spacing, weight};
 pub use colour::{ColourSum, colour_word, eight_bit, grey, lod_of, rgb_of};
 pub use describe::{AttributeEntry, ColourSource, Description, ErrorFigures, LatticeEntry, PlaneErrors};
@@ -55,7 +65,9 @@ pub use header::{Flags, Header, Sections};
 pub use layout::{Finish, Layout, Section};
 pub use morton::{morton21, morton32};
 pub use order::{batch_count, batch_points, swap_slot};
+pub use points::{BatchPoints, Point, PointsInMortonOrder};
 pub use precision::{Precision, distance_to_box, focal_pixels, projected_diagonal};
+pub use read::{AttributeValue, Batches, Original, Part};
 pub use record::{BatchRecord, Decoder, planes, quantized};
 pub use write::{Cloud, WriteOptions, Written, write};
 

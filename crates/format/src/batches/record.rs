@@ -123,8 +123,7 @@ const fn word(x: u32, y: u32, z: u32) -> u32 {
 mod tests {
     use super::*;
 
-    const BOX: BatchRecord =
-        BatchRecord { min: [10.0, 20.0, 5.0], first_point: 0, max: [18.0, 24.0, 6.0], points: 1 };
+    const BOX: BatchRecord = BatchRecord { min: [10.0, 20.0, 5.0], first_point: 0, max: [18.0, 24.0, 6.0], points: 1 };
 
     #[test]
     fn the_example_of_the_format_page_holds() {
@@ -134,7 +133,10 @@ mod tests {
         assert_eq!([hi, mid, lo], [0x133c_0140, 0x0cc0_0000, 0x3330_0000]);
         assert_eq!(quantized([hi, mid, lo]), q);
         let decoder = BOX.decoder(Precision::Ten);
-        assert_eq!(decoder.position_of_words(hi, u32::MAX, u32::MAX), [12.503_906_25, 23.001_953_125, 5.300_292_968_75]);
+        assert_eq!(
+            decoder.position_of_words(hi, u32::MAX, u32::MAX),
+            [12.503_906_25, 23.001_953_125, 5.300_292_968_75]
+        );
         let thirty = [12.500_000_003_725_29, 23.000_000_001_862_645, 5.300_000_000_279_397];
         assert_eq!(BOX.decode(q, Precision::Thirty), thirty);
         assert_eq!(BOX.decoder(Precision::Thirty).position_of_words(hi, mid, lo), thirty);

@@ -7,8 +7,8 @@ use crate::{Aabb, Attribute, Lattice};
 
 use super::describe::{ColourSource, Description};
 use super::{
-    BATCH_POINTS, ColourSum, EncodedBatch, ErrorSums, Grid, HEADER_BYTES, Header, LOD_LEVELS, Layout, Precision, Section,
-    WriteError, align, colour_word, encode_batch, le_bytes, lod_of, rgb_of,
+    BATCH_POINTS, ColourSum, EncodedBatch, ErrorSums, Grid, HEADER_BYTES, Header, LOD_LEVELS, Layout, Precision,
+    Section, WriteError, align, colour_word, encode_batch, le_bytes, lod_of, rgb_of,
 };
 
 /// Points in memory, in any order.
@@ -203,7 +203,8 @@ fn levels_of_detail(cloud: &Cloud, cells: &[[f64; 3]], order: &[usize]) -> Vec<u
         distance_squared: f64,
         colours: ColourSum,
     }
-    let mut words: Vec<u32> = (0..cells.len()).map(|i| colour_word(rgb_of(cloud.colours[i]), LOD_LEVELS as u8)).collect();
+    let mut words: Vec<u32> =
+        (0..cells.len()).map(|i| colour_word(rgb_of(cloud.colours[i]), LOD_LEVELS as u8)).collect();
     for level in (0..LOD_LEVELS).rev() {
         let mut occupied: HashMap<[u32; 3], Cell> = HashMap::new();
         for &i in order {

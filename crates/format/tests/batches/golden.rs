@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use pointmill_format::Lattice;
-use pointmill_format::batches::{Precision, WriteOptions};
+use pointmill_format::batches::{Batches, Original, Precision, WriteOptions};
 
 use crate::util::{Points, golden};
 
@@ -69,6 +69,49 @@ fn coarse_far_and_empty_clouds_are_written_byte_for_byte() {
     assert_golden("empty.qbatch", &cloud, &options(&cloud, 1.0, Precision::Thirty));
 }
 
+/// The table of the format page.
+#[test]
+fn the_worked_example_is_read_as_the_page_tells_it() {
+    let batches = Batches::read(&golden("example.qbatch")).unwrap();
+    assert_eq!((batches.header().points, batches.header().grid.exponent), (6, 2));
+    assert_eq!(batches.attribute::<u16>(0).unwrap(), [2, 259, 1, 65_535, 4, 5]);
+    assert_eq!(batches.attribute::<u8>(1).unwrap(), [2, 5, 2, 1, 6, 6]);
+    let quantized = |i| LATTICE.world(i);
+    let expected = [
+        ([100, 100, 100], [255, 0, 0], 1, [255, 0, 0]),
+        ([900, 200, 100], [0, 255, 0], 1, [0, 255, 0]),
+        ([500, 500, 500], [139, 139, 25], 0, [200, 100, 50]),
+        ([500, 500, 500], [100, 200, 50], 3, [100, 200, 50]),
+        ([1500, 700, 300], [0, 0, 255], 0, [0, 0, 255]),
+        ([2250, 250, 1000], [10, 20, 30], 0, [10, 20, 30]),
+    ];
+    for (point, (p, rgb, lod, original)) in batches.points_in_morton_order(Precision::Thirty).zip(expected) {
+        let point = point.unwrap();
+        assert!(point.world.iter().zip(quantized(p)).all(|(a, b)| (a - b).abs() < 2e-9), "{point:?}");
+        assert_eq!((point.rgb, point.lod, batches.original_colour(point.index)), (rgb, lod, Some(original)));
+    }
+    assert_eq!(batches.originals()[2], Original { index: 2, colour: 0x0032_64c8 });
+}
+
+#[cfg(feature = "zstd")]
+#[test]
+fn frames_that_no_compressor_made_are_read() {
+    let (raw, packed) = ["example.qbatch", "blocks.qbatch"].map(|n| Batches::read(&golden(n)).unwrap()).into();
+    assert!(packed.is_compressed() && packed.read_everything().unwrap() == 6);
+    let points = |b: &Batches<_>| b.points_in_morton_order(Precision::Thirty).map(Result::unwrap).collect::<Vec<_>>();
+    assert_eq!(points(&packed), points(&raw));
+}
+
+#[test]
+fn every_golden_file_is_read_to_its_end() {
+    for (name, points, precision) in
+        [("coarse", 6, Precision::Ten), ("far", 3, Precision::Thirty), ("empty", 0, Precision::Thirty)]
+    {
+        let batches = Batches::read(&golden(&format!("{name}.qbatch"))).unwrap();
+        assert_eq!((batches.read_everything().unwrap(), batches.header().precision()), (points, precision));
+    }
+}
+
 fn fnv1a(bytes: &[u8]) -> String {
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325u64, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3));
     format!("{hash:016x}")
@@ -115,7 +158,9 @@ fn the_worked_example_of_the_format_page_is_the_golden_file() {
     let file = std::fs::read(golden("example.qbatch")).unwrap();
     let mut quoted = 0;
     for line in page.lines() {
-        let Some((offset, rest)) = line.strip_prefix("qbatch ").and_then(|rest| rest.split_once(": ")) else { continue };
+        let Some((offset, rest)) = line.strip_prefix("qbatch ").and_then(|rest| rest.split_once(": ")) else {
+            continue;
+        };
         let hex = rest.split("  ").next().unwrap();
         let expected: Vec<u8> = hex.split(' ').map(|h| u8::from_str_radix(h, 16).unwrap()).collect();
         let offset: usize = offset.trim().parse().unwrap();

@@ -2,4 +2,6 @@
 //! byte for byte, what is written is read back within the promised error, and hostile bytes end in an error.
 
 mod golden;
+mod hostile;
+mod round_trip;
 mod util;

@@ -3,12 +3,17 @@
 use std::io::Cursor;
 use std::path::PathBuf;
 
-use pointmill_format::batches::{Cloud, WriteOptions, Written, colour_word, write};
-use pointmill_format::{Attribute, AttributeType, Lattice};
+use pointmill_format::batches::{AlignedBytes, Batches, Cloud, WriteOptions, Written, colour_word, write};
+use pointmill_format::{Attribute, AttributeType, Lattice, ReadError};
 
 /// A golden file.
 pub(crate) fn golden(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/batches").join(name)
+}
+
+/// Opens a file in memory.
+pub(crate) fn open(bytes: &[u8]) -> Result<Batches<AlignedBytes>, ReadError> {
+    Batches::open_bytes(AlignedBytes::from(bytes), "points.qbatch".as_ref())
 }
 
 /// The generator of `fixtures/generators/batches.py`.
