@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use pointmill_format::{Aabb, OpenOptions};
 
+use crate::exit::Failure;
 use crate::quantities::{parse_bounds, parse_bytes};
 
 /// Turns raw scans into data that renderers stream, without losing a point.
@@ -63,9 +64,13 @@ pub(crate) struct ReadingArgs {
 }
 
 impl ReadingArgs {
-    /// For the readers.
-    pub(crate) fn options(&self) -> OpenOptions {
-        OpenOptions { columns: self.columns.clone(), separator: self.separator, keep_row_column: self.row_column }
+    /// For the readers; columns that cannot be are told before any file is opened.
+    pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
+        if let Some(columns) = &self.columns {
+            pointmill_format::text::check_columns(columns).map_err(|e| Failure::Usage(format!("--columns: {e}")))?;
+        }
+        let Self { columns, separator, row_column } = self;
+        Ok(OpenOptions { columns: columns.clone(), separator: *separator, keep_row_column: *row_column })
     }
 }
 
@@ -413,7 +418,7 @@ mod tests {
             convert(&["--class", "2,6", "--bounds", "-1,-2,-3..1,2,3", "--attributes", "rgb, intensity"]).unwrap();
         assert_eq!(args.class, Some(vec![2, 6]));
         assert_eq!(args.bounds.unwrap().min, [-1.0, -2.0, -3.0]);
-        assert_eq!(args.attributes, Attributes::List(vec!["rgb".into(), "intensity".into()]));
+        assert_eq!(args.attributes, Some(Attributes::List(vec!["rgb".into(), "intensity".into()])));
         assert_eq!(args.scale, Scale(None));
     }
 

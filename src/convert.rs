@@ -114,7 +114,7 @@ fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
 fn plan(args: &ConvertArgs, targets: Vec<Target>, inputs: Inputs) -> Result<Plan, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
     let mut plan = Plan::new(inputs.files, args.output.clone());
-    plan.open = args.inputs.options();
+    plan.open = args.inputs.options()?;
     plan.name = name;
     plan.targets = targets;
     plan.sampling = match (args.sampling, args.seed) {

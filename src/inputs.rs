@@ -37,26 +37,28 @@ pub(crate) enum Kind {
 
 impl InputArgs {
     /// What the files do not say of themselves.
-    pub(crate) fn options(&self) -> OpenOptions {
+    pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
         self.reading.options()
     }
 
     /// Finds the scans that are meant.
     pub(crate) fn expand(&self) -> Result<Inputs, Failure> {
+        let options = self.options()?;
         let mut typed = self.inputs.clone();
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        expand(&typed)
+        expand(&typed, &options)
     }
 }
 
-/// Finds the scans that `typed` means: files, folders (recursive), globs where no such path exists.
-pub(crate) fn expand(typed: &[PathBuf]) -> Result<Inputs, Failure> {
+/// Finds the scans that `typed` means: files, folders (recursive), globs where no such path exists. A file that is
+/// named together with its columns is text, whatever it looks like.
+pub(crate) fn expand(typed: &[PathBuf], options: &OpenOptions) -> Result<Inputs, Failure> {
     if typed.is_empty() {
         return Err(Failure::Usage("no input: name scans, folders or globs, or pass --files-from LIST".to_owned()));
     }
-    let mut search = Search::default();
+    let mut search = Search { options: options.clone(), ..Search::default() };
     for path in typed {
         search.add_typed(path)?;
     }
@@ -69,6 +71,7 @@ struct Search {
     found: BTreeMap<PathBuf, PathBuf>,
     repeated: Vec<PathBuf>,
     no_scans: Vec<PathBuf>,
+    options: OpenOptions,
 }
 
 impl Search {
@@ -83,14 +86,11 @@ impl Search {
 
     /// A file that was named must be a scan.
     fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
-        match kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? {
-            Kind::Scan => self.add_scan(path),
-            Kind::NoScan => {
-                let supported = supported_scans();
-                let line = format!("{}: this is no scan that is known here; supported are {supported}", path.display());
-                return Err(Failure::Unsupported(line));
-            }
+        if kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? == Kind::NoScan {
+            // the readers say why, unless columns were named that make it one
+            pointmill_format::open_scan(path, &self.options)?;
         }
+        self.add_scan(path);
         Ok(())
     }
 
@@ -192,11 +192,11 @@ pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
     }
 }
 
-/// [`kind`] of a file that a folder brought along. Lines of numbers are many things (matrices, tracks, logs): text counts as a
-/// scan if its ending says so too.
+/// [`kind`] of a file that a folder brought along. Lines of numbers are many things (matrices, tracks, logs): they count
+/// as a scan if the ending says so too.
 fn kind_in_folder(path: &Path) -> io::Result<Kind> {
     match content(path)? {
-        Some(ScanKind::Text(TextKind::Xyz)) if !ends_with(path, &TEXT_ENDINGS) => Ok(Kind::NoScan),
+        Some(ScanKind::Text(TextKind::Xyz | TextKind::Pts)) if !ends_with(path, &TEXT_ENDINGS) => Ok(Kind::NoScan),
         _ => kind(path),
     }
 }
@@ -263,7 +263,7 @@ fn path_from_bytes(bytes: &[u8]) -> PathBuf {
 mod tests {
     use super::*;
 
-    /// A folder with two scans (one of them by ending alone), a PLY and a text.
+    /// A folder with three scans (one of them by ending alone) and other files, some of which hold lines of numbers.
     fn folder() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir(dir.path().join("süd")).unwrap();
@@ -272,11 +272,17 @@ mod tests {
             ("süd/a.LAZ", b""),
             ("c.ply", b"ply\nformat ascii 1.0\n"),
             ("notes.txt", b"hello"),
+            ("matrix.txt", b"1 0 0\n0 1 0\n0 0 1\n"),
+            ("counted.log", b"2\n1 0 0\n0 1 0\n"),
             ("._b.laz", b"Finder"),
         ] {
             fs::write(dir.path().join(name), bytes).unwrap();
         }
         dir
+    }
+
+    fn find(typed: &[PathBuf]) -> Result<Inputs, Failure> {
+        expand(typed, &OpenOptions::default())
     }
 
     fn names(inputs: &Inputs) -> Vec<&str> {
@@ -286,37 +292,65 @@ mod tests {
     #[test]
     fn a_folder_gives_its_scans_sorted_and_says_what_it_left_out() {
         let dir = folder();
-        let inputs = expand(&[dir.path().to_path_buf()]).unwrap();
-        assert_eq!(names(&inputs), ["b.dat", "a.LAZ"]);
-        assert_eq!(inputs.notes.len(), 2, "{:?}", inputs.notes);
-        assert!(inputs.notes[0].starts_with("2 other files left out") && inputs.notes[0].contains("notes.txt"));
-        assert!(inputs.notes[1].contains("c.ply: PLY"));
+        let inputs = find(&[dir.path().to_path_buf()]).unwrap();
+        assert_eq!(names(&inputs), ["b.dat", "c.ply", "a.LAZ"]);
+        let [note] = inputs.notes.as_slice() else { panic!("{:?}", inputs.notes) };
+        assert!(note.starts_with("4 other files left out, no scans"), "{note}");
+        assert!(["._b.laz", "counted.log", "matrix.txt"].iter().all(|name| note.contains(name)), "{note}");
+    }
+
+    #[test]
+    fn lines_of_numbers_count_in_a_folder_by_their_ending_and_elsewhere_by_content() {
+        let dir = folder();
+        for name in ["tile.xyz", "tile.CSV", "tile.asc", "tile.pts"] {
+            fs::copy(dir.path().join("matrix.txt"), dir.path().join("süd").join(name)).unwrap();
+        }
+        fs::copy(dir.path().join("notes.txt"), dir.path().join("süd/notes.csv")).unwrap();
+        let inputs = find(&[dir.path().join("süd")]).unwrap();
+        assert_eq!(names(&inputs), ["a.LAZ", "tile.CSV", "tile.asc", "tile.pts", "tile.xyz"]);
+        assert_eq!(names(&find(&[dir.path().join("matrix.txt")]).unwrap()), ["matrix.txt"]);
+        assert_eq!(names(&find(&[dir.path().join("*.txt")]).unwrap()), ["matrix.txt"]);
+        assert_eq!(names(&find(&[dir.path().join("*.log")]).unwrap()), ["counted.log"]);
+    }
+
+    #[test]
+    fn a_file_whose_columns_are_named_is_taken_for_text() {
+        let dir = folder();
+        fs::write(dir.path().join("flat.dat"), "1 2\n3 4\n").unwrap();
+        let named = OpenOptions { columns: Some(vec!["x".into(), "y".into()]), ..OpenOptions::default() };
+        let code = |name: &str| expand(&[dir.path().join(name)], &named).map_err(|e| e.code());
+        assert_eq!(names(&code("flat.dat").unwrap()), ["flat.dat"]);
+        assert_eq!(code("notes.txt").unwrap_err(), 3);
+        assert_eq!(names(&expand(&[dir.path().join("*.dat")], &named).unwrap()), ["b.dat"], "a glob brings others");
+        assert_eq!(find(&[dir.path().join("flat.dat")]).unwrap_err().code(), 3, "without columns");
     }
 
     #[test]
     fn globs_are_tried_only_where_no_such_path_exists() {
         let dir = folder();
-        assert_eq!(names(&expand(&[dir.path().join("**/*.LAZ")]).unwrap()), ["a.LAZ"]);
+        assert_eq!(names(&find(&[dir.path().join("**/*.LAZ")]).unwrap()), ["a.LAZ"]);
         fs::write(dir.path().join("x[1].las"), "LASF").unwrap();
         fs::write(dir.path().join("x1.las"), "LASF").unwrap();
-        assert_eq!(names(&expand(&[dir.path().join("x[1].las")]).unwrap()), ["x[1].las"]);
-        assert_eq!(expand(&[dir.path().join("*.nothing")]).unwrap_err().code(), 2);
+        assert_eq!(names(&find(&[dir.path().join("x[1].las")]).unwrap()), ["x[1].las"]);
+        assert_eq!(find(&[dir.path().join("*.nothing")]).unwrap_err().code(), 2);
     }
 
     #[test]
     fn a_file_counts_once_however_it_is_spelt() {
         let dir = folder();
         let again = dir.path().join("süd/../b.dat");
-        let inputs = expand(&[dir.path().join("b.dat"), again, dir.path().to_path_buf()]).unwrap();
-        assert_eq!(inputs.files.len(), 2);
+        let inputs = find(&[dir.path().join("b.dat"), again, dir.path().to_path_buf()]).unwrap();
+        assert_eq!(names(&inputs), ["b.dat", "c.ply", "a.LAZ"]);
         assert!(inputs.notes.iter().any(|n| n.starts_with("2 inputs named more than once")), "{:?}", inputs.notes);
     }
 
     #[test]
     fn what_was_named_must_be_a_scan() {
         let dir = folder();
-        let code = |name: &str| expand(&[dir.path().join(name)]).unwrap_err().code();
-        assert_eq!([code("notes.txt"), code("c.ply"), code("missing.las")], [4, 4, 2]);
+        let code = |name: &str| find(&[dir.path().join(name)]).unwrap_err().code();
+        assert_eq!([code("notes.txt"), code("missing.las")], [4, 2]);
+        let Failure::Unsupported(line) = find(&[dir.path().join("notes.txt")]).unwrap_err() else { panic!() };
+        assert!(["notes.txt", "LAS, LAZ", "E57", "PLY", "PCD", "XYZ"].iter().all(|w| line.contains(w)), "{line}");
         fs::create_dir(dir.path().join("empty")).unwrap();
         assert_eq!(code("empty"), 3);
     }
@@ -336,6 +370,6 @@ mod tests {
         let dir = folder();
         std::os::unix::fs::symlink("nowhere", dir.path().join("süd/z.las")).unwrap();
         std::os::unix::fs::symlink(".", dir.path().join("süd/loop")).unwrap();
-        assert_eq!(names(&expand(&[dir.path().join("süd")]).unwrap()), ["a.LAZ", "z.las"]);
+        assert_eq!(names(&find(&[dir.path().join("süd")]).unwrap()), ["a.LAZ", "z.las"]);
     }
 }

@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::time::Instant;
 
+use pointmill_format::ReadError;
+
 use crate::budget::Budget;
 use crate::checksum::Checksum;
 use crate::describe::{Description, resolve_crs};
@@ -223,13 +225,14 @@ fn nothing_to_convert(job: &Job, stats: &Stats) -> ConvertError {
             stats.outside_bounds, stats.other_class, stats.thinned, stats.invalid
         ));
     }
-    let first = job.sources.first().map(|s| s.scan.info().path.display().to_string()).unwrap_or_default();
-    match job.sources.len() {
-        1 => ConvertError::Input(format!("{first}: holds no points; there is nothing to convert")),
-        n => ConvertError::Input(format!(
-            "{first} and {} more inputs hold no points; there is nothing to convert",
-            n - 1
-        )),
+    match job.sources.as_slice() {
+        [] => ConvertError::Input("there is nothing to convert".into()),
+        [first, rest @ ..] => {
+            let info = first.scan.info();
+            let others = if rest.is_empty() { String::new() } else { format!(", nor do {} more inputs", rest.len()) };
+            let what = format!("holds no points up to its end{others}");
+            ReadError::broken(&info.path, info.file_bytes, what).advise("there is nothing to convert").into()
+        }
     }
 }
 

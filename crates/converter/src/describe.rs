@@ -78,9 +78,15 @@ impl Description {
         if let Some(wkt) = &self.crs.wkt {
             own.insert("wkt".into(), wkt.clone().into());
         }
-        if !dropped.is_empty() {
-            let dropped = dropped.iter().map(|d| (d.name.clone(), d.why.clone().into()));
-            own.insert("attributesDropped".into(), Map::from_iter(dropped).into());
+        // Those that were not asked for are no matter of the dataset: which there were depends on the kind of the scans.
+        if plan.attributes == AttributeChoice::Scene {
+            let names: Vec<&str> = dropped.iter().map(|d| d.name.as_str()).collect();
+            let constant = |name: &str| self.ranges.get(job.schema.find(name)?)?.constant();
+            let constants: Map<_, _> =
+                names.iter().filter_map(|n| Some(((*n).to_owned(), json!(constant(n)?)))).collect();
+            if !constants.is_empty() {
+                own.insert("attributesDropped".into(), constants.into());
+            }
         }
         own
     }

@@ -33,6 +33,8 @@ pub struct Plan {
     pub memory_bytes: u64,
     /// Worker threads, ≥ 1.
     pub threads: usize,
+    /// Points that a thread takes at once, at most; `None`: as the memory allows. Changes nothing in the output.
+    pub task_points: Option<u64>,
     /// Where temporary files go; `None`: beside the output.
     pub temp_dir: Option<PathBuf>,
     /// Which points go in.
@@ -213,6 +215,7 @@ impl Plan {
             scale: ScaleChoice::Auto,
             memory_bytes: crate::memory::default_ceiling_bytes(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
+            task_points: None,
             temp_dir: None,
             filter: Filter::default(),
             duplicates: Duplicates::Keep,

@@ -126,10 +126,6 @@ pub fn supported_scans() -> String {
 #[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
 pub fn open_scan(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
     let first = first_bytes(path)?;
-    let unknown = || {
-        ReadError::unsupported(path, "not a scan that is known here")
-            .advise(format!("supported are {}", supported_scans()))
-    };
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
         // Columns were named for it: then it is text, if it can be.
@@ -140,7 +136,7 @@ pub fn open_scan(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, Re
         None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {
             return Err(ReadError::broken(path, 0, "the file is empty").advise("copy it again, or leave it out"));
         }
-        None => return Err(unknown()),
+        None => return Err(unknown(path, &first)),
     };
     match kind {
         #[cfg(feature = "las")]
@@ -159,6 +155,30 @@ pub fn open_scan(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, Re
             crate::text::open(path, &options)
         }
     }
+}
+
+/// The endings of scans. They never tell what a file is, but that it was to be one.
+const ENDINGS: [&str; 11] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "off", "xyz", "asc", "csv"];
+
+/// Why a file of no kind is refused: as no scan at all, or as one of which too little is left.
+fn unknown(path: &Path, first: &[u8]) -> ReadError {
+    let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    let supported = format!("supported are {}", supported_scans());
+    match ending.filter(|e| ENDINGS.contains(&e.as_str())) {
+        _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),
+        Some(ending) => ReadError::broken(path, 0, format!("called .{ending}, but it is no scan that is known here"))
+            .advise(format!("if it was cut short or damaged, copy it again; {supported}")),
+        None if starts_with_number(first) => ReadError::broken(path, 0, "no whole row of three numbers or more")
+            .advise("if it was cut short, copy it again; if its columns are x,y alone, say so with --columns"),
+        None => ReadError::unsupported(path, "this is no scan that is known here").advise(supported),
+    }
+}
+
+/// True if text begins with digits, as the rows of a scan do.
+fn starts_with_number(first: &[u8]) -> bool {
+    let start = first.trim_ascii_start();
+    let start = start.strip_prefix(b"-").unwrap_or(start);
+    start.first().is_some_and(u8::is_ascii_digit) && !first.contains(&0)
 }
 
 /// The start of a regular file; nothing of anything else: opening a pipe would wait for somebody who writes to it.
@@ -219,5 +239,19 @@ mod tests {
         let error = error.err().unwrap();
         assert!(matches!(error.kind, ErrorKind::Unsupported));
         assert!(error.to_string().contains("LAS, LAZ, E57, PLY, PCD, text"), "{error}");
+    }
+
+    #[test]
+    fn what_was_to_be_a_scan_and_is_none_is_broken() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, bytes) in [("a.ply", "pl"), ("a.LAZ", "LA"), ("a.csv", "X,Y"), ("a.txt", "12.5 1"), ("a.e57", "")] {
+            let path = dir.path().join(name);
+            fs::write(&path, bytes).unwrap();
+            let error = open_scan(&path, &OpenOptions::default()).err().unwrap();
+            assert!(matches!(error.kind, ErrorKind::Broken) && error.offset == Some(0), "{error}");
+        }
+        fs::write(dir.path().join("a.txt"), "1 gallon\n").unwrap();
+        let error = open_scan(&dir.path().join("a.txt"), &OpenOptions::default()).err().unwrap();
+        assert!(matches!(error.kind, ErrorKind::Broken), "{error}");
     }
 }

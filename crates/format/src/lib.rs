@@ -1,7 +1,8 @@
 //! Readers and writers of point-cloud formats, for renderers and for preprocessors.
 //!
 //! * [`batches`]: quantised batches with levels of detail, mapped as they stand (cargo features `mmap`, `zstd`), and written.
-//! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written.
+//! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written
+//!   (feature `rstar`: nearest points too).
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
 //! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.

@@ -3,6 +3,7 @@
 
 mod batch;
 mod columns;
+pub(crate) mod load;
 mod moments;
 pub(crate) mod outliers;
 mod partition;

@@ -8,6 +8,9 @@ use crate::job::Job;
 /// So many points, or one in a million, are a handful.
 const HANDFUL: u64 = 16;
 
+/// Of a cloud so many times smaller they are no handful any more.
+const RARE: u64 = 100;
+
 /// The box without them must be so many times smaller to be worth a word.
 const WORTH: f64 = 10.0;
 
@@ -42,7 +45,7 @@ impl Outliers {
 
 /// Looks at the cells of the partition, not at the points.
 pub(crate) fn find(gathered: &Gathered, job: &Job) -> Option<Outliers> {
-    let handful = HANDFUL.max(gathered.stats.points / 1_000_000);
+    let handful = handful(gathered.stats.points);
     let cells: Vec<&Cell> = gathered.cells.iter().collect();
     let (kept, left_out) = trim(cells, handful)?;
     let cube = &gathered.cube;
@@ -59,6 +62,11 @@ pub(crate) fn find(gathered: &Gathered, job: &Job) -> Option<Outliers> {
     let whole = longest([0, 1, 2].map(|a| bounds.max[a].abs_diff(bounds.min[a]) as f64 * job.lattice.scale[a]));
     let factor = whole / longest(others.extent());
     (left_out > 0 && factor >= WORTH).then_some(Outliers { points: left_out, others, factor })
+}
+
+/// How many of `points` points are too few to matter.
+fn handful(points: u64) -> u64 {
+    HANDFUL.max(points / 1_000_000).min(points / RARE)
 }
 
 /// Leaves out cells from both ends of every axis as long as the points in them are a handful.
@@ -109,6 +117,11 @@ mod tests {
         assert_eq!((kept.len(), left_out), (2, 5));
         let many = [cell(0, 30), cell(100, 50_000)];
         assert_eq!(trim(many.iter().collect(), 16).unwrap().1, 0);
+    }
+
+    #[test]
+    fn most_of_a_small_cloud_are_no_outliers() {
+        assert_eq!([10, 99, 100, 2_000, 50_000_000].map(handful), [0, 0, 1, 16, 50]);
     }
 
     #[test]

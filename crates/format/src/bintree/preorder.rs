@@ -121,8 +121,11 @@ mod tests {
         Node { bounds, count, kind: high.map_or(leaf, |high| NodeKind::Inner { axis: 0, split: 0.5, high }) }
     }
 
+    /// Points, and the high child of an inner node.
+    type Row = (u64, Option<u32>);
+
     /// The fault of the first node that does not fit, or of the end; the names of the leaves.
-    fn fault_of(nodes: &[(u64, Option<u32>)]) -> Result<Vec<String>, String> {
+    fn fault_of(nodes: &[Row]) -> Result<Vec<String>, String> {
         let (mut order, mut names) = (Preorder::default(), Vec::new());
         for &(count, high) in nodes {
             if high.is_none() {
@@ -143,7 +146,7 @@ mod tests {
 
     #[test]
     fn whatever_is_not_a_tree_in_preorder_is_refused() {
-        let faults: [(&[(u64, Option<u32>)], &str); 9] = [
+        let faults: [(&[Row], &str); 9] = [
             (&[(2, Some(0))], "high child 0"),
             (&[(2, Some(1))], "not behind its low child 1"),
             (&[(3, Some(3)), (1, None), (2, None)], "stands where the high child 3"),

@@ -115,6 +115,9 @@ impl NodeText {
         let count = self.count.ok_or_else(|| missing("count"))?;
         let kind = match self.children {
             Some(_) if self.file.is_some() || self.start.is_some() => return Err("has children and points".into()),
+            Some(_) if self.degenerate == Some(true) && self.axis.is_some_and(|axis| axis >= 0) => {
+                return Err("is degenerate, but has an axis".into());
+            }
             Some([_, high]) if self.degenerate == Some(true) => NodeKind::Degenerate { high },
             Some([_, high]) => {
                 let axis = u8::try_from(self.axis.ok_or_else(|| missing("axis"))?);
