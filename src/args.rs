@@ -4,8 +4,9 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
-use pointmill_format::Aabb;
+use pointmill_format::{Aabb, OpenOptions};
 
+use crate::exit::Failure;
 use crate::quantities::{parse_bounds, parse_bytes};
 
 /// Turns raw scans into data that renderers stream, without losing a point.
@@ -31,12 +32,59 @@ pub(crate) enum Command {
 /// Where points come from.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct InputArgs {
-    /// Scans (LAS, LAZ): files, folders (searched recursively) or globs
+    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF): files, folders (searched recursively) or globs
     #[arg(value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// Reads more inputs from LIST, one a line; empty lines and lines that begin with # are skipped
     #[arg(long, value_name = "LIST")]
     pub(crate) files_from: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+}
+
+/// What files do not say of themselves.
+#[derive(Debug, Default, ClapArgs)]
+pub(crate) struct ReadingArgs {
+    /// Columns of text scans in file order, as in x,y,z,r,g,b,i: x y z, r g b, i (intensity), c (classification), nx ny
+    /// nz; - leaves one out, any other name makes an attribute, its type after a colon [default: found out]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "How scans are read"
+    )]
+    pub(crate) columns: Option<Vec<String>>,
+    /// What stands between the fields of text scans: one character, or tab, space, comma, semicolon [default: found out]
+    #[arg(long, value_name = "CHAR", value_parser = parse_separator, help_heading = "How scans are read")]
+    pub(crate) separator: Option<char>,
+    /// Keeps rowIndex and columnIndex of E57 scans as attributes
+    #[arg(long, help_heading = "How scans are read")]
+    pub(crate) row_column: bool,
+}
+
+impl ReadingArgs {
+    /// For the readers; columns that cannot be are told before any file is opened.
+    pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
+        if let Some(columns) = &self.columns {
+            pointmill_format::text::check_columns(columns).map_err(|e| Failure::Usage(format!("--columns: {e}")))?;
+        }
+        let Self { columns, separator, row_column } = self;
+        Ok(OpenOptions { columns: columns.clone(), separator: *separator, keep_row_column: *row_column })
+    }
+}
+
+fn parse_separator(text: &str) -> Result<char, String> {
+    match text {
+        "tab" | "\\t" => Ok('\t'),
+        "space" | "blank" => Ok(' '),
+        "comma" => Ok(','),
+        "semicolon" => Ok(';'),
+        _ => {
+            let mut chars = text.chars();
+            chars.next().filter(|_| chars.next().is_none()).ok_or_else(|| "one character is expected".to_owned())
+        }
+    }
 }
 
 #[derive(Debug, ClapArgs)]
@@ -47,9 +95,10 @@ pub(crate) struct ConvertArgs {
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 
-    /// Output format
+    /// Output format; several, each with its own --to, are made from one read of the input and go into OUT/potree2,
+    /// OUT/bintree, OUT/batches
     #[arg(long, value_name = "FORMAT", default_value = "potree2", help_heading = "Output")]
-    pub(crate) to: Vec<Target>,
+    pub(crate) to: Vec<TargetArg>,
     /// Replaces OUT if it is a dataset; the old one stays until the new one is complete
     #[arg(long, help_heading = "Output")]
     pub(crate) overwrite: bool,
@@ -73,17 +122,22 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "POINTS", default_value = "10000",
           value_parser = clap::value_parser!(u32).range(1..=1_000_000), help_heading = "Output")]
     pub(crate) leaf_capacity: u32,
-    /// Coordinate step in units of the CRS, or `auto`: the sources' own, so that no coordinate changes
+    #[command(flatten)]
+    pub(crate) bintree: BintreeArgs,
+    #[command(flatten)]
+    pub(crate) batches: BatchesArgs,
+    /// Coordinate step in units of the CRS, or `auto`: the sources' own, so that no coordinate changes; for scans
+    /// without one, what the extent and the precision of the scan allow
     #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale, help_heading = "Output")]
     pub(crate) scale: Scale,
     /// Overrides the coordinate reference system: a proj4 string, EPSG:n or WKT [default: from the inputs]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     pub(crate) crs: Option<String>,
 
-    /// `all`; `scene`: without those that are constant; or a list, as in intensity,rgb
-    #[arg(long, value_name = "all|scene|LIST", default_value = "all", value_parser = parse_attributes,
-          help_heading = "What goes in")]
-    pub(crate) attributes: Attributes,
+    /// `all`; `scene`: without those that are constant; or a list, as in intensity,rgb [default: all for potree2, the
+    /// class for bintree, the colour for batches]
+    #[arg(long, value_name = "all|scene|LIST", value_parser = parse_attributes, help_heading = "What goes in")]
+    pub(crate) attributes: Option<Attributes>,
     /// Keeps the points inside this box, in world coordinates
     #[arg(long, value_name = "X,Y,Z..X,Y,Z", value_parser = parse_bounds, allow_hyphen_values = true,
           help_heading = "What goes in")]
@@ -131,6 +185,78 @@ pub(crate) struct ConvertArgs {
     pub(crate) talk: TalkArgs,
 }
 
+/// Settings of a mean-split binary tree.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct BintreeArgs {
+    /// A leaf of a binary tree has at most so many points [default: 65000]
+    #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Output: bintree")]
+    pub(crate) capacity: Option<u32>,
+    /// Where nodes are split; anything but the mean is for comparison [default: mean]
+    #[arg(long, value_enum, value_name = "RULE", help_heading = "Output: bintree")]
+    pub(crate) split: Option<SplitArg>,
+    /// One file a leaf, or all leaves in one file [default: files]
+    #[arg(long, value_enum, value_name = "LAYOUT", help_heading = "Output: bintree")]
+    pub(crate) layout: Option<LayoutArg>,
+}
+
+/// Settings of quantised batches.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct BatchesArgs {
+    /// Side of the cells of the coarsest level of detail, in units of the CRS, or `auto`: from extent and density
+    /// [default: 1]
+    #[arg(long, value_name = "STEP|auto", value_parser = parse_scale, help_heading = "Output: batches")]
+    pub(crate) lod_cell: Option<Scale>,
+    /// Bits of a coordinate: 10, 20 or 30, or `auto`: what the step of the scans needs [default: auto]
+    #[arg(long, value_name = "BITS", value_parser = parse_planes, help_heading = "Output: batches")]
+    pub(crate) planes: Option<Planes>,
+    /// Compresses the sections in blocks that decode on their own; they cannot be mapped then [default: none]
+    #[arg(long, value_name = "zstd[:LEVEL]", value_parser = parse_compress, help_heading = "Output: batches")]
+    pub(crate) compress: Option<i32>,
+    /// Does not keep the colours that averaging replaces
+    #[arg(long, help_heading = "Output: batches")]
+    pub(crate) no_originals: bool,
+}
+
+/// Planes of ten bits, or as many as are needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Planes(pub(crate) Option<u8>);
+
+fn parse_planes(text: &str) -> Result<Planes, String> {
+    match text {
+        "auto" => Ok(Planes(None)),
+        "10" => Ok(Planes(Some(1))),
+        "20" => Ok(Planes(Some(2))),
+        "30" => Ok(Planes(Some(3))),
+        _ => Err("10, 20, 30 or auto is expected".to_owned()),
+    }
+}
+
+/// Zstandard's own default.
+const ZSTD_LEVEL: i32 = 3;
+
+fn parse_compress(text: &str) -> Result<i32, String> {
+    match text.split_once(':').unwrap_or((text, "")) {
+        ("zstd", "") => Ok(ZSTD_LEVEL),
+        ("zstd", level) => level.parse().ok().filter(|l| (1..=19).contains(l)).ok_or("levels are 1 to 19".to_owned()),
+        _ => Err("zstd or zstd:LEVEL is expected".to_owned()),
+    }
+}
+
+/// Where the nodes of a binary tree are split.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SplitArg {
+    Mean,
+    Median,
+    Midpoint,
+}
+
+/// Where the leaves of a binary tree go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LayoutArg {
+    Files,
+    Packed,
+}
+
 /// How much is told while the program works.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct TalkArgs {
@@ -152,6 +278,8 @@ pub(crate) struct ValidateArgs {
     /// Proves that every point of these scans is in the dataset exactly once: files, folders or globs
     #[arg(long, value_name = "INPUT", num_args = 1..)]
     pub(crate) against: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     /// Leaves out spacing, coverage and quality figures, which take most of the time
     #[arg(long)]
     pub(crate) fast: bool,
@@ -173,20 +301,23 @@ pub(crate) struct InfoArgs {
     /// Decodes every point: counts them and measures bounds and the range of each attribute
     #[arg(long)]
     pub(crate) deep: bool,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     /// Prints one JSON array on standard output, an object for each scan or dataset
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// The formats that pointmill knows of; this version writes the first.
+/// The formats that pointmill knows of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Target {
+pub(crate) enum TargetArg {
+    /// Octree with levels of detail, for Potree and its relatives
     Potree2,
     #[value(hide = true)]
     Potree1,
-    #[value(hide = true)]
+    /// Mean-split binary tree with tight boxes: every point at every distance
     Bintree,
-    #[value(hide = true)]
+    /// Morton-sorted quantised batches with CLOD levels, for compute-shader renderers
     Batches,
 }
 
@@ -287,7 +418,7 @@ mod tests {
             convert(&["--class", "2,6", "--bounds", "-1,-2,-3..1,2,3", "--attributes", "rgb, intensity"]).unwrap();
         assert_eq!(args.class, Some(vec![2, 6]));
         assert_eq!(args.bounds.unwrap().min, [-1.0, -2.0, -3.0]);
-        assert_eq!(args.attributes, Attributes::List(vec!["rgb".into(), "intensity".into()]));
+        assert_eq!(args.attributes, Some(Attributes::List(vec!["rgb".into(), "intensity".into()])));
         assert_eq!(args.scale, Scale(None));
     }
 

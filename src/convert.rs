@@ -4,10 +4,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, Duplicates, Encoding, Filter, OnFault, Plan, Report, RgbDepth, Sampling, ScaleChoice,
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, Report, RgbDepth,
+    Sampling, ScaleChoice, Target,
 };
+use pointmill_format::bintree::{Layout, SplitRule};
 
-use crate::args::{Attributes, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, RgbDepthArg, SamplingArg, Target};
+use crate::args::{
+    Attributes, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg, RgbDepthArg,
+    SamplingArg, SplitArg, TargetArg,
+};
 use crate::exit::{Failure, emit, tell, to_json};
 use crate::inputs::Inputs;
 use crate::interrupt::stop_flag;
@@ -18,17 +23,12 @@ use crate::text;
 const BROTLI_QUALITY: u8 = 5;
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
-    if let Some(other) = args.to.iter().find(|to| **to != Target::Potree2) {
-        let name = format!("{other:?}").to_lowercase();
-        return Err(Failure::Unsupported(format!(
-            "--to {name} is not supported yet by this version; it writes potree2"
-        )));
-    }
+    let targets = targets(args)?;
     let inputs = args.inputs.expand()?;
     if !args.talk.quiet {
         inputs.notes.iter().for_each(|note| tell(note));
     }
-    let plan = plan(args, inputs)?;
+    let plan = plan(args, targets, inputs)?;
     if args.dry_run {
         let estimate = pointmill_converter::estimate(&plan)?;
         return emit(&if args.json { to_json(&estimate)? } else { text::estimate(&estimate, &plan) });
@@ -54,10 +54,69 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
+/// The formats with their settings; an option for a format that is not asked for is a mistake.
+fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
+    let mut targets = Vec::new();
+    for to in &args.to {
+        let target = match to {
+            TargetArg::Potree2 => Target::Potree2,
+            TargetArg::Bintree => Target::Bintree(bintree_settings(&args.bintree)),
+            TargetArg::Batches => Target::Batches(batches_settings(&args.batches)),
+            TargetArg::Potree1 => {
+                let line = "--to potree1 is not supported yet by this version; it writes potree2, bintree and batches";
+                return Err(Failure::Unsupported(line.to_owned()));
+            }
+        };
+        targets.push(target);
+    }
+    let (tree, batches) = (&args.bintree, &args.batches);
+    let given = [
+        ("--capacity", TargetArg::Bintree, tree.capacity.is_some()),
+        ("--split", TargetArg::Bintree, tree.split.is_some()),
+        ("--layout", TargetArg::Bintree, tree.layout.is_some()),
+        ("--lod-cell", TargetArg::Batches, batches.lod_cell.is_some()),
+        ("--planes", TargetArg::Batches, batches.planes.is_some()),
+        ("--compress", TargetArg::Batches, batches.compress.is_some()),
+        ("--no-originals", TargetArg::Batches, batches.no_originals),
+    ];
+    if let Some((option, to, _)) = given.iter().find(|(_, to, given)| *given && !args.to.contains(to)) {
+        return Err(Failure::Usage(format!("{option} is for --to {}", format!("{to:?}").to_lowercase())));
+    }
+    Ok(targets)
+}
+
+fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
+    let usual = BintreeSettings::default();
+    BintreeSettings {
+        capacity: args.capacity.unwrap_or(usual.capacity),
+        split: args.split.map_or(usual.split, |s| match s {
+            SplitArg::Mean => SplitRule::Mean,
+            SplitArg::Median => SplitRule::Median,
+            SplitArg::Midpoint => SplitRule::Midpoint,
+        }),
+        layout: args.layout.map_or(usual.layout, |l| match l {
+            LayoutArg::Files => Layout::Files,
+            LayoutArg::Packed => Layout::Packed,
+        }),
+    }
+}
+
+fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
+    let usual = BatchesSettings::default();
+    BatchesSettings {
+        lod_cell: args.lod_cell.as_ref().map_or(usual.lod_cell, |c| c.0),
+        planes: args.planes.map_or(usual.planes, |p| p.0),
+        zstd_level: args.compress,
+        originals: !args.no_originals,
+    }
+}
+
+fn plan(args: &ConvertArgs, targets: Vec<Target>, inputs: Inputs) -> Result<Plan, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
     let mut plan = Plan::new(inputs.files, args.output.clone());
+    plan.open = args.inputs.options()?;
     plan.name = name;
+    plan.targets = targets;
     plan.sampling = match (args.sampling, args.seed) {
         (SamplingArg::Random, seed) => Sampling::Random { seed: seed.unwrap_or(0) },
         (_, Some(_)) => return Err(Failure::Usage("--seed is for --sampling random".to_owned())),
@@ -73,9 +132,10 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     };
     plan.leaf_capacity = args.leaf_capacity;
     plan.attributes = match &args.attributes {
-        Attributes::All => AttributeChoice::All,
-        Attributes::Scene => AttributeChoice::Scene,
-        Attributes::List(names) => AttributeChoice::List(names.clone()),
+        None => AttributeChoice::Usual,
+        Some(Attributes::All) => AttributeChoice::All,
+        Some(Attributes::Scene) => AttributeChoice::Scene,
+        Some(Attributes::List(names)) => AttributeChoice::List(names.clone()),
     };
     plan.scale = args.scale.0.map_or(ScaleChoice::Auto, ScaleChoice::Fixed);
     plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every };

@@ -6,9 +6,12 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+
+use pointmill_format::text::TextKind;
+use pointmill_format::{ErrorKind, OpenOptions, ScanKind, supported_scans};
 
 use crate::args::InputArgs;
 use crate::exit::Failure;
@@ -26,31 +29,36 @@ pub(crate) struct Inputs {
 /// What a file is, as far as this program is concerned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// LAS or LAZ.
-    Las,
-    /// A scan of a kind that this version does not read.
-    OtherScan(&'static str),
+    /// A scan, or a file that is called one: its reader will say what it is.
+    Scan,
     /// Anything else.
     NoScan,
 }
 
 impl InputArgs {
+    /// What the files do not say of themselves.
+    pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
+        self.reading.options()
+    }
+
     /// Finds the scans that are meant.
     pub(crate) fn expand(&self) -> Result<Inputs, Failure> {
+        let options = self.options()?;
         let mut typed = self.inputs.clone();
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        expand(&typed)
+        expand(&typed, &options)
     }
 }
 
-/// Finds the scans that `typed` means: files, folders (recursive), globs where no such path exists.
-pub(crate) fn expand(typed: &[PathBuf]) -> Result<Inputs, Failure> {
+/// Finds the scans that `typed` means: files, folders (recursive), globs where no such path exists. A file that is
+/// named together with its columns is text, whatever it looks like.
+pub(crate) fn expand(typed: &[PathBuf], options: &OpenOptions) -> Result<Inputs, Failure> {
     if typed.is_empty() {
         return Err(Failure::Usage("no input: name scans, folders or globs, or pass --files-from LIST".to_owned()));
     }
-    let mut search = Search::default();
+    let mut search = Search { options: options.clone(), ..Search::default() };
     for path in typed {
         search.add_typed(path)?;
     }
@@ -63,7 +71,7 @@ struct Search {
     found: BTreeMap<PathBuf, PathBuf>,
     repeated: Vec<PathBuf>,
     no_scans: Vec<PathBuf>,
-    other_scans: Vec<(PathBuf, &'static str)>,
+    options: OpenOptions,
 }
 
 impl Search {
@@ -78,27 +86,19 @@ impl Search {
 
     /// A file that was named must be a scan.
     fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
-        match kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? {
-            Kind::Las => self.add_scan(path),
-            Kind::OtherScan(name) => {
-                let line =
-                    format!("{}: {name} is not supported yet by this version; it reads LAS and LAZ", path.display());
-                return Err(Failure::Unsupported(line));
-            }
-            Kind::NoScan => {
-                let line = format!("{}: this is no scan that is known here; supported are LAS and LAZ", path.display());
-                return Err(Failure::Unsupported(line));
-            }
+        if kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? == Kind::NoScan {
+            // the readers say why, unless columns were named that make it one
+            pointmill_format::open_scan(path, &self.options)?;
         }
+        self.add_scan(path);
         Ok(())
     }
 
     /// A file that a folder or a glob brought along.
-    fn add_met_file(&mut self, path: &Path) {
+    fn add_met_file(&mut self, path: &Path, kind: fn(&Path) -> io::Result<Kind>) {
         // A file that cannot be opened but is called a scan goes on: the reader says why, and --unreadable decides.
         match kind(path).unwrap_or_else(|_| kind_by_ending(path)) {
-            Kind::Las => self.add_scan(path),
-            Kind::OtherScan(name) => self.other_scans.push((path.to_path_buf(), name)),
+            Kind::Scan => self.add_scan(path),
             Kind::NoScan => self.no_scans.push(path.to_path_buf()),
         }
     }
@@ -107,9 +107,11 @@ impl Search {
         for entry in walkdir::WalkDir::new(folder).follow_links(true).sort_by_file_name() {
             match entry {
                 Ok(entry) if entry.file_type().is_dir() => {}
-                Ok(entry) => self.add_met_file(entry.path()),
+                Ok(entry) => self.add_met_file(entry.path(), kind_in_folder),
                 Err(e) => match (e.path(), e.io_error()) {
-                    (Some(path), Some(error)) if error.kind() == io::ErrorKind::NotFound => self.add_met_file(path),
+                    (Some(path), Some(error)) if error.kind() == io::ErrorKind::NotFound => {
+                        self.add_met_file(path, kind_in_folder);
+                    }
                     (Some(path), Some(error)) => return Err(Failure::io(path, "searching the folder", error)),
                     // A link that leads back to a folder above it: what is there is found anyway.
                     _ => {}
@@ -129,7 +131,7 @@ impl Search {
         for found in matches {
             let found = found.map_err(|e| Failure::io(e.path(), "searching the folder", e.error()))?;
             any = true;
-            if found.is_dir() { self.add_folder(&found)? } else { self.add_met_file(&found) }
+            if found.is_dir() { self.add_folder(&found)? } else { self.add_met_file(&found, kind) }
         }
         if any { Ok(()) } else { Err(Failure::Usage(format!("{pattern}: nothing matches"))) }
     }
@@ -158,8 +160,6 @@ impl Search {
         let name = |path: &PathBuf| path.display().to_string();
         let examples = |paths: &[PathBuf]| paths.iter().take(3).map(name).collect();
         note(self.no_scans.len(), "other file", "left out, no scans", examples(&self.no_scans));
-        let others = self.other_scans.iter().take(3).map(|(path, kind)| format!("{}: {kind}", path.display()));
-        note(self.other_scans.len(), "scan", "left out, of kinds that this version does not read", others.collect());
         note(self.repeated.len(), "input", "named more than once, read once", examples(&self.repeated));
 
         let mut files: Vec<PathBuf> = self.found.into_values().collect();
@@ -167,7 +167,11 @@ impl Search {
         if files.is_empty() {
             let places: Vec<String> = typed.iter().take(3).map(name).collect();
             let left_out = if notes.is_empty() { String::new() } else { format!("; {}", notes.join("; ")) };
-            return Err(Failure::Input(format!("{}: no scan there (LAS or LAZ){left_out}", places.join(", "))));
+            return Err(Failure::Input(format!(
+                "{}: no scan there ({}){left_out}",
+                places.join(", "),
+                supported_scans()
+            )));
         }
         Ok(Inputs { files, notes })
     }
@@ -181,38 +185,46 @@ fn identity(path: &Path) -> PathBuf {
 
 /// Says what a file is, by its first bytes, else by its ending.
 pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
-    if !fs::metadata(path)?.is_file() {
-        return Ok(Kind::NoScan); // opening a pipe would wait for somebody who writes to it
+    match content(path)? {
+        Some(_) => Ok(Kind::Scan),
+        None if fs::metadata(path)?.is_file() => Ok(kind_by_ending(path)),
+        None => Ok(Kind::NoScan), // a pipe, say
     }
-    let mut first = Vec::with_capacity(16);
-    File::open(path)?.take(16).read_to_end(&mut first)?;
-    Ok(kind_by_content(&first).unwrap_or_else(|| kind_by_ending(path)))
 }
 
-fn kind_by_content(first: &[u8]) -> Option<Kind> {
-    match first {
-        _ if pointmill_format::las::is_las(first) => Some(Kind::Las),
-        [b'A', b'S', b'T', b'M', b'-', b'E', b'5', b'7', ..] => Some(Kind::OtherScan("E57")),
-        [b'p', b'l', b'y', b'\n' | b'\r', ..] => Some(Kind::OtherScan("PLY")),
-        [b'#', b' ', b'.', b'P', b'C', b'D', ..] => Some(Kind::OtherScan("PCD")),
-        _ => None,
+/// [`kind`] of a file that a folder brought along. Lines of numbers are many things (matrices, tracks, logs): they count
+/// as a scan if the ending says so too.
+fn kind_in_folder(path: &Path) -> io::Result<Kind> {
+    match content(path)? {
+        Some(ScanKind::Text(TextKind::Xyz | TextKind::Pts)) if !ends_with(path, &TEXT_ENDINGS) => Ok(Kind::NoScan),
+        _ => kind(path),
     }
 }
+
+fn content(path: &Path) -> io::Result<Option<ScanKind>> {
+    ScanKind::of_file(path).map_err(|e| match e.kind {
+        ErrorKind::Io(error) => error,
+        _ => io::Error::other(e.to_string()),
+    })
+}
+
+/// Endings of scans whose content may be too damaged to tell.
+const SCAN_ENDINGS: [&str; 8] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "xyz"];
+
+/// Endings under which lines of numbers are a scan. `txt` is not among them: name such files, or use a glob.
+const TEXT_ENDINGS: [&str; 7] = ["xyz", "asc", "csv", "xyzi", "xyzrgb", "pts", "ptx"];
 
 fn kind_by_ending(path: &Path) -> Kind {
     // macOS leaves `._tile.laz` beside `tile.laz` on foreign disks: notes of the Finder, no points.
     if path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with("._")) {
         return Kind::NoScan;
     }
+    if ends_with(path, &SCAN_ENDINGS) { Kind::Scan } else { Kind::NoScan }
+}
+
+fn ends_with(path: &Path, endings: &[&str]) -> bool {
     let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
-    match ending.as_deref() {
-        Some("las" | "laz") => Kind::Las,
-        Some("e57") => Kind::OtherScan("E57"),
-        Some("ply") => Kind::OtherScan("PLY"),
-        Some("pcd") => Kind::OtherScan("PCD"),
-        Some("pts" | "ptx" | "xyz") => Kind::OtherScan("a text scan"),
-        _ => Kind::NoScan,
-    }
+    ending.is_some_and(|e| endings.contains(&e.as_str()))
 }
 
 /// The paths in `list`, one a line; `-` is standard input.
@@ -251,7 +263,7 @@ fn path_from_bytes(bytes: &[u8]) -> PathBuf {
 mod tests {
     use super::*;
 
-    /// A folder with two scans (one of them by ending alone), a PLY and a text.
+    /// A folder with three scans (one of them by ending alone) and other files, some of which hold lines of numbers.
     fn folder() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir(dir.path().join("süd")).unwrap();
@@ -260,11 +272,17 @@ mod tests {
             ("süd/a.LAZ", b""),
             ("c.ply", b"ply\nformat ascii 1.0\n"),
             ("notes.txt", b"hello"),
+            ("matrix.txt", b"1 0 0\n0 1 0\n0 0 1\n"),
+            ("counted.log", b"2\n1 0 0\n0 1 0\n"),
             ("._b.laz", b"Finder"),
         ] {
             fs::write(dir.path().join(name), bytes).unwrap();
         }
         dir
+    }
+
+    fn find(typed: &[PathBuf]) -> Result<Inputs, Failure> {
+        expand(typed, &OpenOptions::default())
     }
 
     fn names(inputs: &Inputs) -> Vec<&str> {
@@ -274,37 +292,65 @@ mod tests {
     #[test]
     fn a_folder_gives_its_scans_sorted_and_says_what_it_left_out() {
         let dir = folder();
-        let inputs = expand(&[dir.path().to_path_buf()]).unwrap();
-        assert_eq!(names(&inputs), ["b.dat", "a.LAZ"]);
-        assert_eq!(inputs.notes.len(), 2, "{:?}", inputs.notes);
-        assert!(inputs.notes[0].starts_with("2 other files left out") && inputs.notes[0].contains("notes.txt"));
-        assert!(inputs.notes[1].contains("c.ply: PLY"));
+        let inputs = find(&[dir.path().to_path_buf()]).unwrap();
+        assert_eq!(names(&inputs), ["b.dat", "c.ply", "a.LAZ"]);
+        let [note] = inputs.notes.as_slice() else { panic!("{:?}", inputs.notes) };
+        assert!(note.starts_with("4 other files left out, no scans"), "{note}");
+        assert!(["._b.laz", "counted.log", "matrix.txt"].iter().all(|name| note.contains(name)), "{note}");
+    }
+
+    #[test]
+    fn lines_of_numbers_count_in_a_folder_by_their_ending_and_elsewhere_by_content() {
+        let dir = folder();
+        for name in ["tile.xyz", "tile.CSV", "tile.asc", "tile.pts"] {
+            fs::copy(dir.path().join("matrix.txt"), dir.path().join("süd").join(name)).unwrap();
+        }
+        fs::copy(dir.path().join("notes.txt"), dir.path().join("süd/notes.csv")).unwrap();
+        let inputs = find(&[dir.path().join("süd")]).unwrap();
+        assert_eq!(names(&inputs), ["a.LAZ", "tile.CSV", "tile.asc", "tile.pts", "tile.xyz"]);
+        assert_eq!(names(&find(&[dir.path().join("matrix.txt")]).unwrap()), ["matrix.txt"]);
+        assert_eq!(names(&find(&[dir.path().join("*.txt")]).unwrap()), ["matrix.txt"]);
+        assert_eq!(names(&find(&[dir.path().join("*.log")]).unwrap()), ["counted.log"]);
+    }
+
+    #[test]
+    fn a_file_whose_columns_are_named_is_taken_for_text() {
+        let dir = folder();
+        fs::write(dir.path().join("flat.dat"), "1 2\n3 4\n").unwrap();
+        let named = OpenOptions { columns: Some(vec!["x".into(), "y".into()]), ..OpenOptions::default() };
+        let code = |name: &str| expand(&[dir.path().join(name)], &named).map_err(|e| e.code());
+        assert_eq!(names(&code("flat.dat").unwrap()), ["flat.dat"]);
+        assert_eq!(code("notes.txt").unwrap_err(), 3);
+        assert_eq!(names(&expand(&[dir.path().join("*.dat")], &named).unwrap()), ["b.dat"], "a glob brings others");
+        assert_eq!(find(&[dir.path().join("flat.dat")]).unwrap_err().code(), 3, "without columns");
     }
 
     #[test]
     fn globs_are_tried_only_where_no_such_path_exists() {
         let dir = folder();
-        assert_eq!(names(&expand(&[dir.path().join("**/*.LAZ")]).unwrap()), ["a.LAZ"]);
+        assert_eq!(names(&find(&[dir.path().join("**/*.LAZ")]).unwrap()), ["a.LAZ"]);
         fs::write(dir.path().join("x[1].las"), "LASF").unwrap();
         fs::write(dir.path().join("x1.las"), "LASF").unwrap();
-        assert_eq!(names(&expand(&[dir.path().join("x[1].las")]).unwrap()), ["x[1].las"]);
-        assert_eq!(expand(&[dir.path().join("*.nothing")]).unwrap_err().code(), 2);
+        assert_eq!(names(&find(&[dir.path().join("x[1].las")]).unwrap()), ["x[1].las"]);
+        assert_eq!(find(&[dir.path().join("*.nothing")]).unwrap_err().code(), 2);
     }
 
     #[test]
     fn a_file_counts_once_however_it_is_spelt() {
         let dir = folder();
         let again = dir.path().join("süd/../b.dat");
-        let inputs = expand(&[dir.path().join("b.dat"), again, dir.path().to_path_buf()]).unwrap();
-        assert_eq!(inputs.files.len(), 2);
+        let inputs = find(&[dir.path().join("b.dat"), again, dir.path().to_path_buf()]).unwrap();
+        assert_eq!(names(&inputs), ["b.dat", "c.ply", "a.LAZ"]);
         assert!(inputs.notes.iter().any(|n| n.starts_with("2 inputs named more than once")), "{:?}", inputs.notes);
     }
 
     #[test]
     fn what_was_named_must_be_a_scan() {
         let dir = folder();
-        let code = |name: &str| expand(&[dir.path().join(name)]).unwrap_err().code();
-        assert_eq!([code("notes.txt"), code("c.ply"), code("missing.las")], [4, 4, 2]);
+        let code = |name: &str| find(&[dir.path().join(name)]).unwrap_err().code();
+        assert_eq!([code("notes.txt"), code("missing.las")], [4, 2]);
+        let Failure::Unsupported(line) = find(&[dir.path().join("notes.txt")]).unwrap_err() else { panic!() };
+        assert!(["notes.txt", "LAS, LAZ", "E57", "PLY", "PCD", "XYZ"].iter().all(|w| line.contains(w)), "{line}");
         fs::create_dir(dir.path().join("empty")).unwrap();
         assert_eq!(code("empty"), 3);
     }
@@ -314,7 +360,7 @@ mod tests {
         let dir = folder();
         let list = dir.path().join("list");
         fs::write(&list, format!("\u{feff}# scans\r\n\n{}\r\n", dir.path().join("b.dat").display())).unwrap();
-        let args = InputArgs { inputs: Vec::new(), files_from: Some(list) };
+        let args = InputArgs { inputs: Vec::new(), files_from: Some(list), ..InputArgs::default() };
         assert_eq!(names(&args.expand().unwrap()), ["b.dat"]);
     }
 
@@ -324,6 +370,6 @@ mod tests {
         let dir = folder();
         std::os::unix::fs::symlink("nowhere", dir.path().join("süd/z.las")).unwrap();
         std::os::unix::fs::symlink(".", dir.path().join("süd/loop")).unwrap();
-        assert_eq!(names(&expand(&[dir.path().join("süd")]).unwrap()), ["a.LAZ", "z.las"]);
+        assert_eq!(names(&find(&[dir.path().join("süd")]).unwrap()), ["a.LAZ", "z.las"]);
     }
 }

@@ -9,7 +9,9 @@ use pointmill_format::{Aabb, PointBatch, Positions, ReadError, Scan, Scratch, Wa
 #[derive(Debug, Clone)]
 pub(crate) struct Measured {
     pub(crate) points: u64,
-    /// World coordinates; [`Aabb::EMPTY`] without points.
+    /// Those among them that have no finite position.
+    pub(crate) invalid: u64,
+    /// World coordinates of the others; [`Aabb::EMPTY`] if there are none.
     pub(crate) bounds: Aabb,
     /// For each attribute of the scan, in order, and each of its elements: lowest and highest raw value. Empty without
     /// points; not-a-number values do not count.
@@ -20,7 +22,8 @@ impl Measured {
     fn nothing(scan: &dyn Scan) -> Self {
         let attributes = &scan.info().attributes;
         let empty = [f64::INFINITY, f64::NEG_INFINITY];
-        Self { points: 0, bounds: Aabb::EMPTY, ranges: attributes.iter().map(|a| vec![empty; a.elements]).collect() }
+        let ranges = attributes.iter().map(|a| vec![empty; a.elements]).collect();
+        Self { points: 0, invalid: 0, bounds: Aabb::EMPTY, ranges }
     }
 
     fn add(&mut self, batch: &PointBatch, scan: &dyn Scan) {
@@ -34,7 +37,10 @@ impl Measured {
                 corners.into_iter().flatten().for_each(|corner| self.bounds.grow(lattice.world(corner)));
             }
             (Positions::World([x, y, z]), _) => {
-                x.iter().zip(y).zip(z).for_each(|((x, y), z)| self.bounds.grow([*x, *y, *z]));
+                for ((x, y), z) in x.iter().zip(y).zip(z) {
+                    let p = [*x, *y, *z];
+                    if p.iter().all(|v| v.is_finite()) { self.bounds.grow(p) } else { self.invalid += 1 }
+                }
             }
             (Positions::Quantized(_), None) => {} // no reader gives integers without a lattice
         }
@@ -52,6 +58,7 @@ impl Measured {
 
     fn merge(&mut self, other: &Self) {
         self.points += other.points;
+        self.invalid += other.invalid;
         self.bounds = self.bounds.union(&other.bounds);
         for (mine, theirs) in self.ranges.iter_mut().flatten().zip(other.ranges.iter().flatten()) {
             *mine = [mine[0].min(theirs[0]), mine[1].max(theirs[1])];

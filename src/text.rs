@@ -1,15 +1,14 @@
-//! How reports, estimates, scans and datasets look to people. No figure is worked out here.
+//! How reports, estimates and validations look to people, and the words that all commands share. No figure is worked
+//! out here.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use pointmill_converter::{Estimate, Plan, Report};
-use pointmill_format::potree2::Metadata;
-use pointmill_format::{Attribute, Crs, ScanInfo};
-use pointmill_validate::{LevelQuality, Outcome};
+use pointmill_format::{Attribute, Crs};
+use pointmill_validate::{LeafQuality, LevelQuality, Outcome};
 
 use crate::convert::points_left_out;
-use crate::measure::Measured;
 use crate::quantities::{bytes, count, number, numbers, plural, rate, seconds};
 
 /// The summary of a run, line by line.
@@ -112,58 +111,6 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
     t.0
 }
 
-/// A scan, and its measured figures if there are some.
-pub(crate) fn scan(info: &ScanInfo, pieces: usize, measured: Option<&Measured>) -> String {
-    let mut t = Table::about(&info.path);
-    t.row("format", &info.format);
-    t.row("points", count(info.points_declared));
-    let declared = info.bounds_declared.map_or_else(|| "not told".to_owned(), |b| corners(&b.min, &b.max));
-    t.row("bounds", declared);
-    if let Some(measured) = measured {
-        t.row("decoded", plural(measured.points, "point"));
-        let none = measured.bounds.is_empty();
-        t.row("measured", if none { "nothing".into() } else { corners(&measured.bounds.min, &measured.bounds.max) });
-    }
-    if let Some(lattice) = info.lattice {
-        t.row("lattice", format!("step {}, offset {}", numbers(&lattice.scale), numbers(&lattice.offset)));
-    }
-    t.row("CRS", crs(&info.crs));
-    t.row("size", format!("{}, {} to decode in parallel", bytes(info.file_bytes), plural(pieces as u64, "piece")));
-    for (i, attribute) in info.attributes.iter().enumerate() {
-        let ranges = measured.map(|m| m.ranges[i].as_slice());
-        t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, ranges));
-    }
-    info.warnings.iter().for_each(|w| t.row("warning", w));
-    t.0
-}
-
-/// A dataset; `levels`: nodes and points of each; `size_bytes`: of its three files.
-pub(crate) fn dataset(folder: &Path, metadata: &Metadata, levels: &[[u64; 2]], size_bytes: u64) -> String {
-    let mut t = Table::about(folder);
-    t.row("format", format!("Potree 2.0, encoding {}", metadata.encoding.name()));
-    t.row("name", &metadata.name);
-    t.row("points", count(metadata.points));
-    let position = metadata.attributes.iter().find(|stats| stats.attribute.name == "position");
-    if let Some(position) = position.filter(|stats| stats.min.len() == 3 && stats.max.len() == 3) {
-        t.row("bounds", corners(&position.min, &position.max));
-    }
-    t.row("cube", corners(&metadata.cube.min, &metadata.cube.max));
-    let lattice = &metadata.lattice;
-    t.row("lattice", format!("step {}, offset {}", numbers(&lattice.scale), numbers(&lattice.offset)));
-    t.row("spacing", format!("{} at the root, half of it at each level below", number(metadata.spacing)));
-    t.row("CRS", or_none(&metadata.projection));
-    t.row("size", bytes(size_bytes));
-    for (level, [nodes, points]) in levels.iter().enumerate() {
-        let word = if level == 0 { "levels" } else { "" };
-        t.row(word, format!("{level}: {} in {}", plural(*points, "point"), plural(*nodes, "node")));
-    }
-    for (i, stats) in metadata.attributes.iter().enumerate() {
-        let ends = stats.min.iter().zip(&stats.max).map(|(min, max)| [*min, *max]).collect::<Vec<_>>();
-        t.row(if i == 0 { "attributes" } else { "" }, attribute_line(&stats.attribute, Some(&ends)));
-    }
-    t.0
-}
-
 /// What a validation found: checks, quality by level, problems.
 pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> String {
     let mut out = printable(&dataset.to_string_lossy());
@@ -192,6 +139,7 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
         }
     }
     out.push_str(&quality(&outcome.quality, verbose));
+    out.push_str(&outcome.leaves.as_ref().map(leaves).unwrap_or_default());
     out + &problems(outcome)
 }
 
@@ -229,6 +177,22 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
         );
     }
     out
+}
+
+/// Sizes of the leaves of a binary tree.
+fn leaves(leaves: &LeafQuality) -> String {
+    if leaves.leaves == 0 {
+        return String::new();
+    }
+    let LeafQuality { points_min, points_mean, points_max, depth, volume, largest_error, largest_bound, .. } = leaves;
+    format!(
+        "  {} of {} to {} points, {} on average, down to depth {depth}; volume of their boxes {volume:.0}\n  \
+         positions are off by {largest_error:.1e} at most, {largest_bound:.1e} is allowed\n",
+        if leaves.leaves == 1 { "1 leaf".to_owned() } else { format!("{} leaves", count(leaves.leaves)) },
+        count(*points_min),
+        count(*points_max),
+        count(points_mean.round() as u64),
+    )
 }
 
 /// One problem a line.
@@ -276,7 +240,7 @@ pub(crate) fn corners(min: &[f64], max: &[f64]) -> String {
     format!("{} … {}", numbers(min), numbers(max))
 }
 
-fn or_none(text: &str) -> &str {
+pub(crate) fn or_none(text: &str) -> &str {
     if text.is_empty() { "no CRS" } else { text }
 }
 
@@ -286,7 +250,7 @@ pub(crate) struct Table(pub(crate) String);
 
 impl Table {
     /// A table about a file or folder.
-    fn about(path: &Path) -> Self {
+    pub(crate) fn about(path: &Path) -> Self {
         Self(printable(&path.to_string_lossy()) + "\n")
     }
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use pointmill_format::ReadError;
-use pointmill_validate::{Options, Outcome};
+use pointmill_format::{ErrorKind, ReadError};
+use pointmill_validate::{Format, Options, Outcome, locate};
 
 use crate::args::ValidateArgs;
 use crate::exit::{Failure, emit, tell, to_json};
@@ -14,9 +14,9 @@ use crate::text;
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
     require_dataset(&args.dataset)?;
-    let mut options = Options { neighbourhoods: !args.fast, ..Options::default() };
+    let mut options = Options { neighbourhoods: !args.fast, open: args.reading.options()?, ..Options::default() };
     if !args.against.is_empty() {
-        let found = inputs::expand(&args.against)?;
+        let found = inputs::expand(&args.against, &options.open)?;
         if !args.talk.quiet {
             found.notes.iter().for_each(|note| tell(note));
         }
@@ -51,17 +51,17 @@ fn verdict(dataset: &Path, outcome: &Outcome) -> Result<(), Failure> {
 /// A path that leads to no dataset at all was mistyped; a file that is missing from one is a fault of the dataset.
 fn require_dataset(dataset: &Path) -> Result<(), Failure> {
     let path = dataset.display();
-    let folder = if dataset.is_dir() { dataset } else { dataset.parent().unwrap_or(dataset) };
-    let metadata = folder.join("metadata.json");
-    match () {
-        () if !dataset.exists() => Err(Failure::Usage(format!("{path}: there is no such dataset"))),
-        () if !metadata.is_file() || dataset.is_file() && !dataset.ends_with("metadata.json") => {
-            Err(Failure::Usage(format!("{path}: this is no Potree 2.0 dataset: a folder with metadata.json")))
-        }
-        () => match ["hierarchy.bin", "octree.bin"].into_iter().find(|name| !folder.join(name).exists()) {
-            Some(name) => Err(Failure::Faults(format!("{path}: {name} is missing; convert or copy the dataset again"))),
-            None => Ok(()),
-        },
+    if !dataset.exists() {
+        return Err(Failure::Usage(format!("{path}: there is no such dataset")));
+    }
+    let located = locate(dataset).map_err(|error| match error.kind {
+        ErrorKind::Io(_) => Failure::from(error),
+        _ => Failure::Usage(error.to_string()),
+    })?;
+    let needed: &[&str] = if located.format == Format::Potree2 { &["hierarchy.bin", "octree.bin"] } else { &[] };
+    match needed.iter().find(|name| !located.path.join(name).exists()) {
+        Some(name) => Err(Failure::Faults(format!("{path}: {name} is missing; convert or copy the dataset again"))),
+        None => Ok(()),
     }
 }
 

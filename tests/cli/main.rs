@@ -3,8 +3,11 @@
 mod arguments;
 mod bad_input;
 mod bad_output;
+mod cut_short;
 mod hostile;
+mod inputs;
 mod interrupted;
+mod same_points;
 mod sameness;
 mod support;
 mod telling;

@@ -114,6 +114,11 @@ pub(crate) fn corpus(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
+/// A file or folder of `fixtures/`.
+pub(crate) fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(name)
+}
+
 /// A LAS 1.2 file, point format 3 (34 bytes a point), written field by field so that any of them can lie.
 #[derive(Clone)]
 pub(crate) struct Las {

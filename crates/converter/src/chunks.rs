@@ -4,7 +4,7 @@
 use pointmill_format::NodeKey;
 
 use crate::error::ConvertError;
-use crate::gather::{Cell, Gathered, Grouping, Segment};
+use crate::gather::{Cell, Gathered, Grouping, Moments, Segment};
 use crate::grid::TREE_BITS;
 use crate::records::RecordFrame;
 
@@ -24,10 +24,10 @@ const SPLIT_LEVELS: u32 = 3;
 const SPLIT_POINTS: usize = 65_536;
 
 /// The chunks of the cloud, in Morton order, none larger than `max_points` unless its points share one place.
-pub(crate) fn plan(gathered: &mut Gathered, frame: &RecordFrame, max_points: u64) -> Result<Vec<Chunk>, ConvertError> {
+pub(crate) fn plan(gathered: &Gathered, frame: &RecordFrame, max_points: u64) -> Result<Vec<Chunk>, ConvertError> {
     let mut cells = Vec::with_capacity(gathered.cells.len());
-    for cell in std::mem::take(&mut gathered.cells) {
-        divide(cell, gathered, frame, max_points, &mut cells)?;
+    for cell in &gathered.cells {
+        divide(cell.clone(), gathered, frame, max_points, &mut cells)?;
     }
     let mut chunks = Vec::new();
     choose(NodeKey::ROOT, &mut cells, max_points, &mut chunks);
@@ -137,7 +137,7 @@ impl<'a> Division<'a> {
             self.sorted.extend_from_slice(&records[at..at + stride]);
         }
         let block = self.gathered.store.open(source)?;
-        self.gathered.store.fill(block, &mut self.sorted)?;
+        self.gathered.store.refill(block, &mut self.sorted)?;
         let mut at = 0;
         for &(_, count) in &self.grouping.groups {
             let first = self.grouping.order[at as usize] as usize * stride;
@@ -153,7 +153,7 @@ impl<'a> Division<'a> {
                 }
                 None => {
                     let (points, segments) = (u64::from(count), vec![segment]);
-                    self.parts.push(Cell { key, points, segments, is_one_place: false });
+                    self.parts.push(Cell { key, points, segments, is_one_place: false, moments: Moments::default() });
                 }
             }
         }

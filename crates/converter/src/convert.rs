@@ -1,34 +1,58 @@
 //! A run, all passes in order.
 
-use std::panic::AssertUnwindSafe;
 use std::path::Path;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use pointmill_format::potree2::encode_hierarchy;
+use pointmill_format::ReadError;
 
 use crate::budget::Budget;
-use crate::build::chunk::{BuiltChunk, ChunkBuilder, ChunkPlan};
-use crate::build::commit::{Built, Committer};
-use crate::chunks::{self, Chunk};
-use crate::describe::{Description, HIERARCHY_STEP, choose_attributes, resolve_crs};
+use crate::checksum::Checksum;
+use crate::describe::{Description, resolve_crs};
 use crate::error::ConvertError;
 use crate::events::{Events, Phase};
-use crate::gather::{Gathered, Outcome, Stats, gather};
+use crate::gather::{Gathered, Outcome, Stats, gather, outliers};
 use crate::grid::{Cube, LatticeBounds};
 use crate::job::Job;
-use crate::plan::Plan;
-use crate::records::{OutputLayout, RecordFrame};
+use crate::plan::{Plan, Target};
 use crate::report::{PhaseReport, Report};
-use crate::sample::Sampler;
 use crate::write::dataset::StagedFolder;
-use crate::write::payload::PayloadWriter;
+use crate::{batches, bintree, octree};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
 const MAX_PASSES: usize = 3;
 
-/// Converts the inputs of `plan` to one dataset.
+/// What every output is made from.
+#[derive(Clone, Copy)]
+pub(crate) struct Run<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) job: &'a Job,
+    pub(crate) gathered: &'a Gathered,
+    pub(crate) facts: &'a Description,
+    pub(crate) budget: &'a Budget,
+    pub(crate) pool: &'a rayon::ThreadPool,
+    pub(crate) events: &'a dyn Events,
+    /// Where temporary files go.
+    pub(crate) temp_dir: &'a Path,
+}
+
+impl Run<'_> {
+    /// Every point that was decoded must have been written, with the bytes that it had.
+    pub(crate) fn account(&self, written: Checksum) -> Result<(), ConvertError> {
+        let read = self.gathered.stats.checksum;
+        if read == written {
+            return Ok(());
+        }
+        Err(ConvertError::Internal(format!("points were lost on the way: read {read:?}, written {written:?}")))
+    }
+
+    /// "position" and the names of attributes of the schema.
+    pub(crate) fn names(&self, attributes: impl Iterator<Item = usize>) -> Vec<String> {
+        let names = attributes.map(|i| self.job.schema.attributes[i].name.clone());
+        std::iter::once("position".to_owned()).chain(names).collect()
+    }
+}
+
+/// Converts the inputs of `plan` to one dataset of each target.
 ///
 /// # Errors
 /// See [`ConvertError`]; the output folder is then as it was before.
@@ -39,7 +63,7 @@ pub fn convert(plan: &Plan, events: &dyn Events) -> Result<Report, ConvertError>
     let staged = StagedFolder::new(&plan.output, plan.overwrite)?;
     let mut job = Job::open(plan, events)?;
     let budget = Budget::new(plan, job.schema.stride)?;
-    check_names(plan, &job)?;
+    resolve_crs(plan, &job, &mut Vec::new())?; // a name that makes no sense shall fail now, not after the read
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads.max(1))
         .thread_name(|i| format!("pointmill-{i}"))
@@ -47,29 +71,45 @@ pub fn convert(plan: &Plan, events: &dyn Events) -> Result<Report, ConvertError>
         .map_err(|e| ConvertError::Internal(format!("starting threads: {e}")))?;
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
 
-    let mut gathered = read(plan, &mut job, &budget, &temp_dir, &pool, events, &mut clock)?;
+    let gathered = read(plan, &mut job, &budget, &temp_dir, &pool, events, &mut clock)?;
 
-    clock.phase(Phase::Build, gathered.stats.points);
-    let description = Description::new(plan, &job, &gathered.stats, &gathered.cube)?;
-    let frame = RecordFrame { stride: job.schema.stride, cube: gathered.cube, base: gathered.base };
-    let layout = OutputLayout::new(&job.schema, &description.kept, &frame);
-    let chunks = chunks::plan(&mut gathered, &frame, budget.chunk_points)?;
-    for chunk in &chunks {
-        budget.check_chunk(chunk.points)?;
+    if let Some(outliers) = outliers::find(&gathered, &job) {
+        let line = outliers.line(job.is_held_back());
+        events.warning(&line);
+        job.warnings.push(line);
     }
-    let built = build(plan, &gathered, &frame, &layout, &description, &chunks, &budget, &staged, &pool, events)?;
-    account(&gathered.stats, &built)?;
+    let facts = Description::new(plan, &job, &gathered.stats, &gathered.cube)?;
+    let points = gathered.stats.points;
+    let run = Run {
+        plan,
+        job: &job,
+        gathered: &gathered,
+        facts: &facts,
+        budget: &budget,
+        pool: &pool,
+        events,
+        temp_dir: &temp_dir,
+    };
+    let mut outputs = Vec::new();
+    for target in &plan.targets {
+        clock.phase(Phase::Build, points);
+        let start = Instant::now();
+        let dataset = staged.dataset(if plan.targets.len() > 1 { target.name() } else { "" })?;
+        let mut output = match target {
+            Target::Potree2 => octree::write(&run, &dataset)?,
+            Target::Bintree(settings) => bintree::write(&run, settings, &dataset)?,
+            Target::Batches(settings) => batches::write(&run, settings, &dataset)?,
+        };
+        dataset.sync()?;
+        output.format = target.name().into();
+        output.folder = dataset.name().into();
+        output.seconds = start.elapsed().as_secs_f64();
+        outputs.push(output);
+    }
 
     clock.phase(Phase::Finish, 0);
-    let mut nodes = built.nodes;
-    let hierarchy = encode_hierarchy(&mut nodes, HIERARCHY_STEP);
-    let metadata = description.metadata(plan, &gathered, &built.accounts, &hierarchy, &job);
-    staged.write("hierarchy.bin", &hierarchy.bytes)?;
-    let json = metadata.to_json();
-    staged.write("metadata.json", json.as_bytes())?;
-    let mut report = description.report(plan, &job, &gathered, &built.accounts, &nodes);
-    report.output_bytes = built.bytes + (hierarchy.bytes.len() + json.len()) as u64;
-    report.phases = clock.finish(gathered.stats.points);
+    let mut report = facts.report(plan, &job, &gathered, outputs);
+    report.phases = clock.finish(points);
     report.seconds = clock.seconds();
     report.peak_memory_bytes = crate::memory::peak_resident_bytes();
     let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
@@ -85,6 +125,30 @@ fn check(plan: &Plan) -> Result<(), ConvertError> {
     let bad = |text: &str| Err(ConvertError::Usage(text.into()));
     if plan.leaf_capacity == 0 {
         return bad("--leaf-capacity: must be at least 1");
+    }
+    if plan.targets.is_empty() {
+        return bad("--to: name at least one format");
+    }
+    let repeated = |(i, t): (usize, &Target)| plan.targets[..i].iter().any(|other| other.name() == t.name());
+    if plan.targets.iter().enumerate().any(repeated) {
+        return bad("--to: a format is named twice");
+    }
+    if plan.duplicates == crate::Duplicates::Drop && plan.targets.iter().any(|t| *t != Target::Potree2) {
+        return Err(ConvertError::Unsupported(
+            "--duplicates drop is there for potree2 alone; leave it out, or convert to potree2".into(),
+        ));
+    }
+    for target in &plan.targets {
+        match target {
+            Target::Bintree(s) if s.capacity == 0 => return bad("--capacity: must be at least 1"),
+            Target::Batches(s) if s.lod_cell.is_some_and(|c| !(c.is_finite() && c > 0.0)) => {
+                return bad("--lod-cell: must be a number above 0, or auto");
+            }
+            Target::Batches(s) if s.planes.is_some_and(|p| !(1..=3).contains(&p)) => {
+                return bad("--planes: must be 10, 20, 30 or auto");
+            }
+            _ => {}
+        }
     }
     match plan.scale {
         crate::ScaleChoice::Fixed(s) if !(s.is_finite() && s > 0.0) => return bad("--scale: must be a number above 0"),
@@ -103,14 +167,6 @@ fn check(plan: &Plan) -> Result<(), ConvertError> {
         return bad(&format!("--temp-dir: {} is not a folder", dir.display()));
     }
     Ok(())
-}
-
-/// What names attributes or a reference system wrongly shall fail now, not after the points were read.
-fn check_names(plan: &Plan, job: &Job) -> Result<(), ConvertError> {
-    if let crate::AttributeChoice::List(_) = plan.attributes {
-        choose_attributes(&plan.attributes, job, &[])?;
-    }
-    resolve_crs(plan, job, &mut Vec::new()).map(drop)
 }
 
 /// Reads every point once; again only if the headers were wrong about the bounds.
@@ -139,13 +195,16 @@ fn read(
                 events.warning(line);
                 hint = Some(bounds);
                 if let Err(too_fine) = Cube::around(&bounds, &job.lattice) {
+                    let fine = job.lattice;
                     job.coarsen(too_fine.coarser_by);
                     let line = format!("coordinate step {:?}: {}", job.lattice.scale, job.lattice_reason);
                     events.warning(&line);
                     job.warnings.push(line);
-                    let rescale = |v: i64| v >> too_fine.coarser_by;
-                    hint =
-                        Some(LatticeBounds { min: bounds.min.map(rescale), max: bounds.max.map(|v| rescale(v) + 1) });
+                    let [min, max] = [bounds.min, bounds.max].map(|q| {
+                        let world = fine.world(q);
+                        [0, 1, 2].map(|a| job.lattice.quantize(a, world[a]))
+                    });
+                    hint = Some(LatticeBounds { min: min.map(|v| v - 1), max: max.map(|v| v + 1) });
                 }
             }
         }
@@ -166,88 +225,15 @@ fn nothing_to_convert(job: &Job, stats: &Stats) -> ConvertError {
             stats.outside_bounds, stats.other_class, stats.thinned, stats.invalid
         ));
     }
-    let first = job.sources.first().map(|s| s.scan.info().path.display().to_string()).unwrap_or_default();
-    match job.sources.len() {
-        1 => ConvertError::Input(format!("{first}: holds no points; there is nothing to convert")),
-        n => ConvertError::Input(format!(
-            "{first} and {} more inputs hold no points; there is nothing to convert",
-            n - 1
-        )),
-    }
-}
-
-#[allow(clippy::too_many_arguments)] // the parts of one pass, each used once
-fn build(
-    plan: &Plan,
-    gathered: &Gathered,
-    frame: &RecordFrame,
-    layout: &OutputLayout,
-    description: &Description,
-    chunks: &[Chunk],
-    budget: &Budget,
-    staged: &StagedFolder,
-    pool: &rayon::ThreadPool,
-    events: &dyn Events,
-) -> Result<Built, ConvertError> {
-    let (file, path) = staged.create("octree.bin")?;
-    let writer = || PayloadWriter::new(layout.clone(), plan.encoding);
-    let keys = chunks.iter().map(|c| c.key).collect();
-    let sampler = Sampler::new(plan.sampling);
-    let committer = Committer::new(&file, &path, keys, budget.window, frame.stride, sampler, writer());
-    let chunk_plan = ChunkPlan {
-        frame,
-        store: &gathered.store,
-        leaf_capacity: plan.leaf_capacity,
-        usual_points: budget.chunk_points.min(gathered.stats.points),
-        duplicates: plan.duplicates,
-        widen_rgb: &description.widen_rgb,
-        class: description.class,
-    };
-    let next = AtomicUsize::new(0);
-    let failed: Mutex<Option<(usize, ConvertError)>> = Mutex::new(None);
-    pool.broadcast(|_| {
-        let mut builder = ChunkBuilder::new(&chunk_plan, Sampler::new(plan.sampling), writer());
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(chunk) = chunks.get(index) else { break };
-            let Some(buffer) = committer.admit(index) else { break };
-            let result = if events.stop_requested() {
-                Err(ConvertError::Interrupted)
-            } else {
-                // A panic must not leave the other threads waiting for this chunk.
-                let build = AssertUnwindSafe(|| {
-                    builder.build(chunk, buffer).and_then(|built: BuiltChunk| committer.submit(index, built))
-                });
-                std::panic::catch_unwind(build)
-                    .unwrap_or_else(|_| Err(ConvertError::Internal(format!("building node {} failed", chunk.key))))
-            };
-            events.advance(chunk.points);
-            if let Err(error) = result {
-                committer.stop();
-                if let Ok(mut failed) = failed.lock()
-                    && failed.as_ref().is_none_or(|(i, _)| index < *i)
-                {
-                    *failed = Some((index, error));
-                }
-                break;
-            }
+    match job.sources.as_slice() {
+        [] => ConvertError::Input("there is nothing to convert".into()),
+        [first, rest @ ..] => {
+            let info = first.scan.info();
+            let others = if rest.is_empty() { String::new() } else { format!(", nor do {} more inputs", rest.len()) };
+            let what = format!("holds no points up to its end{others}");
+            ReadError::broken(&info.path, info.file_bytes, what).advise("there is nothing to convert").into()
         }
-    });
-    if let Ok(Some((_, error))) = failed.into_inner() {
-        return Err(error);
     }
-    let built = committer.finish()?;
-    file.sync_all().map_err(|e| ConvertError::io(&path, "syncing the payloads", e))?;
-    Ok(built)
-}
-
-/// Every point that was decoded must have been written, with the bytes that it had.
-fn account(stats: &Stats, built: &Built) -> Result<(), ConvertError> {
-    let written = built.accounts.unaltered();
-    if stats.checksum == written {
-        return Ok(());
-    }
-    Err(ConvertError::Internal(format!("points were lost on the way: read {:?}, written {written:?}", stats.checksum)))
 }
 
 /// Wall time by phase.

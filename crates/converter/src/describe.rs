@@ -1,35 +1,26 @@
-//! What is told of a run: the metadata of the dataset and the report.
+//! What is known once every point was read, and what is told of a run.
 
-use pointmill_format::potree2::{AttributeStats, Encoding as StoredEncoding, HierarchyBytes, Metadata, NodeEntry};
-use pointmill_format::{Aabb, Attribute, AttributeType, Crs, Lattice};
+use pointmill_format::{Aabb, Crs};
 use serde_json::{Map, Value, json};
 
-use crate::build::chunk::Accounts;
 use crate::crs::{self, ResolvedCrs};
 use crate::error::ConvertError;
 use crate::gather::{Gathered, Range, Stats, is_eight_bit};
 use crate::grid::{Cube, tidy_world};
 use crate::job::Job;
-use crate::plan::{AttributeChoice, Duplicates, Encoding, Plan, RgbDepth, Sampling};
-use crate::report::{CoordinateChange, DroppedAttribute, GridReport, InputReport, PointsReport, Report, TreeReport};
-use crate::sample::SPACING_BITS;
-
-/// Levels a hierarchy chunk, as the reference converter has it.
-pub(crate) const HIERARCHY_STEP: u32 = 4;
+use crate::plan::{AttributeChoice, Duplicates, Encoding, Plan, RgbDepth, Sampling, Target};
+use crate::report::{CoordinateChange, DroppedAttribute, GridReport, InputReport, OutputReport, PointsReport, Report};
 
 /// What is known once every point was read.
 pub(crate) struct Description {
-    /// Attributes of the schema that go into the output, in output order.
-    pub(crate) kept: Vec<usize>,
     /// For each source: byte offset in a stored record of a colour that is 8 bits deep.
     pub(crate) widen_rgb: Vec<Option<usize>>,
     /// Byte offset of the classification in a stored record, if it is one byte.
     pub(crate) class: Option<usize>,
-    dropped: Vec<DroppedAttribute>,
     /// Ranges of the output, by index of the schema.
-    ranges: Vec<Range>,
-    crs: ResolvedCrs,
-    grid: GridReport,
+    pub(crate) ranges: Vec<Range>,
+    pub(crate) crs: ResolvedCrs,
+    pub(crate) grid: GridReport,
     warnings: Vec<String>,
 }
 
@@ -51,7 +42,7 @@ impl Description {
         if let Some(rgb) = rgb {
             for (i, source) in stats.sources.iter().enumerate().filter(|(_, s)| s.kept > 0) {
                 let mut range = source.rgb.clone();
-                let has_colour = job.sources[i].columns.contains(&rgb);
+                let has_colour = job.sources[i].columns.contains(&Some(rgb));
                 if has_colour && depths[i] {
                     if plan.rgb_depth == RgbDepth::Eight && range.max.iter().any(|v| *v > 255.0) {
                         let path = job.sources[i].scan.info().path.display();
@@ -66,75 +57,18 @@ impl Description {
             }
             warnings.extend(mixed_depths(job, stats, &depths, rgb));
         }
-        let (kept, dropped) = choose_attributes(&plan.attributes, job, &ranges)?;
         let crs = resolve_crs(plan, job, &mut warnings)?;
         let grid = grid_report(job, cube);
         let class = job.schema.find("classification");
         let class = class.filter(|&i| job.schema.attributes[i].size() == 1).map(|i| job.schema.offsets[i]);
-        Ok(Self { kept, widen_rgb, class, dropped, ranges, crs, grid, warnings })
-    }
-
-    pub(crate) fn metadata(
-        &self,
-        plan: &Plan,
-        gathered: &Gathered,
-        accounts: &Accounts,
-        hierarchy: &HierarchyBytes,
-        job: &Job,
-    ) -> Metadata {
-        let offset = self.grid.offset;
-        let side = gathered.cube.side;
-        let lattice = Lattice { scale: self.grid.scale, offset };
-        let stats = &gathered.stats;
-        let stored = |q: [i64; 3]| std::array::from_fn(|a| q[a] - gathered.cube.min[a]);
-        let mut position = AttributeStats {
-            attribute: Attribute::new("position", AttributeType::Int32, 3),
-            min: lattice.world(stored(stats.bounds.min)).to_vec(),
-            max: lattice.world(stored(stats.bounds.max)).to_vec(),
-            histogram: None,
-        };
-        position.attribute.description = String::new();
-        let mut attributes = vec![position];
-        attributes.extend(self.kept.iter().map(|&i| {
-            let attribute = job.schema.attributes[i].clone();
-            let range = &self.ranges[i];
-            // A range must be there and finite; a column of NaN has none.
-            let finite = |v: &[f64]| v.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect::<Vec<_>>();
-            let histogram = (attribute.name == "classification" && attribute.ty == AttributeType::UInt8).then(|| {
-                let mut left = stats.classes.clone();
-                left.iter_mut().zip(&accounts.classes_dropped).for_each(|(all, dropped)| *all -= dropped);
-                left
-            });
-            AttributeStats { attribute, min: finite(&range.min), max: finite(&range.max), histogram }
-        }));
-        let name = if plan.name.is_empty() { default_name(plan) } else { plan.name.clone() };
-        Metadata {
-            name,
-            description: String::new(),
-            points: stats.points - accounts.duplicates_dropped,
-            projection: self.crs.projection.clone(),
-            first_chunk_size: hierarchy.first_chunk_size,
-            step_size: HIERARCHY_STEP,
-            depth: hierarchy.depth,
-            lattice,
-            spacing: side / f64::from(1 << SPACING_BITS),
-            cube: Aabb { min: offset, max: offset.map(|v| v + side) },
-            encoding: match plan.encoding {
-                Encoding::Default => StoredEncoding::Default,
-                Encoding::Brotli { .. } => StoredEncoding::Brotli,
-            },
-            attributes,
-            extra: Map::from_iter([("pointmill".to_owned(), self.own_key(plan, job))]),
-        }
+        Ok(Self { widen_rgb, class, ranges, crs, grid, warnings })
     }
 
     /// What a validator or a later run needs to know, and no viewer reads.
-    fn own_key(&self, plan: &Plan, job: &Job) -> Value {
+    pub(crate) fn own_key(&self, plan: &Plan, job: &Job, dropped: &[DroppedAttribute]) -> Map<String, Value> {
         let mut own = Map::new();
         own.insert("version".into(), env!("CARGO_PKG_VERSION").into());
         own.insert("latticeOffset".into(), json!(job.lattice.offset));
-        own.insert("sampling".into(), sampling_name(plan.sampling).into());
-        own.insert("leafCapacity".into(), plan.leaf_capacity.into());
         own.insert("rgbDepth".into(), rgb_depth_name(plan.rgb_depth).into());
         own.insert("duplicates".into(), duplicates_name(plan.duplicates).into());
         let filter = filter_json(plan);
@@ -144,23 +78,25 @@ impl Description {
         if let Some(wkt) = &self.crs.wkt {
             own.insert("wkt".into(), wkt.clone().into());
         }
-        if !self.dropped.is_empty() {
-            let dropped = self.dropped.iter().map(|d| (d.name.clone(), d.why.clone().into()));
-            own.insert("attributesDropped".into(), Map::from_iter(dropped).into());
+        // Those that were not asked for are no matter of the dataset: which there were depends on the kind of the scans.
+        if plan.attributes == AttributeChoice::Scene {
+            let names: Vec<&str> = dropped.iter().map(|d| d.name.as_str()).collect();
+            let constant = |name: &str| self.ranges.get(job.schema.find(name)?)?.constant();
+            let constants: Map<_, _> =
+                names.iter().filter_map(|n| Some(((*n).to_owned(), json!(constant(n)?)))).collect();
+            if !constants.is_empty() {
+                own.insert("attributesDropped".into(), constants.into());
+            }
         }
-        own.into()
+        own
     }
 
-    pub(crate) fn report(
-        &self,
-        plan: &Plan,
-        job: &Job,
-        gathered: &Gathered,
-        accounts: &Accounts,
-        nodes: &[NodeEntry],
-    ) -> Report {
+    /// The account of the run, but for times and memory.
+    pub(crate) fn report(&self, plan: &Plan, job: &Job, gathered: &Gathered, outputs: Vec<OutputReport>) -> Report {
         let stats = &gathered.stats;
         let count = stats.points.max(1) as f64;
+        let first = outputs.first().cloned().unwrap_or_default();
+        let told = outputs.iter().flat_map(|o| &o.warnings);
         Report {
             version: env!("CARGO_PKG_VERSION").into(),
             options: options_json(plan),
@@ -168,11 +104,11 @@ impl Description {
             grid: self.grid.clone(),
             points: PointsReport {
                 read: stats.sources.iter().map(|s| s.read).sum(),
-                written: stats.points - accounts.duplicates_dropped,
+                written: first.points,
                 outside_bounds: stats.outside_bounds,
                 other_class: stats.other_class,
                 thinned: stats.thinned,
-                duplicates_dropped: accounts.duplicates_dropped,
+                duplicates_dropped: stats.points - first.points,
                 invalid: stats.invalid,
                 unreadable: stats.unreadable.saturating_add(job.points_missing),
             },
@@ -180,15 +116,15 @@ impl Description {
                 max: stats.change.max,
                 rms: stats.change.sum_of_squares.map(|s| (s / count).sqrt()),
             },
-            attributes: std::iter::once("position".to_owned())
-                .chain(self.kept.iter().map(|&i| job.schema.attributes[i].name.clone()))
-                .collect(),
-            attributes_dropped: self.dropped.clone(),
-            tree: tree_report(nodes, accounts),
+            attributes: first.attributes,
+            attributes_dropped: first.attributes_dropped,
+            tree: first.tree,
             checksum_in: stats.checksum.to_string(),
-            checksum_out: accounts.unaltered().to_string(),
+            checksum_out: first.checksum,
             temp_bytes: gathered.store.spilled_bytes(),
-            warnings: self.warnings.clone(),
+            output_bytes: outputs.iter().map(|o| o.bytes).sum(),
+            warnings: self.warnings.iter().chain(told).cloned().collect(),
+            outputs,
             ..Report::default()
         }
     }
@@ -201,7 +137,7 @@ pub(crate) fn input_reports(job: &Job, read: Option<(&Stats, &[Option<usize>])>)
     let report = |(i, source): (usize, &crate::job::Source)| {
         let info = source.scan.info();
         let seen = read.map(|(stats, _)| &stats.sources[i]);
-        let has_rgb = rgb.is_some_and(|rgb| source.columns.contains(&rgb));
+        let has_rgb = rgb.is_some_and(|rgb| source.columns.contains(&Some(rgb)));
         InputReport {
             path: info.path.clone(),
             format: info.format.clone(),
@@ -259,56 +195,13 @@ pub(crate) fn resolve_crs(plan: &Plan, job: &Job, warnings: &mut Vec<String>) ->
 pub(crate) fn grid_report(job: &Job, cube: &Cube) -> GridReport {
     let mut why = job.lattice_reason.clone();
     if !job.is_lossless() {
-        why.push_str("; some inputs do not lie on it, their coordinates are rounded");
+        why.push_str("; coordinates that do not lie on it are rounded");
     }
     GridReport { scale: job.lattice.scale, offset: cube.offset(&job.lattice), cube_side: cube.side, why }
 }
 
-/// Attributes that go into the output: all, those that vary, or those that were named.
-pub(crate) fn choose_attributes(
-    choice: &AttributeChoice,
-    job: &Job,
-    ranges: &[Range],
-) -> Result<(Vec<usize>, Vec<DroppedAttribute>), ConvertError> {
-    let all = || 0..job.schema.attributes.len();
-    let drop = |i: usize, why: String| DroppedAttribute { name: job.schema.attributes[i].name.clone(), why };
-    match choice {
-        AttributeChoice::All => Ok((all().collect(), Vec::new())),
-        AttributeChoice::Scene => {
-            let (mut kept, mut dropped) = (Vec::new(), Vec::new());
-            for i in all() {
-                match ranges[i].constant() {
-                    Some(values) => {
-                        let text: Vec<String> = values.iter().map(f64::to_string).collect();
-                        dropped.push(drop(i, format!("constant {}", text.join(" "))));
-                    }
-                    None => kept.push(i),
-                }
-            }
-            Ok((kept, dropped))
-        }
-        AttributeChoice::List(names) => {
-            let mut kept = Vec::new();
-            for name in names.iter().filter(|n| *n != "position") {
-                let Some(i) = job.schema.find(name) else {
-                    let known: Vec<&str> = job.schema.attributes.iter().map(|a| a.name.as_str()).collect();
-                    return Err(ConvertError::Usage(format!(
-                        "--attributes: no input has \"{name}\"; there are: {}",
-                        known.join(", ")
-                    )));
-                };
-                if !kept.contains(&i) {
-                    kept.push(i);
-                }
-            }
-            let dropped = all().filter(|i| !kept.contains(i)).map(|i| drop(i, "not asked for".into())).collect();
-            Ok((kept, dropped))
-        }
-    }
-}
-
 fn mixed_depths(job: &Job, stats: &Stats, eight: &[bool], rgb: usize) -> Option<String> {
-    let coloured = |i: &usize| job.sources[*i].columns.contains(&rgb) && stats.sources[*i].kept > 0;
+    let coloured = |i: &usize| job.sources[*i].columns.contains(&Some(rgb)) && stats.sources[*i].kept > 0;
     // A file without any colour value above 0 is no sign of anything.
     let lit = |i: &usize| stats.sources[*i].rgb.max.iter().any(|v| *v > 0.0);
     let coloured: Vec<usize> = (0..job.sources.len()).filter(coloured).filter(lit).collect();
@@ -325,33 +218,17 @@ fn mixed_depths(job: &Job, stats: &Stats, eight: &[bool], rgb: usize) -> Option<
     ))
 }
 
-fn tree_report(nodes: &[NodeEntry], accounts: &Accounts) -> TreeReport {
-    let depth = nodes.iter().map(|n| usize::from(n.key.level)).max().unwrap_or(0);
-    let mut report = TreeReport {
-        nodes: nodes.len() as u64,
-        depth: depth as u32,
-        points_per_level: vec![0; depth + 1],
-        nodes_per_level: vec![0; depth + 1],
-        overfull_leaves: accounts.overfull_leaves,
-        largest_leaf: 0,
-    };
-    let parents: std::collections::HashSet<_> = nodes.iter().filter_map(|n| n.key.parent()).collect();
-    for n in nodes {
-        report.points_per_level[usize::from(n.key.level)] += u64::from(n.points);
-        report.nodes_per_level[usize::from(n.key.level)] += 1;
-        if !parents.contains(&n.key) {
-            report.largest_leaf = report.largest_leaf.max(u64::from(n.points));
-        }
+/// The name of the cloud.
+pub(crate) fn name_of(plan: &Plan) -> String {
+    if !plan.name.is_empty() {
+        return plan.name.clone();
     }
-    report
-}
 
-fn default_name(plan: &Plan) -> String {
     let stem = plan.output.file_name().map(|n| n.to_string_lossy().into_owned());
     stem.filter(|s| !s.is_empty()).unwrap_or_else(|| "cloud".into())
 }
 
-fn sampling_name(sampling: Sampling) -> &'static str {
+pub(crate) fn sampling_name(sampling: Sampling) -> &'static str {
     match sampling {
         Sampling::Poisson => "poisson",
         Sampling::Grid => "grid",
@@ -390,6 +267,40 @@ fn filter_json(plan: &Plan) -> Map<String, Value> {
 
 fn options_json(plan: &Plan) -> Map<String, Value> {
     let mut options = filter_json(plan);
+    options.insert("to".into(), plan.targets.iter().map(Target::name).collect::<Vec<_>>().into());
+    for target in &plan.targets {
+        match target {
+            Target::Potree2 => octree_options(plan, &mut options),
+            Target::Bintree(s) => {
+                options.insert("capacity".into(), s.capacity.into());
+                options.insert("split".into(), s.split.name().into());
+                options.insert("layout".into(), s.layout.name().into());
+            }
+            Target::Batches(s) => {
+                options.insert("lod-cell".into(), s.lod_cell.map_or("auto".into(), Value::from));
+                options.insert("planes".into(), s.planes.map_or("auto".into(), |p| (u32::from(p) * 10).into()));
+                options.insert("originals".into(), s.originals.into());
+                if let Some(level) = s.zstd_level {
+                    options.insert("zstd-level".into(), level.into());
+                }
+            }
+        }
+    }
+    let attributes = match &plan.attributes {
+        AttributeChoice::Usual => json!("usual"),
+        AttributeChoice::All => json!("all"),
+        AttributeChoice::Scene => json!("scene"),
+        AttributeChoice::List(names) => json!(names),
+    };
+    options.insert("attributes".into(), attributes);
+    options.insert("memory".into(), plan.memory_bytes.into());
+    options.insert("threads".into(), plan.threads.into());
+    options.insert("duplicates".into(), duplicates_name(plan.duplicates).into());
+    options.insert("rgb-depth".into(), rgb_depth_name(plan.rgb_depth).into());
+    options
+}
+
+fn octree_options(plan: &Plan, options: &mut Map<String, Value>) {
     options.insert("sampling".into(), sampling_name(plan.sampling).into());
     if let Sampling::Random { seed } = plan.sampling {
         options.insert("seed".into(), seed.into());
@@ -401,18 +312,7 @@ fn options_json(plan: &Plan) -> Map<String, Value> {
             options.insert("encoding".into(), "brotli".into())
         }
     };
-    let attributes = match &plan.attributes {
-        AttributeChoice::All => json!("all"),
-        AttributeChoice::Scene => json!("scene"),
-        AttributeChoice::List(names) => json!(names),
-    };
-    options.insert("attributes".into(), attributes);
     options.insert("leaf-capacity".into(), plan.leaf_capacity.into());
-    options.insert("memory".into(), plan.memory_bytes.into());
-    options.insert("threads".into(), plan.threads.into());
-    options.insert("duplicates".into(), duplicates_name(plan.duplicates).into());
-    options.insert("rgb-depth".into(), rgb_depth_name(plan.rgb_depth).into());
-    options
 }
 
 /// World coordinates of the bounds that the headers declare, on the job lattice.

@@ -1,12 +1,13 @@
 //! What a run would do, from the headers alone.
 
 use crate::budget::Budget;
-use crate::describe::{choose_attributes, grid_report, input_reports, resolve_crs, tidy_bounds};
+use crate::describe::{grid_report, input_reports, resolve_crs, tidy_bounds};
 use crate::error::ConvertError;
 use crate::events::Silent;
 use crate::gather::Range;
 use crate::grid::{Cube, LatticeBounds};
 use crate::job::Job;
+use crate::octree::choose_attributes;
 use crate::plan::{AttributeChoice, Plan};
 use crate::report::Estimate;
 use crate::schema::POSITION_BYTES;
@@ -26,10 +27,11 @@ pub fn estimate(plan: &Plan) -> Result<Estimate, ConvertError> {
     let crs = resolve_crs(plan, &job, &mut warnings)?;
     // Which attributes are constant is not known before the points are read.
     let ranges: Vec<Range> = job.schema.attributes.iter().map(|a| Range::new(a.elements)).collect();
-    let (kept, _) = match &plan.attributes {
-        AttributeChoice::Scene => choose_attributes(&AttributeChoice::All, &job, &ranges)?,
-        other => choose_attributes(other, &job, &ranges)?,
-    };
+    let kept = match &plan.attributes {
+        AttributeChoice::Scene => choose_attributes(&AttributeChoice::All, &job, &ranges),
+        other => choose_attributes(other, &job, &ranges),
+    }
+    .kept;
     let size = |i: &usize| job.schema.attributes[*i].size();
     let bytes_per_point = (POSITION_BYTES + kept.iter().map(size).sum::<usize>()) as u64;
     let bounds = job.bounds_hint.map(|b| LatticeBounds {

@@ -12,8 +12,10 @@
 //! The bytes depend on the points and the settings alone: not on threads, memory, chunks or the order of the inputs.
 
 mod axis;
+mod batches;
 #[doc(hidden)]
 pub mod bench_api;
+mod bintree;
 mod budget;
 mod build;
 mod checksum;
@@ -28,8 +30,11 @@ mod file_at;
 mod gather;
 mod grid;
 mod job;
+mod lattice;
 pub mod memory;
 mod morton;
+mod needs;
+mod octree;
 mod os_hints;
 mod plan;
 mod records;
@@ -42,8 +47,11 @@ pub use convert::convert;
 pub use error::ConvertError;
 pub use estimate::estimate;
 pub use events::{Events, Phase, Silent};
-pub use plan::{AttributeChoice, Duplicates, Encoding, Filter, OnFault, Plan, RgbDepth, Sampling, ScaleChoice};
+pub use plan::{
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, RgbDepth, Sampling,
+    ScaleChoice, Target,
+};
 pub use report::{
-    CoordinateChange, DroppedAttribute, Estimate, GridReport, InputReport, PhaseReport, PointsReport, Report,
-    TreeReport,
+    CoordinateChange, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport, PointsReport,
+    Report, TreeReport,
 };

@@ -2,22 +2,28 @@
 
 use std::path::PathBuf;
 
-use pointmill_format::Aabb;
+use pointmill_format::bintree::{self, SplitRule};
+use pointmill_format::{Aabb, OpenOptions};
 
 /// The settings of a conversion. `Plan::new` gives the defaults of the command line.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Scans to read, files only (folders and globs are already expanded), any order.
     pub inputs: Vec<PathBuf>,
+    /// What text and E57 files do not say of themselves.
+    pub open: OpenOptions,
     /// The folder to make.
     pub output: PathBuf,
     /// Name of the cloud in the metadata.
     pub name: String,
-    /// How inner nodes choose their points.
+    /// What to make: one or more, no two of a format. One goes into the output folder itself, several into folders of
+    /// their names below it.
+    pub targets: Vec<Target>,
+    /// Octree: how inner nodes choose their points.
     pub sampling: Sampling,
-    /// How payloads are stored.
+    /// Octree: how payloads are stored.
     pub encoding: Encoding,
-    /// A node with more points than this is split, unless all of them share one position.
+    /// Octree: a node with more points than this is split, unless all of them share one position.
     pub leaf_capacity: u32,
     /// Which attributes go in.
     pub attributes: AttributeChoice,
@@ -27,6 +33,8 @@ pub struct Plan {
     pub memory_bytes: u64,
     /// Worker threads, ≥ 1.
     pub threads: usize,
+    /// Points that a thread takes at once, at most; `None`: as the memory allows. Changes nothing in the output.
+    pub task_points: Option<u64>,
     /// Where temporary files go; `None`: beside the output.
     pub temp_dir: Option<PathBuf>,
     /// Which points go in.
@@ -43,6 +51,64 @@ pub struct Plan {
     pub crs: Option<String>,
     /// Replace an existing output.
     pub overwrite: bool,
+}
+
+/// A format to write, and its own settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Target {
+    /// Potree 2.0 octree (`docs/formats/potree2.md`).
+    Potree2,
+    /// Mean-split binary tree (`docs/formats/bintree.md`).
+    Bintree(BintreeSettings),
+    /// Quantised batches (`docs/formats/batches.md`).
+    Batches(BatchesSettings),
+}
+
+impl Target {
+    /// The word of the command line, and the name of its folder beside others.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Potree2 => "potree2",
+            Self::Bintree(_) => "bintree",
+            Self::Batches(_) => "batches",
+        }
+    }
+}
+
+/// Settings of a mean-split binary tree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BintreeSettings {
+    /// Most points of a leaf, ≥ 1.
+    pub capacity: u32,
+    /// Where a node is split.
+    pub split: SplitRule,
+    /// One file a leaf, or one for all.
+    pub layout: bintree::Layout,
+}
+
+impl Default for BintreeSettings {
+    fn default() -> Self {
+        Self { capacity: 65_000, split: SplitRule::Mean, layout: bintree::Layout::Files }
+    }
+}
+
+/// Settings of quantised batches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BatchesSettings {
+    /// Cell of the coarsest level of detail, world units; `None`: from the scene's extent and density.
+    pub lod_cell: Option<f64>,
+    /// Position planes of ten bits to write, 1 to 3; `None`: those that the scene needs.
+    pub planes: Option<u8>,
+    /// Zstandard level of the sections; `None`: stored as they are, ready to be mapped.
+    pub zstd_level: Option<i32>,
+    /// Keep the colours that averaging replaced.
+    pub originals: bool,
+}
+
+impl Default for BatchesSettings {
+    fn default() -> Self {
+        Self { lod_cell: Some(1.0), planes: None, zstd_level: None, originals: true }
+    }
 }
 
 /// How an inner node chooses its points from those of its children.
@@ -74,6 +140,8 @@ pub enum Encoding {
 /// Which attributes go in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum AttributeChoice {
+    /// What the format is made for: all for an octree, the class for a binary tree, the colour for batches.
+    Usual,
     /// All that any input has.
     All,
     /// All but those that have one value everywhere; what is left out is named in the report.
@@ -136,15 +204,18 @@ impl Plan {
     pub fn new(inputs: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             inputs,
+            open: OpenOptions::default(),
             output,
             name: String::new(),
+            targets: vec![Target::Potree2],
             sampling: Sampling::Poisson,
             encoding: Encoding::Default,
             leaf_capacity: 10_000,
-            attributes: AttributeChoice::All,
+            attributes: AttributeChoice::Usual,
             scale: ScaleChoice::Auto,
             memory_bytes: crate::memory::default_ceiling_bytes(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
+            task_points: None,
             temp_dir: None,
             filter: Filter::default(),
             duplicates: Duplicates::Keep,

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use serde_json::{Map, Value};
 
 /// What a run did.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -19,11 +20,13 @@ pub struct Report {
     pub points: PointsReport,
     /// Largest and RMS change of a coordinate, per axis, world units.
     pub coordinate_change: CoordinateChange,
-    /// Attributes that were kept.
+    /// One entry a format written, in the order asked for.
+    pub outputs: Vec<OutputReport>,
+    /// Attributes that were kept, by the first output.
     pub attributes: Vec<String>,
-    /// Attributes that were left out, and why.
+    /// Attributes that were left out by the first output, and why.
     pub attributes_dropped: Vec<DroppedAttribute>,
-    /// The tree.
+    /// The tree of the first output.
     pub tree: TreeReport,
     /// Order-independent checksum of the points read and of the points written; equal, or the run fails.
     pub checksum_in: String,
@@ -37,9 +40,38 @@ pub struct Report {
     pub peak_memory_bytes: Option<u64>,
     /// Bytes written to temporary files.
     pub temp_bytes: u64,
-    /// Bytes of the dataset.
+    /// Bytes of the datasets.
     pub output_bytes: u64,
     /// Lines the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// One dataset.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct OutputReport {
+    /// `potree2`, `bintree`, `batches`.
+    pub format: String,
+    /// Folder below the output; empty if there is one dataset.
+    pub folder: String,
+    /// Points in it.
+    pub points: u64,
+    /// Attributes that were kept.
+    pub attributes: Vec<String>,
+    /// Attributes that were left out, and why.
+    pub attributes_dropped: Vec<DroppedAttribute>,
+    /// Bytes of its files.
+    pub bytes: u64,
+    /// Wall seconds from the gathered points to the synced files.
+    pub seconds: f64,
+    /// Order-independent checksum of the points written; equals `checksum_in` of the report.
+    pub checksum: String,
+    /// Nodes of a tree.
+    pub tree: TreeReport,
+    /// What is particular to the format.
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    pub details: Map<String, Value>,
+    /// Lines the user should know.
+    #[serde(skip)]
     pub warnings: Vec<String>,
 }
 

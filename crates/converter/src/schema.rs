@@ -73,6 +73,19 @@ impl Schema {
         (Self::new(order.iter().map(|&i| all[i].clone()).collect()), maps)
     }
 
+    /// The schema without what is not needed, and for each attribute of the present one its place there.
+    pub(crate) fn reduce(&self, needed: &[bool]) -> (Self, Vec<Option<usize>>) {
+        let mut kept = Vec::new();
+        let places = self.attributes.iter().zip(needed).map(|(attribute, needed)| {
+            needed.then(|| {
+                kept.push(attribute.clone());
+                kept.len() - 1
+            })
+        });
+        let places = places.collect();
+        (Self::new(kept), places)
+    }
+
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
         self.attributes.iter().position(|a| a.name == name)
     }
@@ -141,6 +154,8 @@ mod tests {
             points_declared: 0,
             bounds_declared: None,
             lattice: None,
+            resolution: Default::default(),
+            parts: vec![],
             attributes,
             crs: Crs::default(),
             file_bytes: 0,

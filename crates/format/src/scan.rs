@@ -31,6 +31,10 @@ pub struct ScanInfo {
     pub bounds_declared: Option<Aabb>,
     /// The lattice of [`crate::Positions::Quantized`] batches; `None` for world coordinates.
     pub lattice: Option<Lattice>,
+    /// How finely the file stores world coordinates; nothing is told by it of scans that have a lattice.
+    pub resolution: Resolution,
+    /// The scans within the file, where its format knows such (E57, PTX); else empty.
+    pub parts: Vec<ScanPart>,
     /// The columns beside the position, in order.
     pub attributes: Vec<Attribute>,
     /// The coordinate reference system.
@@ -39,6 +43,31 @@ pub struct ScanInfo {
     pub file_bytes: u64,
     /// Disagreements that did not stop the reader ("the header declares 10 points, 3 are there"), a line each.
     pub warnings: Vec<String>,
+}
+
+/// How finely coordinates are stored: steps below that carry nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Resolution {
+    /// In steps of that many world units (scaled integers, or single precision of a known range).
+    Step(f64),
+    /// In single precision, as world coordinates: 24 bits, so the step grows with the distance from 0.
+    Single,
+    /// In double precision, as decimal text, or not known: finer than any lattice.
+    #[default]
+    Double,
+}
+
+/// A scan within a file, as the file tells of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanPart {
+    /// Its name, or empty.
+    pub name: String,
+    /// Points that it declares.
+    pub points: u64,
+    /// `world = rotation · local + translation`, rows of the matrix; the reader has applied it.
+    pub rotation: [[f64; 3]; 3],
+    /// See `rotation`; world units.
+    pub translation: [f64; 3],
 }
 
 /// A part of a scan that decodes without any other part.

@@ -5,109 +5,12 @@ use std::fmt;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use pointmill_format::NodeKey;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use serde_json::Value;
 
-/// A promise of the format. Each check stands for one; the order is that of reports.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[allow(missing_docs)] // `promise` says it
-pub enum Check {
-    Metadata,
-    Hierarchy,
-    NodeTypes,
-    EmptyNodes,
-    Depth,
-    PointCount,
-    PayloadRanges,
-    Payloads,
-    Order,
-    Coordinates,
-    Boxes,
-    TightBox,
-    AttributeRanges,
-    Histogram,
-    Spacing,
-    Coverage,
-    Against,
-}
-
-impl Check {
-    /// Every check, in the order of reports.
-    pub const ALL: [Self; 17] = [
-        Self::Metadata,
-        Self::Hierarchy,
-        Self::NodeTypes,
-        Self::EmptyNodes,
-        Self::Depth,
-        Self::PointCount,
-        Self::PayloadRanges,
-        Self::Payloads,
-        Self::Order,
-        Self::Coordinates,
-        Self::Boxes,
-        Self::TightBox,
-        Self::AttributeRanges,
-        Self::Histogram,
-        Self::Spacing,
-        Self::Coverage,
-        Self::Against,
-    ];
-
-    /// The word in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Metadata => "metadata",
-            Self::Hierarchy => "hierarchy",
-            Self::NodeTypes => "node-types",
-            Self::EmptyNodes => "empty-nodes",
-            Self::Depth => "depth",
-            Self::PointCount => "point-count",
-            Self::PayloadRanges => "payload-ranges",
-            Self::Payloads => "payloads",
-            Self::Order => "order",
-            Self::Coordinates => "coordinates",
-            Self::Boxes => "boxes",
-            Self::TightBox => "tight-box",
-            Self::AttributeRanges => "attribute-ranges",
-            Self::Histogram => "histogram",
-            Self::Spacing => "spacing",
-            Self::Coverage => "coverage",
-            Self::Against => "against",
-        }
-    }
-
-    /// What the dataset promises, in one line.
-    pub const fn promise(self) -> &'static str {
-        match self {
-            Self::Metadata => "metadata.json is complete, in range and consistent",
-            Self::Hierarchy => {
-                "every hierarchy chunk holds exactly its records; chunks are disjoint and none is orphaned"
-            }
-            Self::NodeTypes => "a node is of type 0 exactly if it has children",
-            Self::EmptyNodes => "no node is empty",
-            Self::Depth => "hierarchy.depth is the deepest level that has a node",
-            Self::PointCount => "the points of all nodes add up to points",
-            Self::PayloadRanges => "payloads have the right size, do not overlap and cover octree.bin",
-            Self::Payloads => "every payload decodes to exactly its points",
-            Self::Order => "points of a BROTLI node are sorted by Morton code",
-            Self::Coordinates => "stored coordinates are 0 or more and below 2^31",
-            Self::Boxes => "every point lies in the box of its node",
-            Self::TightBox => "min and max of position are the tight box of the points",
-            Self::AttributeRanges => "min and max of every attribute bound its values and are attained",
-            Self::Histogram => "histograms count the values that are there",
-            Self::Spacing => "inner nodes are sampled as promised: no pair closer than the spacing of the level",
-            Self::Coverage => "no hole: every point is within two spacings of a point drawn at each level above it",
-            Self::Against => "every point and attribute of the sources is in the dataset exactly once",
-        }
-    }
-}
-
-impl Serialize for Check {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
-}
+use crate::check::Check;
+use crate::format::Format;
+use crate::place::Place;
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -126,9 +29,8 @@ pub struct Finding {
     pub check: Check,
     /// How bad.
     pub severity: Severity,
-    /// The node, if one is to blame; serialised as its name ("r042").
-    #[serde(serialize_with = "node_name")]
-    pub node: Option<NodeKey>,
+    /// The node or batch, if one is to blame; serialised as its name ("r042").
+    pub node: Option<Place>,
     /// What was looked at ("childMask", "max of intensity").
     pub subject: Cow<'static, str>,
     /// What the format, the geometry or the sources ask for.
@@ -137,13 +39,6 @@ pub struct Finding {
     pub found: Value,
     /// How many points are concerned, where points are.
     pub points: Option<u64>,
-}
-
-fn node_name<S: Serializer>(node: &Option<NodeKey>, serializer: S) -> Result<S::Ok, S::Error> {
-    match node {
-        Some(key) => serializer.collect_str(key),
-        None => serializer.serialize_none(),
-    }
 }
 
 impl Finding {
@@ -165,9 +60,9 @@ impl Finding {
         }
     }
 
-    /// Blames a node.
-    pub(crate) fn at(mut self, node: NodeKey) -> Self {
-        self.node = Some(node);
+    /// Blames a node or batch.
+    pub(crate) fn at(mut self, place: impl Into<Place>) -> Self {
+        self.node = Some(place.into());
         self
     }
 
@@ -184,7 +79,7 @@ impl Finding {
     }
 
     /// Reports keep the first findings in this order, so that they do not depend on threads.
-    fn sort_key(&self) -> (Severity, Option<NodeKey>, String, String, String) {
+    fn sort_key(&self) -> (Severity, Option<Place>, String, String, String) {
         let Self { severity, node, subject, expected, found, .. } = self;
         (*severity, *node, subject.to_string(), found.to_string(), expected.to_string())
     }
@@ -266,22 +161,31 @@ struct Slot {
 /// Gathers findings from many threads; keeps the first `cap` of each check in sort order, whoever comes first.
 #[derive(Debug)]
 pub(crate) struct Findings {
+    format: Format,
     cap: usize,
+    /// By [`Check::index`]; those of other formats stay empty.
     slots: Vec<Mutex<Slot>>,
     checked: Vec<AtomicU64>,
 }
 
 impl Findings {
-    pub(crate) fn new(cap: usize) -> Self {
+    /// Keeps at most `cap` findings of each check of `format`.
+    pub(crate) fn new(format: Format, cap: usize) -> Self {
         Self {
+            format,
             cap,
-            slots: Check::ALL.map(|_| Mutex::default()).into(),
-            checked: Check::ALL.map(|_| AtomicU64::new(0)).into(),
+            slots: Check::ALL.iter().map(|_| Mutex::default()).collect(),
+            checked: Check::ALL.iter().map(|_| AtomicU64::new(0)).collect(),
         }
     }
 
+    /// The format whose checks these are.
+    pub(crate) fn format(&self) -> Format {
+        self.format
+    }
+
     fn slot(&self, check: Check) -> std::sync::MutexGuard<'_, Slot> {
-        self.slots[check as usize].lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.slots[check.index()].lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
     /// Adds a finding.
@@ -309,13 +213,18 @@ impl Findings {
 
     /// Counts `n` more things that `check` looked at.
     pub(crate) fn checked(&self, check: Check, n: u64) {
-        self.checked[check as usize].fetch_add(n, Ordering::Relaxed);
+        self.checked[check.index()].fetch_add(n, Ordering::Relaxed);
     }
 
     /// Says that a check was not done, and forgets what it may have found.
     pub(crate) fn skip(&self, check: Check, why: impl Into<String>) {
         *self.slot(check) = Slot { skipped: Some(why.into()), ..Slot::default() };
-        self.checked[check as usize].store(0, Ordering::Relaxed);
+        self.checked[check.index()].store(0, Ordering::Relaxed);
+    }
+
+    /// Says that a check was not fully done, and keeps what it found.
+    pub(crate) fn note(&self, check: Check, why: impl Into<String>) {
+        self.slot(check).skipped = Some(why.into());
     }
 
     /// Errors of a check so far.
@@ -325,7 +234,7 @@ impl Findings {
 
     /// Takes over the findings of one check from `other`.
     pub(crate) fn absorb(&self, check: Check, other: &Self) {
-        self.checked(check, other.checked[check as usize].load(Ordering::Relaxed));
+        self.checked(check, other.checked[check.index()].load(Ordering::Relaxed));
         let mut from = std::mem::take(&mut *other.slot(check));
         let mut slot = self.slot(check);
         slot.found += from.found;
@@ -337,14 +246,14 @@ impl Findings {
     pub(crate) fn finish(self) -> (Vec<CheckResult>, Vec<Finding>) {
         let mut results = Vec::new();
         let mut problems = Vec::new();
-        for ((check, slot), checked) in Check::ALL.into_iter().zip(self.slots).zip(self.checked) {
-            let mut slot = slot.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        for check in self.format.checks() {
+            let mut slot = std::mem::take(&mut *self.slot(*check));
             shorten(&mut slot.kept, self.cap);
             results.push(CheckResult {
-                name: check,
+                name: *check,
                 promise: check.promise(),
                 ok: slot.found == 0,
-                checked: checked.into_inner(),
+                checked: self.checked[check.index()].load(Ordering::Relaxed),
                 found: slot.found,
                 warnings: slot.warnings,
                 skipped: slot.skipped,
@@ -362,18 +271,21 @@ fn shorten(findings: &mut Vec<Finding>, cap: usize) {
 
 #[cfg(test)]
 mod tests {
+    use pointmill_format::NodeKey;
+
     use super::*;
 
     #[test]
     fn a_capped_list_keeps_the_first_in_order_and_counts_all() {
-        let findings = Findings::new(2);
+        let findings = Findings::new(Format::Potree2, 2);
         for level in (0..30).rev() {
             let key = NodeKey { level, x: 0, y: 0, z: 0 };
             findings.push(Finding::new(Check::Boxes, "position", 1, 2).at(key));
         }
         let (results, problems) = findings.finish();
-        assert_eq!(results[Check::Boxes as usize].found, 30);
-        assert_eq!(problems.iter().map(|p| p.node.unwrap().level).collect::<Vec<_>>(), [0, 1]);
+        assert_eq!(results.iter().find(|r| r.name == Check::Boxes).unwrap().found, 30);
+        let places = [0, 1].map(|level| Some(Place::Octree(NodeKey { level, x: 0, y: 0, z: 0 })));
+        assert_eq!(problems.iter().map(|p| p.node).collect::<Vec<_>>(), places);
     }
 
     #[test]
@@ -383,10 +295,5 @@ mod tests {
         assert_eq!(finding.to_string(), "error empty-nodes r04: numPoints: expected at least 1, found 0");
         let json = serde_json::to_value(&finding).unwrap();
         assert_eq!((json["check"].as_str(), json["node"].as_str()), (Some("empty-nodes"), Some("r04")));
-    }
-
-    #[test]
-    fn checks_are_indexed_by_their_place_in_the_list() {
-        assert!(Check::ALL.iter().enumerate().all(|(i, c)| *c as usize == i));
     }
 }

@@ -55,7 +55,7 @@ fn a_point_stored_twice_is_surplus_and_its_node_is_named() {
     cloud.nodes.get_mut(&leaf).unwrap().push(twice);
     let outcome = cloud.encode(Encoding::Brotli).validate_against(&[&points()]);
     assert_only(&outcome, Check::Against, 1);
-    assert_eq!((outcome.problems[0].subject.as_ref(), outcome.problems[0].node), ("surplus point", Some(leaf)));
+    assert_eq!((outcome.problems[0].subject.as_ref(), outcome.problems[0].node), ("surplus point", Some(leaf.into())));
 }
 
 #[test]

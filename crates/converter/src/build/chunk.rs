@@ -11,6 +11,7 @@ use crate::checksum::Checksum;
 use crate::chunks::Chunk;
 use crate::error::ConvertError;
 use crate::gather::Store;
+use crate::gather::load::load;
 use crate::morton;
 use crate::os_hints;
 use crate::plan::Duplicates;
@@ -136,18 +137,7 @@ impl<'a> ChunkBuilder<'a> {
         self.records.clear();
         os_hints::reserve(&mut self.records, chunk.points.max(self.plan.usual_points) as usize * stride);
         for segment in &chunk.segments {
-            let start = self.records.len();
-            let source = self.plan.store.take(*segment, &mut self.records)?;
-            if let Some(rgb) = self.plan.widen_rgb[source as usize] {
-                let fresh = &mut self.records[start..];
-                accounts.narrow.add_all(fresh, stride);
-                for record in fresh.chunks_exact_mut(stride) {
-                    for channel in record[rgb..rgb + 6].as_chunks_mut::<2>().0 {
-                        *channel = u16::from_le_bytes(*channel).wrapping_mul(257).to_le_bytes();
-                    }
-                }
-                accounts.wide.add_all(fresh, stride);
-            }
+            load(self.plan.store, stride, self.plan.widen_rgb, *segment, &mut self.records, accounts)?;
         }
         Ok(())
     }

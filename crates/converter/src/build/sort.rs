@@ -73,7 +73,7 @@ fn settle_ties(keys: &[u64], index_bits: u32, points: &mut [Point], records: &[u
 }
 
 /// Least-significant-digit radix sort of the bits `from..to`; what is below `from` is in order already.
-fn radix_sort(keys: &mut Vec<u64>, swap: &mut Vec<u64>, from: u32, to: u32) {
+pub(crate) fn radix_sort(keys: &mut Vec<u64>, swap: &mut Vec<u64>, from: u32, to: u32) {
     if keys.len() < 512 {
         keys.sort_unstable();
         return;

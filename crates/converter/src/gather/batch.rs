@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 
-use pointmill_format::{Aabb, Column, PointBatch, Positions};
+use pointmill_format::{Aabb, Column, PointBatch, Positions, with_column};
 
 use super::columns::Part;
 use super::store::BLOCK_BYTES;
@@ -182,10 +182,7 @@ impl<'a> Worker<'a> {
             return Ok(false);
         }
         let class_column = scan.info().attributes.iter().position(|a| a.name == "classification");
-        let classes = class_column.and_then(|c| match &batch.columns[c] {
-            Column::UInt8(v) => Some(v),
-            _ => None,
-        });
+        let classes = class_column.map(|c| &batch.columns[c]).filter(|_| filter.classes.is_some()).map(whole_numbers);
         let world = |i: usize| -> [f64; 3] {
             match (&batch.positions, scan.info().lattice.as_ref()) {
                 (Positions::Quantized(p), Some(l)) => {
@@ -213,7 +210,11 @@ impl<'a> Worker<'a> {
                 stats.invalid += 1;
             } else if filter.bounds.is_some_and(|b| !b.contains(p)) {
                 stats.outside_bounds += 1;
-            } else if filter.classes.as_ref().is_some_and(|c| !c.contains(&classes.map_or(0, |v| v[i]))) {
+            } else if filter
+                .classes
+                .as_ref()
+                .is_some_and(|c| !c.iter().any(|c| i64::from(*c) == classes.as_ref().map_or(0, |v| v[i])))
+            {
                 stats.other_class += 1;
             } else {
                 self.selection.push(i as u32);
@@ -226,7 +227,8 @@ impl<'a> Worker<'a> {
     fn unfiltered_colour(&mut self, source: usize, batch: &PointBatch) {
         let job = self.pass.job;
         let places = &job.sources[source].columns;
-        let colour = batch.columns.iter().zip(places).find(|(_, place)| Some(**place) == job.schema.rgb());
+        let Some(rgb) = job.schema.rgb() else { return };
+        let colour = batch.columns.iter().zip(places).find(|(_, place)| **place == Some(rgb));
         if let Some((column, _)) = colour {
             self.stats.sources[source].rgb_unfiltered.include(column, None);
         }
@@ -237,7 +239,8 @@ impl<'a> Worker<'a> {
         let job = self.pass.job;
         let rgb = job.schema.rgb();
         let columns = &job.sources[source].columns;
-        for (column, &place) in batch.columns.iter().zip(columns) {
+        for (column, place) in batch.columns.iter().zip(columns) {
+            let Some(place) = *place else { continue };
             if Some(place) == rgb {
                 self.stats.sources[source].rgb.include(column, selection);
             } else {
@@ -252,7 +255,7 @@ impl<'a> Worker<'a> {
                 }
             }
         }
-        for place in (0..job.schema.attributes.len()).filter(|p| !columns.contains(p)) {
+        for place in (0..job.schema.attributes.len()).filter(|p| !columns.contains(&Some(*p))) {
             // What this source does not have is stored as zeros.
             if Some(place) == rgb {
                 self.stats.sources[source].rgb.add(0.0);
@@ -305,11 +308,23 @@ impl<'a> Worker<'a> {
     }
 
     fn note_segments(&mut self, block: u32, mut start: u32) {
+        let mut first = 0;
         for &(cell, count) in &self.grouping.groups {
-            self.segments.entry(cell).or_default().push(Segment { block, start, count });
+            let part = self.segments.entry(cell).or_default();
+            part.segments.push(Segment { block, start, count });
+            if self.pass.wants_moments {
+                part.moments.add_rows(&self.q, &self.grouping.order[first..first + count as usize]);
+            }
+            first += count as usize;
             start += count;
         }
     }
+}
+
+/// Classes of any type as whole numbers; what is none is no class, −1.
+#[allow(clippy::unnecessary_cast)] // one body for every type of column
+fn whole_numbers(column: &Column) -> Vec<i64> {
+    with_column!(column, v => v.iter().map(|v| if (*v as i64) as f64 == *v as f64 { *v as i64 } else { -1 }).collect())
 }
 
 /// Four tables, so that runs of one class do not wait for the same counter.

@@ -16,24 +16,25 @@ pub(crate) enum Part<'a> {
 const MAX_BYTES: usize = 8;
 
 impl<'a> Part<'a> {
-    /// The parts of a batch; `places` are the columns' indices in the schema.
-    pub(crate) fn of(columns: &'a [Column], places: &[usize], schema: &Schema) -> Vec<Self> {
-        let mut order: Vec<usize> = (0..columns.len()).collect();
-        order.sort_unstable_by_key(|&c| schema.offsets[places[c]]);
+    /// The parts of a batch; `places` are the columns' indices in the schema, `None` for columns that are not kept.
+    pub(crate) fn of(columns: &'a [Column], places: &[Option<usize>], schema: &Schema) -> Vec<Self> {
+        let mut placed: Vec<(usize, &Column)> =
+            columns.iter().zip(places).filter_map(|(column, place)| Some(((*place)?, column))).collect();
+        placed.sort_unstable_by_key(|(place, _)| schema.offsets[*place]);
         let mut parts: Vec<Self> = Vec::new();
-        for c in order {
-            let offset = schema.offsets[places[c]];
-            match (&columns[c], parts.last_mut()) {
+        for (place, column) in placed {
+            let offset = schema.offsets[place];
+            match (column, parts.last_mut()) {
                 (Column::UInt8(v), Some(Self::Bytes { columns, offset: start }))
                     if *start + columns.len() == offset && columns.len() < MAX_BYTES =>
                 {
                     columns.push(v);
                 }
-                (Column::UInt8(v), _) if schema.attributes[places[c]].elements == 1 => {
+                (Column::UInt8(v), _) if schema.attributes[place].elements == 1 => {
                     parts.push(Self::Bytes { columns: vec![v], offset });
                 }
                 (column, _) => {
-                    parts.push(Self::One { column, offset, elements: schema.attributes[places[c]].elements });
+                    parts.push(Self::One { column, offset, elements: schema.attributes[place].elements });
                 }
             }
         }
@@ -124,7 +125,7 @@ mod tests {
         assert_eq!(attributes[4].ty, AttributeType::Float64);
         let schema = Schema::new(attributes);
         let mut tile = vec![0; 2 * schema.stride];
-        for part in Part::of(&columns, &[0, 1, 2, 3, 4, 5], &schema) {
+        for part in Part::of(&columns, &[0, 1, 2, 3, 4, 5].map(Some), &schema) {
             part.put(&mut tile, schema.stride, &[1, 0]);
         }
         let mut expected = vec![0; 12];

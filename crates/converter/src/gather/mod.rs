@@ -3,6 +3,9 @@
 
 mod batch;
 mod columns;
+pub(crate) mod load;
+mod moments;
+pub(crate) mod outliers;
 mod partition;
 mod stats;
 mod store;
@@ -12,9 +15,10 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use pointmill_format::{NodeKey, Scratch, Wanted};
+use pointmill_format::{NodeKey, Scratch};
 
 pub(crate) use batch::{Grouping, is_eight_bit};
+pub(crate) use moments::Moments;
 pub(crate) use partition::Partition;
 pub(crate) use stats::{Range, Stats};
 pub(crate) use store::{Segment, Store};
@@ -23,7 +27,7 @@ use crate::error::ConvertError;
 use crate::events::Events;
 use crate::grid::{Cube, LatticeBounds};
 use crate::job::Job;
-use crate::plan::{OnFault, Plan};
+use crate::plan::{OnFault, Plan, Target};
 
 /// All points of the job.
 pub(crate) struct Gathered {
@@ -37,13 +41,15 @@ pub(crate) struct Gathered {
 }
 
 /// The points of one octree cell, wherever they are stored.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Cell {
     pub(crate) key: NodeKey,
     pub(crate) points: u64,
     pub(crate) segments: Vec<Segment>,
     /// All points share one place (known only for cells that had to be looked into).
     pub(crate) is_one_place: bool,
+    /// Sums and extremes of the positions, if some output needs them.
+    pub(crate) moments: Moments,
 }
 
 /// How a pass over the inputs ended.
@@ -61,12 +67,21 @@ pub(crate) struct Pass<'a> {
     pub(crate) job: &'a Job,
     pub(crate) partition: Partition,
     pub(crate) store: Store,
+    /// Some output needs the moments of the cells.
+    wants_moments: bool,
     /// True once a point did not fit the partition: from then on only bounds are wanted.
     pub(crate) misled: AtomicBool,
 }
 
-/// Where a batch of points puts its cells: segments by packed cell.
-type Segments = HashMap<u64, Vec<Segment>, batch::CellHash>;
+/// Where a batch of points puts its cells, by packed cell.
+type Segments = HashMap<u64, CellPart, batch::CellHash>;
+
+/// One thread's part of a cell.
+#[derive(Debug, Default)]
+struct CellPart {
+    segments: Vec<Segment>,
+    moments: Moments,
+}
 
 /// Runs the pass with bounds that are believed until they prove wrong.
 pub(crate) fn gather(
@@ -83,7 +98,8 @@ pub(crate) fn gather(
         plan,
         job,
         partition,
-        store: Store::new(temp_dir, job.schema.stride, store_bytes),
+        store: Store::new(temp_dir, job.schema.stride, plan.targets.len() as u32, store_bytes),
+        wants_moments: plan.targets.iter().any(|t| matches!(t, Target::Bintree(_))),
         misled: false.into(),
     };
     let (stats, segments) = pass.run(pool, events)?;
@@ -99,10 +115,10 @@ pub(crate) fn gather(
     }
     let mut cells: Vec<Cell> = segments
         .into_iter()
-        .map(|(packed, mut segments)| {
+        .map(|(packed, CellPart { mut segments, moments })| {
             segments.sort_unstable_by_key(|s| (s.block, s.start));
             let points = segments.iter().map(|s| u64::from(s.count)).sum();
-            Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false }
+            Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, moments }
         })
         .collect();
     cells.sort_unstable_by(|a, b| crate::morton::compare(cell_xyz(&a.key), cell_xyz(&b.key)));
@@ -154,7 +170,9 @@ impl Pass<'_> {
             let (part, cells) = part?;
             stats.merge(&part);
             for (cell, mut more) in cells {
-                segments.entry(cell).or_default().append(&mut more);
+                let part: &mut CellPart = segments.entry(cell).or_default();
+                part.segments.append(&mut more.segments);
+                part.moments.merge(&more.moments);
             }
         }
         Ok((stats, segments))
@@ -170,10 +188,9 @@ impl Pass<'_> {
         events: &dyn Events,
     ) -> Result<(), ConvertError> {
         let scan = &self.job.sources[source].scan;
-        let wanted = Wanted::all(scan.info());
         let mut outcome = Ok(());
         let mut points = 0u64;
-        let decoded = scan.decode(piece, &wanted, scratch, &mut |batch| {
+        let decoded = scan.decode(piece, &self.job.sources[source].wanted, scratch, &mut |batch| {
             if events.stop_requested() {
                 outcome = Err(ConvertError::Interrupted);
                 return false;

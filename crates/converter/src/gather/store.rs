@@ -23,6 +23,8 @@ pub(crate) struct Segment {
 /// Blocks of records. A block holds records of one source and never changes; it is dropped once all of it was taken.
 pub(crate) struct Store {
     stride: usize,
+    /// How often each record is taken.
+    uses: u32,
     memory_limit: u64,
     in_memory: AtomicU64,
     blocks: Mutex<Vec<Block>>,
@@ -33,8 +35,8 @@ pub(crate) struct Store {
 
 struct Block {
     source: u32,
-    /// Records that were not taken yet.
-    remaining: u32,
+    /// Records that were not taken yet, once for each use.
+    remaining: u64,
     place: Place,
 }
 
@@ -46,10 +48,12 @@ enum Place {
 }
 
 impl Store {
-    /// An empty store that keeps up to `memory_limit` bytes in memory and puts the rest into a file in `spill_dir`.
-    pub(crate) fn new(spill_dir: &Path, stride: usize, memory_limit: u64) -> Self {
+    /// An empty store that keeps up to `memory_limit` bytes in memory and puts the rest into a file in `spill_dir`, for
+    /// `uses` outputs that each take every record once.
+    pub(crate) fn new(spill_dir: &Path, stride: usize, uses: u32, memory_limit: u64) -> Self {
         Self {
             stride,
+            uses,
             memory_limit,
             in_memory: AtomicU64::new(0),
             blocks: Mutex::default(),
@@ -73,6 +77,15 @@ impl Store {
 
     /// Adds the records of a block. The buffer comes back empty, with or without its memory.
     pub(crate) fn fill(&self, block: u32, records: &mut Vec<u8>) -> Result<(), ConvertError> {
+        self.fill_for(block, records, self.uses)
+    }
+
+    /// [`Self::fill`] with records that one output has taken and puts back in another order, for itself.
+    pub(crate) fn refill(&self, block: u32, records: &mut Vec<u8>) -> Result<(), ConvertError> {
+        self.fill_for(block, records, 1)
+    }
+
+    fn fill_for(&self, block: u32, records: &mut Vec<u8>, uses: u32) -> Result<(), ConvertError> {
         let bytes = records.len() as u64;
         let keeps_buffer = records.len() * 2 > records.capacity();
         let cost = if keeps_buffer { records.capacity() as u64 } else { bytes };
@@ -89,15 +102,29 @@ impl Store {
             Place::Disk { offset }
         };
         records.clear();
-        let remaining = (bytes / self.stride as u64) as u32;
+        let remaining = bytes / self.stride as u64 * u64::from(uses);
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let slot = &mut blocks[block as usize];
         (slot.remaining, slot.place) = (remaining, place);
         Ok(())
     }
 
-    /// Appends the records of a segment to `out` and returns its source. Each record may be taken once.
+    /// Appends the records of a segment to `out` and returns its source. Each output may take each record once.
     pub(crate) fn take(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        let source = self.read(segment, out)?;
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let block = &mut blocks[segment.block as usize];
+        block.remaining = block.remaining.saturating_sub(u64::from(segment.count));
+        if block.remaining == 0
+            && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
+        {
+            self.in_memory.fetch_sub(bytes.capacity() as u64, Ordering::Relaxed);
+        }
+        Ok(source)
+    }
+
+    /// [`Self::take`], but the records can be taken still.
+    pub(crate) fn read(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
         let (place, source) = {
             let blocks = self.blocks.lock().map_err(|_| poisoned())?;
             let block = &blocks[segment.block as usize];
@@ -114,14 +141,6 @@ impl Store {
                     .map_err(|e| ConvertError::io(&self.spill_dir, "reading the spill file", e))?;
             }
             Place::Gone => return Err(ConvertError::Internal("a record was taken twice".into())),
-        }
-        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
-        let block = &mut blocks[segment.block as usize];
-        block.remaining = block.remaining.saturating_sub(segment.count);
-        if block.remaining == 0
-            && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
-        {
-            self.in_memory.fetch_sub(bytes.capacity() as u64, Ordering::Relaxed);
         }
         Ok(source)
     }
@@ -147,7 +166,7 @@ mod tests {
     #[test]
     fn memory_and_disk_give_back_the_same_records() {
         let dir = tempfile::tempdir().unwrap();
-        let store = Store::new(dir.path(), 4, 40);
+        let store = Store::new(dir.path(), 4, 1, 40);
         let a = store.open(0).unwrap();
         let b = store.open(1).unwrap();
         store.fill(a, &mut (0..40u8).collect()).unwrap();
@@ -162,7 +181,7 @@ mod tests {
     #[test]
     fn a_block_leaves_memory_once_all_of_it_was_taken() {
         let dir = tempfile::tempdir().unwrap();
-        let store = Store::new(dir.path(), 4, 40);
+        let store = Store::new(dir.path(), 4, 1, 40);
         let a = store.open(0).unwrap();
         store.fill(a, &mut vec![1; 40]).unwrap();
         let mut out = Vec::new();
@@ -171,5 +190,20 @@ mod tests {
         store.take(Segment { block: a, start: 4, count: 6 }, &mut out).unwrap();
         assert_eq!(store.in_memory.load(Ordering::Relaxed), 0);
         assert!(store.take(Segment { block: a, start: 0, count: 1 }, &mut out).is_err());
+    }
+
+    #[test]
+    fn with_two_uses_a_block_stays_until_both_have_taken_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = Store::new(dir.path(), 4, 2, 40);
+        let a = store.open(0).unwrap();
+        store.fill(a, &mut vec![1; 40]).unwrap();
+        let (all, mut out) = (Segment { block: a, start: 0, count: 10 }, Vec::new());
+        store.take(all, &mut out).unwrap();
+        store.read(all, &mut out).unwrap();
+        assert_eq!(store.in_memory.load(Ordering::Relaxed), 40);
+        store.take(all, &mut out).unwrap();
+        assert_eq!((store.in_memory.load(Ordering::Relaxed), out.len()), (0, 120));
+        assert!(store.take(all, &mut out).is_err());
     }
 }

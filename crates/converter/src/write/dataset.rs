@@ -39,17 +39,18 @@ impl StagedFolder {
         parent_of(&self.output)
     }
 
-    /// Creates a file of the dataset.
-    pub(crate) fn create(&self, name: &str) -> Result<(File, PathBuf), ConvertError> {
-        let path = self.staging.path().join(name);
-        let file = File::create(&path).map_err(|e| ConvertError::io(&path, "making the file", e))?;
-        Ok((file, path))
+    /// The place of a dataset: the folder itself (`name` is empty) or a folder in it.
+    pub(crate) fn dataset(&self, name: &'static str) -> Result<StagedDataset, ConvertError> {
+        let folder = if name.is_empty() { self.staging.path().to_path_buf() } else { self.staging.path().join(name) };
+        if !name.is_empty() {
+            fs::create_dir(&folder).map_err(|e| ConvertError::io(&folder, "making the folder of a dataset", e))?;
+        }
+        Ok(StagedDataset { folder, name })
     }
 
-    /// Writes and syncs a small file of the dataset.
+    /// Writes and syncs a small file beside the datasets, or in the one that there is.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ConvertError> {
-        let (mut file, path) = self.create(name)?;
-        file.write_all(bytes).and_then(|()| file.sync_all()).map_err(|e| ConvertError::io(&path, "writing the file", e))
+        self.dataset("")?.write(name, bytes)
     }
 
     /// Gives the folder its final name. What stood there before goes only when the new one is in place.
@@ -83,6 +84,53 @@ impl StagedFolder {
     }
 }
 
+/// A dataset on its way into a [`StagedFolder`].
+pub(crate) struct StagedDataset {
+    folder: PathBuf,
+    name: &'static str,
+}
+
+impl StagedDataset {
+    /// The name of its folder below the output, or nothing.
+    pub(crate) fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The path that a file of it has for now.
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Creates a file; whoever writes it syncs it.
+    pub(crate) fn create(&self, name: &str) -> Result<(File, PathBuf), ConvertError> {
+        let path = self.path(name);
+        let file = File::create(&path).map_err(|e| ConvertError::io(&path, "making the file", e))?;
+        Ok((file, path))
+    }
+
+    /// Writes and syncs a small file.
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ConvertError> {
+        let (mut file, path) = self.create(name)?;
+        file.write_all(bytes).and_then(|()| file.sync_all()).map_err(|e| ConvertError::io(&path, "writing the file", e))
+    }
+
+    /// Syncs the names of the files.
+    pub(crate) fn sync(&self) -> Result<(), ConvertError> {
+        sync_folder(&self.folder).map_err(|e| ConvertError::io(&self.folder, "syncing the output", e))
+    }
+}
+
+/// Files by one of which a folder is known as a dataset.
+const DATASET_FILES: [&str; 3] = ["metadata.json", "index.json", "points.qbatch"];
+
+/// True for a folder that holds a dataset, or several in folders of their names.
+fn is_dataset(folder: &Path) -> bool {
+    let holds_one = |folder: &Path| DATASET_FILES.iter().any(|f| folder.join(f).is_file());
+    holds_one(folder)
+        || folder.join("report.json").is_file()
+            && ["potree2", "bintree", "batches"].iter().any(|name| holds_one(&folder.join(name)))
+}
+
 /// An output may be replaced if it is a dataset or an empty folder; anything else is not ours to delete.
 fn check_output(output: &Path, overwrite: bool) -> Result<(), ConvertError> {
     let Ok(meta) = fs::symlink_metadata(output) else { return Ok(()) };
@@ -93,7 +141,7 @@ fn check_output(output: &Path, overwrite: bool) -> Result<(), ConvertError> {
     if !overwrite {
         return Err(ConvertError::OutputExists(output.to_path_buf()));
     }
-    if !meta.is_dir() || !output.join("metadata.json").is_file() {
+    if !meta.is_dir() || !is_dataset(output) {
         return Err(ConvertError::Usage(format!(
             "{}: exists and is not a dataset, so --overwrite does not replace it; choose another output",
             output.display()

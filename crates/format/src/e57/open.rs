@@ -17,7 +17,7 @@ use super::schema::{Roles, ScanFields, Schema, fields};
 use super::streams::Streams;
 use super::{E57Options, E57Scan, ScanPlan, header, xml};
 use crate::source::Source;
-use crate::{Aabb, Crs, Piece, ReadError, ScanInfo};
+use crate::{Aabb, Crs, Piece, ReadError, Resolution, ScanInfo, ScanPart};
 
 /// Records of a piece: a batch of its own; a multiple of 8, so that packed values start at a byte border.
 const PIECE_RECORDS: u64 = 50_000;
@@ -57,6 +57,8 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     }
     warnings.extend(notes.lines());
     let bounds_declared = bounds(&drafts);
+    let resolution = resolution(&drafts);
+    let parts = document.clouds.iter().map(part).collect();
     let (mut scans, mut cuts) = (Vec::new(), Vec::new());
     for (i, (draft, fills)) in drafts.into_iter().zip(fills).enumerate() {
         let Draft { index, fields, roles, pose, cuts: own, .. } = draft;
@@ -69,6 +71,8 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
         points_declared: document.clouds.iter().fold(0, |sum: u64, c| sum.saturating_add(c.records)),
         bounds_declared,
         lattice: None,
+        resolution,
+        parts,
         attributes,
         crs: crs(document.coordinate_metadata.as_deref(), &mut warnings),
         file_bytes: source.len(),
@@ -198,6 +202,21 @@ fn pieces(cuts: &[Cut]) -> Vec<Piece> {
         piece
     };
     cuts.iter().map(piece).collect()
+}
+
+/// The finest step of all scans, if each stores its coordinates in steps.
+fn resolution(drafts: &[Draft<'_>]) -> Resolution {
+    let steps = drafts.iter().map(|draft| draft.roles.positions.step(&draft.fields, draft.cloud));
+    match steps.collect::<Option<Vec<_>>>().and_then(|steps| steps.into_iter().reduce(f64::min)) {
+        Some(step) if step.is_finite() && step > 0.0 => Resolution::Step(step),
+        _ => Resolution::Double,
+    }
+}
+
+/// What is told of a scan.
+fn part(cloud: &PointCloud) -> ScanPart {
+    let (rotation, translation) = Pose::new(cloud).0.parts();
+    ScanPart { name: cloud.name.clone().unwrap_or_default(), points: cloud.records, rotation, translation }
 }
 
 /// The box of all scans, if each declares one.

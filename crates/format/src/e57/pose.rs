@@ -36,6 +36,12 @@ impl Pose {
         (Self { rotation: (!is_identity).then_some(rotation), translation }, note)
     }
 
+    /// Rotation and translation as they are applied.
+    pub(super) fn parts(&self) -> ([[f64; 3]; 3], [f64; 3]) {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        (self.rotation.unwrap_or(identity), self.translation)
+    }
+
     fn identity() -> Self {
         Self { rotation: None, translation: [0.0; 3] }
     }

@@ -95,6 +95,8 @@ impl LasScan {
             points_declared: header.point_count,
             bounds_declared: header.bounds,
             lattice: header.lattice.is_valid().then_some(header.lattice),
+            resolution: Default::default(),
+            parts: Vec::new(),
             attributes: schema.attributes.clone(),
             crs,
             file_bytes: source.len(),

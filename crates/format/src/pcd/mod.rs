@@ -17,7 +17,7 @@ use std::path::Path;
 
 use crate::rows::{
     CUT_SHORT, Endian, LineRule, Planes, Property, Role, RowScan, Schema, Storage, binary, lines, precision, reconcile,
-    settle_float_colours,
+    resolution, settle_float_colours,
 };
 use crate::source::Source;
 use crate::{AttributeType, Piece, ReadError, Scan};
@@ -48,11 +48,12 @@ pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
             .advise("export it with x, y and z")
     })?;
     let (pieces, storage) = place(&source, &header, &properties, &mut warnings)?;
-    let axis = properties.iter().find(|p| p.role == Role::Axis(0)).map_or("float32", |p| precision(p.ty));
-    let format = format!("PCD {}, {}, {axis} positions", header.version, header.encoding.name());
+    let axis = properties.iter().find(|p| p.role == Role::Axis(0)).map_or(AttributeType::Float32, |p| p.ty);
+    let format = format!("PCD {}, {}, {} positions", header.version, header.encoding.name(), precision(axis));
     let mut scan = RowScan::new(source, format, header.points, schema, storage);
     scan.pieces = pieces;
     scan.info.warnings = warnings;
+    scan.info.resolution = resolution(axis);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))
 }

@@ -31,7 +31,7 @@ mod vertices;
 
 use std::path::Path;
 
-use crate::rows::{Property, RowScan, Schema, precision, settle_float_colours};
+use crate::rows::{Property, RowScan, Schema, precision, resolution, settle_float_colours};
 use crate::source::Source;
 use crate::{AttributeType, ReadError, Scan};
 use header::{Encoding, Header, Kind};
@@ -57,11 +57,13 @@ pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
             .advise("export it with x, y and z")
     })?;
     let placed = vertices::place(&source, &header, vertices, &properties, &mut warnings)?;
-    let axis = properties.iter().find(|p| p.role == crate::rows::Role::Axis(0)).map_or("float", |p| precision(p.ty));
-    let format = format!("PLY 1.0, {}, {axis} positions", header.encoding.name());
+    let axis =
+        properties.iter().find(|p| p.role == crate::rows::Role::Axis(0)).map_or(AttributeType::Float32, |p| p.ty);
+    let format = format!("PLY 1.0, {}, {} positions", header.encoding.name(), precision(axis));
     let mut scan = RowScan::new(source, format, header.elements[vertices].count, schema, placed.storage);
     scan.pieces = placed.pieces;
     scan.info.warnings = warnings;
+    scan.info.resolution = resolution(axis);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))
 }

@@ -23,7 +23,7 @@ macro_rules! little_endian {
 little_endian!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
 /// Appends to `column` the `elements` values that stand at byte `at` of every record of `record_len` bytes.
-pub(super) fn append(column: &mut Column, records: &[u8], record_len: usize, at: usize, elements: usize) {
+pub(crate) fn append(column: &mut Column, records: &[u8], record_len: usize, at: usize, elements: usize) {
     with_column!(column, values => append_typed(values, records, record_len, at, elements));
 }
 

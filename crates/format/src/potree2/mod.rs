@@ -25,7 +25,7 @@
 
 mod brotli;
 mod chunk;
-mod column_bytes;
+pub(crate) mod column_bytes;
 mod dataset;
 mod encode_brotli;
 mod encode_hierarchy;
@@ -45,4 +45,5 @@ pub use hierarchy::Hierarchy;
 pub use metadata::{AttributeStats, Encoding, Metadata};
 pub use node_points::NodePoints;
 pub use record::{Node, NodeRecord, NodeType};
+pub(crate) use source::read_exact_at;
 pub use source::{ByteSource, DatasetFile, Folder, Memory};

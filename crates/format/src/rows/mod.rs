@@ -37,7 +37,17 @@ pub(crate) fn reconcile(declared: u64, there: u64, warnings: &mut Vec<String>) -
     declared.min(there)
 }
 
-/// The kind of number that positions are, for people: it bounds what they resolve.
+/// How finely positions of that type are stored.
+pub(crate) fn resolution(ty: crate::AttributeType) -> crate::Resolution {
+    use crate::AttributeType as T;
+    match ty {
+        T::Float32 => crate::Resolution::Single,
+        T::Float64 => crate::Resolution::Double,
+        _ => crate::Resolution::Step(1.0),
+    }
+}
+
+/// The kind of number that positions are, for people.
 pub(crate) fn precision(ty: crate::AttributeType) -> &'static str {
     use crate::AttributeType as T;
     match ty {

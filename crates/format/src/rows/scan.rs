@@ -6,7 +6,9 @@ use super::lines;
 use super::number::Endian;
 use super::schema::Schema;
 use crate::source::Source;
-use crate::{Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted};
+use crate::{
+    Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo, Scratch, Wanted,
+};
 
 /// Binary rows that are read at once, so that they are still in the second-level cache when they become columns.
 const READ_BYTES: usize = 128 << 10;
@@ -97,6 +99,8 @@ impl RowScan {
             points_declared: points,
             bounds_declared: None,
             lattice: None,
+            resolution: Resolution::Double,
+            parts: Vec::new(),
             attributes: schema.attributes.clone(),
             crs: Default::default(),
             file_bytes: source.len(),

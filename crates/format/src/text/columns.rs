@@ -7,6 +7,9 @@ use crate::rows::{
 use crate::source::Source;
 use crate::{AttributeType, Piece, ReadError};
 
+/// Advice for types.
+const TYPES: &str = "types are int8, uint8, int16, uint16, int32, uint32, int64, uint64, float, double";
+
 /// A column before its type is known.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Column {
@@ -23,7 +26,7 @@ impl Column {
             None => (name, None),
             Some((name, ty)) => {
                 let found = AttributeType::from_potree_name(ty.trim());
-                (name, Some(found.ok_or_else(|| format!("the type {ty:?} is not known"))?))
+                (name, Some(found.ok_or_else(|| format!("the type {ty:?} of column {name} is not known; {TYPES}"))?))
             }
         };
         Ok(Self { role: text_role(name), name: name.trim().to_owned(), ty })
@@ -37,6 +40,25 @@ impl Column {
     fn padding() -> Self {
         Self { role: Role::Padding, name: String::new(), ty: None }
     }
+}
+
+/// [`super::check_columns`].
+pub(super) fn check(names: &[String]) -> Result<(), String> {
+    let columns: Vec<Column> = names.iter().map(|n| Column::named(n)).collect::<Result<_, _>>()?;
+    let count = |role: &Role| columns.iter().filter(|c| c.role == *role).count();
+    for (axis, name) in ["x", "y"].into_iter().enumerate() {
+        if count(&Role::Axis(axis)) == 0 {
+            return Err(format!("there is no {name}; name every column in order, as in x,y,z,r,g,b,i"));
+        }
+    }
+    let mut seen: Vec<&Column> = Vec::new();
+    for column in columns.iter().filter(|c| c.role != Role::Padding) {
+        if seen.iter().any(|c| c.role == column.role) {
+            return Err(format!("{} stands twice; write - for columns to leave out", column.name));
+        }
+        seen.push(column);
+    }
+    Ok(())
 }
 
 /// Text has shorter and longer names than the other formats; a unit in brackets does not count.
@@ -233,5 +255,14 @@ mod tests {
         assert_eq!((column.name.as_str(), column.ty), ("quality", Some(AttributeType::UInt8)));
         assert_eq!(Column::named("i:float").unwrap().role, Role::Intensity);
         assert!(Column::named("q:byte").is_err());
+    }
+
+    #[test]
+    fn columns_that_cannot_be_are_told() {
+        let check = |list: &str| check(&list.split(',').map(str::to_owned).collect::<Vec<_>>());
+        assert_eq!(check("x,y,z,-,-,r,g,b,i"), Ok(()));
+        assert!(check("x,z").unwrap_err().contains("there is no y"));
+        assert!(check("x,y,z,i,intensity").unwrap_err().contains("intensity stands twice"));
+        assert!(check("x,y,q:byte").unwrap_err().contains("\"byte\" of column q"));
     }
 }

@@ -135,6 +135,14 @@ pub fn open(path: &Path, options: &TextOptions) -> Result<Box<dyn Scan>, ReadErr
     }
 }
 
+/// Whether these names can be the columns of a file ([`TextOptions::columns`]).
+///
+/// # Errors
+/// What is wrong with them, for people: x or y is missing, a name stands twice, a type is not known.
+pub fn check_columns(names: &[String]) -> Result<(), String> {
+    columns::check(names)
+}
+
 /// The filled lines of the first bytes, 64 at most; the last one may be cut and counts only if it is the only one.
 fn filled(first_bytes: &[u8]) -> Vec<&[u8]> {
     let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);

@@ -8,7 +8,7 @@ use super::{fields, is_number};
 use crate::rows::ascii::{Tokens, parse};
 use crate::rows::{CUT_SHORT, EXPORT_AGAIN, LineRule, Pose, lines, reconcile};
 use crate::source::Source;
-use crate::{Attribute, AttributeType, Piece, ReadError, Scan};
+use crate::{Attribute, AttributeType, Piece, ReadError, Scan, ScanPart};
 
 /// Lines of a scan before its cells.
 const HEADER_LINES: usize = 10;
@@ -41,6 +41,7 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
     let columns: Result<Vec<_>, _> = COLUMNS[..most].iter().map(|name| Column::named(name)).collect();
     let columns = columns.map_err(|what| ReadError::unsupported(source.path(), what))?;
     let scans = grids.poses.len();
+    let parts = grids.parts();
     let table = Table {
         format: format!("PTX, {scans} scan{}, {} grid cells", if scans == 1 { "" } else { "s" }, grids.cells),
         // cells without a point are none of the points
@@ -54,6 +55,7 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
         source,
     };
     let mut scan = table.scan(Some(columns))?;
+    scan.info.parts = parts;
     if scans > 1 {
         let attribute = Attribute::new("point source id", AttributeType::UInt16, 1);
         if let crate::rows::Storage::Lines(rule) = &mut scan.storage {
@@ -66,6 +68,17 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
 }
 
 impl Grids {
+    /// What is told of the scans.
+    fn parts(&self) -> Vec<ScanPart> {
+        let ends = self.poses.iter().skip(1).map(|p| p.first_point).chain([self.points]);
+        let part = |(pose, end): (&Pose, u64)| {
+            let [x, y, z, translation] = pose.rows;
+            let rotation = std::array::from_fn(|a| [x[a], y[a], z[a]]);
+            ScanPart { name: String::new(), points: end.saturating_sub(pose.first_point), rotation, translation }
+        };
+        self.poses.iter().zip(ends).map(part).collect()
+    }
+
     /// Reads the header at `at` and passes over its cells; returns where they end.
     fn scan(&mut self, source: &Source, at: u64) -> Result<u64, ReadError> {
         let header = Header::read(source, at)?;

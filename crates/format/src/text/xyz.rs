@@ -87,7 +87,7 @@ pub(super) fn named(
 ) -> Result<Option<Vec<Column>>, ReadError> {
     let list = |names: &[String]| -> Result<Vec<Column>, ReadError> {
         let columns: Result<Vec<_>, String> = names.iter().map(|n| Column::named(n)).collect();
-        let columns = columns.map_err(|what| ReadError::unsupported(source.path(), what).advise(TYPES))?;
+        let columns = columns.map_err(|what| ReadError::unsupported(source.path(), what))?;
         if columns.len() == count {
             return Ok(columns);
         }
@@ -102,8 +102,6 @@ pub(super) fn named(
     let names: Vec<_> = names.iter().map(|n| n.replace(':', " ")).collect();
     list(&names).map(Some)
 }
-
-const TYPES: &str = "types are int8, uint8, int16, uint16, int32, uint32, int64, uint64, float, double";
 
 /// The separator that was asked for; `Some(None)` means blanks.
 pub(super) fn wanted_separator(options: &TextOptions) -> Option<Option<u8>> {

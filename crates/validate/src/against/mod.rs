@@ -7,23 +7,25 @@
 
 pub(crate) mod block;
 mod narrow;
-mod rules;
+pub(crate) mod rules;
 mod sources;
 
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use pointmill_format::ReadError;
-use pointmill_format::potree2::{Dataset, Metadata, NodePoints};
+use pointmill_format::{OpenOptions, ReadError};
 use serde::Serialize;
 
 use crate::ProgressFn;
-use crate::finding::{Check, Finding, Findings};
-use crate::tree::Tree;
-use block::{BLOCK_POINTS, Block, append_words};
-use rules::{RgbDepth, Rules};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::place::Place;
+use block::Block;
+use rules::RgbDepth;
 use sources::Sources;
+
+pub(crate) use rules::Rules;
 
 /// What the comparison with the sources found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -72,11 +74,12 @@ const COLOURS: [Colour; 2] = [Colour::AsIs, Colour::Times257];
 
 impl Colour {
     #[inline]
-    fn apply(self, rgb: [u64; 3]) -> [u64; 3] {
-        match self {
+    fn apply(self, rgb: [u64; 3], rules: &Rules) -> [u64; 3] {
+        let wide = match self {
             Self::AsIs => rgb,
             Self::Times257 => rgb.map(|v| v.min(255) * 257),
-        }
+        };
+        if rules.rgb_as_bytes { wide.map(|v| (v * 255 + 32_767) / 65_535) } else { wide }
     }
 }
 
@@ -94,6 +97,9 @@ impl Sum {
     }
 }
 
+/// What a walker of a dataset hands its blocks of records to. Blocks are its to change.
+pub(crate) type Sink<'a> = dyn FnMut(&mut Block) + 'a;
+
 /// The side of the dataset, filled while its nodes are walked.
 pub(crate) struct Sums {
     rules: Rules,
@@ -107,11 +113,17 @@ impl Sums {
         self.total.lock().map_or_else(|e| e.into_inner().0, |t| t.0)
     }
 
-    /// Takes in the records of a node.
-    pub(crate) fn add_node(&self, points: &NodePoints) {
+    /// What records are, for who fills blocks.
+    pub(crate) fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// Takes in records, a node's or a batch's: `fill` gets a block to fill as often as it likes ([`Block::reset`]
+    /// first), and hands each over to the sink.
+    pub(crate) fn add(&self, fill: impl FnOnce(&mut Block, &mut Sink<'_>)) {
         let mut block = self.blocks.lock().map_or(None, |mut b| b.pop()).unwrap_or_default();
         let mut sum = Sum::default();
-        each_block_of_node(points, &self.rules, &mut block, |block| {
+        fill(&mut block, &mut |block| {
             block.start_hashes(&self.rules.attributes, self.rules.rgb);
             for i in 0..block.len() {
                 let hash = block.hash(i, rgb_of(block, &self.rules, i), block.position(i));
@@ -134,21 +146,14 @@ fn rgb_of(block: &Block, rules: &Rules, i: usize) -> Option<[u64; 3]> {
     words.get(3 * i..3 * i + 3)?.try_into().ok()
 }
 
-/// Hands over a node's records in blocks.
-fn each_block_of_node(points: &NodePoints, rules: &Rules, block: &mut Block, mut work: impl FnMut(&mut Block)) {
-    for start in (0..points.len()).step_by(BLOCK_POINTS) {
-        let n = (points.len() - start).min(BLOCK_POINTS);
-        block.reset(rules.attributes.len());
-        block.keep.resize(n, true);
-        for (to, from) in block.positions.iter_mut().zip(&points.positions) {
-            to.extend(from[start..start + n].iter().map(|v| i64::from(*v)));
-        }
-        for (i, attribute) in rules.attributes.iter().enumerate() {
-            let column = points.columns.get(i).map(|c| (c, attribute.elements));
-            append_words(column, start, n, attribute, &mut block.words[i]);
-        }
-        work(block);
-    }
+/// A dataset whose records can be read again, to look for those that differ.
+pub(crate) trait Records: Sync {
+    /// Hands over every readable record, in blocks and with its place, in parallel; in any order. Broken payloads are
+    /// passed over: the walk has reported them.
+    ///
+    /// # Errors
+    /// The operating system could not read.
+    fn each_block(&self, rules: &Rules, work: &(dyn Fn(&mut Block, Place) + Sync)) -> Result<(), ReadError>;
 }
 
 /// Both sides, ready to be compared.
@@ -166,8 +171,7 @@ struct FileSums {
 
 /// Where the comparison reads the dataset again.
 pub(crate) struct Context<'a> {
-    pub(crate) dataset: &'a Dataset,
-    pub(crate) tree: &'a Tree,
+    pub(crate) records: &'a dyn Records,
     pub(crate) findings: &'a Findings,
     pub(crate) progress: &'a ProgressFn<'a>,
     /// What later passes may use.
@@ -179,9 +183,8 @@ impl Against {
     ///
     /// # Errors
     /// A file that cannot be opened or is not a scan.
-    pub(crate) fn open(paths: &[PathBuf], metadata: &Metadata) -> Result<Self, ReadError> {
-        let rules = Rules::new(metadata);
-        let sources = Sources::open(paths, &rules)?;
+    pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, rules: Rules) -> Result<Self, ReadError> {
+        let sources = Sources::open(paths, options, &rules)?;
         Ok(Self { sources, sums: Sums { rules, total: Mutex::default(), blocks: Mutex::default() } })
     }
 
@@ -248,7 +251,7 @@ impl Against {
             for i in (0..block.len()).filter(|i| block.keep[*i]) {
                 let rgb = rgb_of(block, rules, i);
                 for (colour, sums) in colours.iter().zip(&mut sums) {
-                    let rgb = rgb.map(|v| colour.apply(v));
+                    let rgb = rgb.map(|v| colour.apply(v, rules));
                     for (rule, sum) in positions.iter().zip(sums) {
                         let from = if rule.truncated { &block.truncated } else { &block.positions };
                         let position = [0, 1, 2].map(|axis| from[axis][i] + rule.shift);

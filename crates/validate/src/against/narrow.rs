@@ -7,14 +7,15 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Mutex;
 
-use pointmill_format::potree2::{Node, NodePoints};
-use pointmill_format::{Attribute, ErrorKind, NodeKey, ReadError};
+use pointmill_format::{Attribute, ReadError};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use super::block::{BUCKETS, Block, bucket, value};
-use super::{Against, Colour, Context, Sum, each_block_of_node};
-use crate::finding::{Check, Finding};
+use super::{Against, Colour, Context, Sum};
+use crate::check::Check;
+use crate::finding::Finding;
+use crate::place::Place;
 
 /// Reports how the records of the dataset differ from those of the sources.
 pub(super) fn narrow(against: &Against, colours: &[Colour], context: &Context<'_>) -> Result<(), ReadError> {
@@ -54,7 +55,7 @@ struct Pass<'a> {
 struct Balance {
     sources: i64,
     dataset: i64,
-    node: Option<NodeKey>,
+    node: Option<Place>,
 }
 
 impl Pass<'_> {
@@ -179,7 +180,7 @@ impl Pass<'_> {
 
     /// World position and attributes of a record.
     fn describe(&self, row: &[u64]) -> Value {
-        let lattice = self.context.dataset.metadata().lattice;
+        let lattice = self.against.sums.rules.lattice;
         let world = lattice.world([row[0] as i64, row[1] as i64, row[2] as i64]);
         let mut map = Map::from_iter([("position".to_owned(), json!(world))]);
         let mut at = 3;
@@ -195,36 +196,27 @@ impl Pass<'_> {
     }
 
     /// Hands over every record of both sides: side (0: sources), block, index, node.
-    fn each_record(&self, work: impl Fn(usize, &Block, usize, Option<NodeKey>) + Sync) -> Result<(), ReadError> {
+    fn each_record(&self, work: impl Fn(usize, &Block, usize, Option<Place>) + Sync) -> Result<(), ReadError> {
         let rules = &self.against.sums.rules;
         self.against.sources.each_block(rules, self.context.progress, "differences", |block, at| {
             if let Some(rgb) = rules.rgb {
                 let colour = self.colours[at];
                 let (colours, _) = block.words[rgb].as_chunks_mut::<3>();
-                colours.iter_mut().for_each(|c| *c = colour.apply(*c));
+                colours.iter_mut().for_each(|c| *c = colour.apply(*c, rules));
             }
             block.start_hashes(&rules.attributes, None);
             (0..block.len()).filter(|i| block.keep[*i]).for_each(|i| work(0, block, i, None));
         })?;
-        let Context { dataset, tree, .. } = self.context;
-        let readable = tree.nodes.par_iter().filter(|n| n.readable);
-        readable.try_for_each_init(<(NodePoints, Block)>::default, |(points, block), node| {
-            match dataset.read_points(&Node { key: node.key, record: node.record }, points) {
-                Err(error) if !matches!(error.kind, ErrorKind::Io(_)) => return Ok(()), // reported by the walk
-                other => other?,
-            }
-            each_block_of_node(points, rules, block, |block| {
-                block.start_hashes(&rules.attributes, None);
-                (0..block.len()).for_each(|i| work(1, block, i, Some(node.key)));
-            });
-            Ok(())
+        self.context.records.each_block(rules, &|block, place| {
+            block.start_hashes(&rules.attributes, None);
+            (0..block.len()).for_each(|i| work(1, block, i, Some(place)));
         })
     }
 }
 
-type Row = (Box<[u64]>, Option<NodeKey>);
+type Row = (Box<[u64]>, Option<Place>);
 
-fn blame(finding: Finding, node: Option<NodeKey>) -> Finding {
+fn blame(finding: Finding, node: Option<Place>) -> Finding {
     match node {
         Some(node) => finding.at(node),
         None => finding,

@@ -1,7 +1,6 @@
 //! What was asked of the conversion, as the dataset's metadata records it, applied by own code.
 
-use pointmill_format::potree2::Metadata;
-use pointmill_format::{Aabb, Attribute};
+use pointmill_format::{Aabb, Attribute, Lattice};
 use serde_json::Value;
 
 /// Meaning of 16-bit colours of the sources.
@@ -15,16 +14,30 @@ pub(crate) enum RgbDepth {
     Sixteen,
 }
 
+/// How values of a source's column become those of the dataset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Conversion {
+    /// They are the same.
+    AsStored,
+    /// A class as a float: rounded to a whole number; 0 where there is none, it is not finite or beyond ±2²⁴.
+    WholeClass,
+}
+
 /// How the records of the sources become those of the dataset.
 #[derive(Debug, Clone)]
 pub(crate) struct Rules {
     /// The dataset's attributes beside the position, in order.
     pub(crate) attributes: Vec<Attribute>,
+    /// One for each of `attributes`.
+    pub(crate) conversions: Vec<Conversion>,
     /// Where `rgb` (uint16 × 3) stands among them.
     pub(crate) rgb: Option<usize>,
+    /// The dataset has 8 bits a channel: each 16-bit value v of the rules below becomes (v · 255 + 32767) / 65535.
+    pub(crate) rgb_as_bytes: bool,
+    /// The dataset's lattice.
+    pub(crate) lattice: Lattice,
     /// World coordinate of the job lattice's integer 0.
-    pub(crate) lattice_offset: [f64; 3],
-    pub(crate) scale: [f64; 3],
+    lattice_offset: [f64; 3],
     /// The job lattice's coordinate of the dataset's integer 0.
     pub(crate) shift: [i64; 3],
     pub(crate) rgb_depth: RgbDepth,
@@ -42,26 +55,24 @@ pub(crate) struct Rules {
 }
 
 impl Rules {
-    /// Reads the key `pointmill` of the metadata, if it is there.
-    pub(crate) fn new(metadata: &Metadata) -> Self {
-        let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
-        let attributes: Vec<Attribute> =
-            metadata.attributes.iter().map(|a| a.attribute.clone()).filter(|a| a.name != "position").collect();
+    /// `attributes`: those to compare, beside the position. `lattice`: of the dataset's integer positions. `own`:
+    /// pointmill's own key of the metadata, null if it is not there.
+    pub(crate) fn new(attributes: Vec<Attribute>, lattice: Lattice, own: &Value) -> Self {
         let rgb = attributes.iter().position(|a| a.name == "rgb" && a.elements == 3);
-        let lattice_offset = vector(&own["latticeOffset"]).unwrap_or(metadata.lattice.offset);
-        let scale = metadata.lattice.scale;
-        let shift =
-            std::array::from_fn(|a| ((metadata.lattice.offset[a] - lattice_offset[a]) / scale[a]).round() as i64);
+        let lattice_offset = vector(&own["latticeOffset"]).unwrap_or(lattice.offset);
+        let shift = [0, 1, 2].map(|a| ((lattice.offset[a] - lattice_offset[a]) / lattice.scale[a]).round() as i64);
         let bounds = match numbers(&own["filter"]["bounds"]).as_deref() {
             Some(&[x0, y0, z0, x1, y1, z1]) => Some(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] }),
             _ => None,
         };
         let classes = numbers(&own["filter"]["classes"]).map(|c| c.iter().map(|v| *v as u8).collect());
         Self {
+            conversions: vec![Conversion::AsStored; attributes.len()],
             attributes,
             rgb,
+            rgb_as_bytes: false,
+            lattice,
             lattice_offset,
-            scale,
             shift,
             rgb_depth: match own["rgbDepth"].as_str() {
                 Some("8") => RgbDepth::Eight,
@@ -80,7 +91,7 @@ impl Rules {
     /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
     #[inline]
     pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
-        let steps = (world - self.lattice_offset[axis]) / self.scale[axis];
+        let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
         (steps.round() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
     }
 }

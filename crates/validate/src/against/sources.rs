@@ -4,10 +4,14 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-use pointmill_format::{Column, PointBatch, Positions, ReadError, Scan, Scratch, Wanted, las, with_column};
+use pointmill_format::{
+    Attribute, AttributeType, Column, OpenOptions, PointBatch, Positions, ReadError, Scan, Scratch, Wanted, open_scan,
+    with_column,
+};
 use rayon::prelude::*;
 
 use super::block::{BLOCK_POINTS, Block, append_words};
+use super::rules::Conversion::{AsStored, WholeClass};
 use super::rules::Rules;
 use crate::{Progress, ProgressFn};
 
@@ -34,8 +38,9 @@ pub(crate) struct Sources {
 
 impl Sources {
     /// Opens the files; decodes nothing.
-    pub(crate) fn open(paths: &[PathBuf], rules: &Rules) -> Result<Self, ReadError> {
-        let list = paths.iter().map(|p| Ok(Source::new(las::open(p)?, rules))).collect::<Result<Vec<_>, _>>()?;
+    pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, rules: &Rules) -> Result<Self, ReadError> {
+        let list =
+            paths.iter().map(|p| Ok(Source::new(open_scan(p, options)?, rules))).collect::<Result<Vec<_>, _>>()?;
         let pieces = list.iter().enumerate();
         let pieces = pieces.flat_map(|(i, s)| (0..s.scan.pieces().len()).map(move |piece| (i, piece))).collect();
         let points = list.iter().flat_map(|s| s.scan.pieces()).map(|p| p.points).sum();
@@ -114,8 +119,9 @@ impl Source {
     fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
         let info = scan.info();
         let find = |name: &str| info.attributes.iter().position(|a| a.name == name);
+        let attributes = rules.attributes.iter().zip(&rules.conversions);
         let columns =
-            rules.attributes.iter().map(|a| find(&a.name).map(|i| (i, info.attributes[i].elements))).collect();
+            attributes.map(|(a, c)| column_of(a, &info.attributes, rules.foreign || *c != AsStored)).collect();
         let classification = rules.classes.is_some().then(|| find("classification")).flatten();
         let constants: Vec<_> =
             rules.constants.iter().filter_map(|(name, value)| Some((find(name)?, value.clone()))).collect();
@@ -142,7 +148,11 @@ impl Source {
         }
         for (i, attribute) in rules.attributes.iter().enumerate() {
             let column = self.columns[i].map(|(c, elements)| (&batch.columns[c], elements));
-            append_words(column, start, points, attribute, &mut block.words[i]);
+            let words = &mut block.words[i];
+            append_words(column, start, points, attribute, words);
+            if rules.conversions[i] == WholeClass {
+                words.iter_mut().for_each(|w| *w = whole_class(*w));
+            }
         }
         if rules.every > 1 {
             let first = batch.first_point + start as u64;
@@ -154,12 +164,13 @@ impl Source {
             let column = self.classification.map(|i| &batch.columns[i]);
             for (i, keep) in block.keep.iter_mut().enumerate() {
                 // a scan without classes has never been classified: class 0
-                let class = column.map_or(0, |c| with_column!(c, v => v.get(start + i).map_or(0, |v| *v as u8)));
-                *keep &= classes.contains(&class);
+                let class = column.map_or(0.0, |c| with_column!(c, v => v.get(start + i).map_or(0.0, |v| *v as f64)));
+                *keep &= classes.iter().any(|c| f64::from(*c) == class);
             }
         }
         for ((column, value), deviating) in self.constants.iter().zip(&self.deviating) {
-            let count = count_deviating(&batch.columns[*column], start, value, &block.keep);
+            let is_rgb = self.scan.info().attributes[*column].name == "rgb";
+            let count = count_deviating(&batch.columns[*column], start, value, &block.keep, is_rgb);
             deviating.fetch_add(count, Relaxed);
         }
     }
@@ -180,7 +191,8 @@ impl Source {
             if rules.foreign {
                 block.truncated[axis].push(truncated);
             }
-            block.keep[i] &= bounds.0 <= world && world <= bounds.1; // false for NaN
+            // a point without a finite position is none
+            block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
         };
         match (&batch.positions, self.scan.info().lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
@@ -199,11 +211,60 @@ impl Source {
     }
 }
 
+/// Bits of a single, to those of the whole number next to it; 0 if that is not finite or beyond ±2²⁴.
+fn whole_class(bits: u64) -> u64 {
+    let class = f32::from_bits(bits as u32).round();
+    // adding 0 makes −0 the 0 that it means
+    let class = if class.abs() <= 16_777_216.0 { class + 0.0 } else { 0.0 };
+    u64::from(class.to_bits())
+}
+
+/// The column of a scan, and its elements, that an attribute of the dataset was filled from.
+///
+/// Scans that mean different things by one name (another type, another scale) have attributes of their own; those after
+/// the first are called "name (2)", "name (3)", …. Wide integers may be stored as doubles.
+fn column_of(stored: &Attribute, columns: &[Attribute], any_type: bool) -> Option<(usize, usize)> {
+    let named = |c: &&Attribute| {
+        let suffix = stored.name.strip_prefix(&*c.name);
+        let is_number = |n: &str| n.parse::<u32>().is_ok_and(|n| n >= 2);
+        suffix.is_some_and(|s| {
+            s.is_empty() || s.strip_prefix(" (").and_then(|s| s.strip_suffix(')')).is_some_and(is_number)
+        })
+    };
+    let same = |c: &&Attribute| {
+        let ty = match c.ty {
+            AttributeType::Int64 | AttributeType::UInt64 => AttributeType::Float64,
+            other => other,
+        };
+        let same_type = ty == stored.ty || c.ty == stored.ty;
+        // other converters do as they like with types
+        any_type || same_type && c.elements == stored.elements && c.scale == stored.scale && c.offset == stored.offset
+    };
+    let exact = columns.iter().position(|c| c.name == stored.name && same(&c));
+    let found = exact.or_else(|| columns.iter().position(|c| named(&c) && same(&c)));
+    found.map(|i| (i, columns[i].elements))
+}
+
+/// Points that are kept and have another value. `is_rgb`: 8-bit values may stand for 16-bit ones.
 #[allow(clippy::unnecessary_cast)] // one body for every type of column
-fn count_deviating(column: &Column, start: usize, value: &[f64], keep: &[bool]) -> u64 {
+fn count_deviating(column: &Column, start: usize, value: &[f64], keep: &[bool], is_rgb: bool) -> u64 {
     let elements = value.len().max(1);
+    let differs = |v: f64, constant: f64| v != constant && !(is_rgb && v * 257.0 == constant);
     with_column!(column, values => {
         let points = values.chunks_exact(elements).skip(start).zip(keep);
-        points.filter(|(v, keep)| **keep && v.iter().zip(value).any(|(v, c)| *v as f64 != *c)).count() as u64
+        points.filter(|(v, keep)| **keep && v.iter().zip(value).any(|(v, c)| differs(*v as f64, *c))).count() as u64
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn classes_become_whole_and_finite() {
+        let cases = [(2.0, 2.0), (2.6, 3.0), (-0.2, 0.0), (f32::NAN, 0.0), (f32::INFINITY, 0.0), (3e8, 0.0)];
+        for (class, expected) in cases {
+            assert_eq!(whole_class(class.to_bits().into()), u64::from(f32::to_bits(expected)), "{class}");
+        }
+    }
 }

@@ -1,0 +1,174 @@
+//! From stored records to the records of a leaf: which columns there are, and how they are made.
+
+use pointmill_format::bintree::RecordLayout;
+use pointmill_format::{Attribute, AttributeType};
+
+use crate::convert::Run;
+use crate::error::ConvertError;
+use crate::needs::{self, RGBA};
+use crate::plan::AttributeChoice;
+use crate::report::DroppedAttribute;
+use crate::schema::Schema;
+
+/// The columns of a leaf record, and where their bytes come from.
+#[derive(Debug)]
+pub(super) struct Columns {
+    pub(super) record: RecordLayout,
+    pub(super) dropped: Vec<DroppedAttribute>,
+    pub(super) warnings: Vec<String>,
+    class: Option<(usize, AttributeType)>,
+    moves: Vec<Move>,
+    has_class: bool,
+}
+
+/// How an optional column comes from a stored record; `to` counts from the end of the core.
+#[derive(Debug, Clone, Copy)]
+enum Move {
+    Copy {
+        from: usize,
+        to: usize,
+        len: usize,
+    },
+    /// Three `u16` to four bytes.
+    Rgba {
+        from: usize,
+        to: usize,
+    },
+}
+
+impl Columns {
+    /// The class, and what was asked for beside it.
+    pub(super) fn choose(run: &Run<'_>) -> Result<Self, ConvertError> {
+        let schema = &run.job.schema;
+        let class = needs::class(schema);
+        let (extras, why) = extras(run, class);
+        let attributes = extras.iter().map(|e| match e {
+            Extra::Own(i) => schema.attributes[*i].clone(),
+            Extra::Rgba(_) => Attribute::new(RGBA, AttributeType::UInt8, 4),
+        });
+        let record = RecordLayout::new(attributes)
+            .map_err(|what| ConvertError::Unsupported(format!("the columns of a leaf: {what}; leave it out")))?;
+        let moves = extras.iter().zip(record.extras()).map(|(extra, placed)| {
+            let to = placed.offset - pointmill_format::bintree::CORE_BYTES;
+            match extra {
+                Extra::Own(i) => Move::Copy { from: schema.offsets[*i], to, len: schema.attributes[*i].size() },
+                Extra::Rgba(i) => Move::Rgba { from: schema.offsets[*i], to },
+            }
+        });
+        let moves = moves.collect();
+        let kept = |i: usize| {
+            class == Some(i) || extras.iter().any(|e| matches!(e, Extra::Own(k) | Extra::Rgba(k) if *k == i))
+        };
+        let mut dropped = needs::dropped(schema, &run.job.unread, kept, why);
+        mark_constants(run, &mut dropped);
+        let class = class.map(|i| (schema.offsets[i], schema.attributes[i].ty));
+        let warnings = Vec::new();
+        Ok(Self { record, dropped, warnings, class, moves, has_class: class.is_some() })
+    }
+
+    /// Names of what is kept, for the report.
+    pub(super) fn names(&self) -> Vec<String> {
+        let class = self.has_class.then(|| "classification".to_owned());
+        let extras = self.record.extras().iter().map(|e| e.attribute.name.clone());
+        std::iter::once("position".to_owned()).chain(class).chain(extras).collect()
+    }
+
+    /// The raw class of a stored record.
+    #[inline]
+    pub(super) fn class(&self, record: &[u8]) -> f64 {
+        match self.class {
+            None => 0.0,
+            Some((at, AttributeType::UInt8)) => f64::from(record[at]),
+            Some((at, ty)) => number(&record[at..], ty),
+        }
+    }
+
+    /// Fills the optional columns of a record: `rest` is what follows the core.
+    #[inline]
+    pub(super) fn fill(&self, record: &[u8], rest: &mut [u8]) {
+        for step in &self.moves {
+            match *step {
+                Move::Copy { from, to, len } => rest[to..to + len].copy_from_slice(&record[from..from + len]),
+                Move::Rgba { from, to } => {
+                    for (byte, v) in rest[to..to + 3].iter_mut().zip(record[from..from + 6].as_chunks::<2>().0) {
+                        *byte = ((u32::from(u16::from_le_bytes(*v)) * 255 + 32767) / 65535) as u8;
+                    }
+                    rest[to + 3] = 255;
+                }
+            }
+        }
+    }
+
+    /// The bytes of an output record from the class on, by which points of one place are put in order.
+    pub(super) fn tail(&self, record: &[u8]) -> Vec<u8> {
+        let mut tail = pointmill_format::bintree::class_value(self.class(record)).to_le_bytes().to_vec();
+        tail.resize(4 + self.record.stride() - pointmill_format::bintree::CORE_BYTES, 0);
+        self.fill(record, &mut tail[4..]);
+        tail
+    }
+}
+
+enum Extra {
+    Own(usize),
+    Rgba(usize),
+}
+
+/// Optional columns, and why others are left out.
+fn extras(run: &Run<'_>, class: Option<usize>) -> (Vec<Extra>, &'static str) {
+    let schema = &run.job.schema;
+    let others = (0..schema.attributes.len()).filter(|i| Some(*i) != class);
+    match &run.plan.attributes {
+        AttributeChoice::Usual => (Vec::new(), "not part of the usual record; --attributes adds it"),
+        AttributeChoice::All => (others.map(Extra::Own).collect(), ""),
+        AttributeChoice::Scene => {
+            let varies = |i: &usize| run.facts.ranges[*i].constant().is_none();
+            (others.filter(varies).map(Extra::Own).collect(), "constant")
+        }
+        AttributeChoice::List(names) => (named(schema, names, class), "not asked for"),
+    }
+}
+
+fn named(schema: &Schema, names: &[String], class: Option<usize>) -> Vec<Extra> {
+    let mut extras: Vec<Extra> = Vec::new();
+    let mut seen: Vec<&str> = Vec::new();
+    for name in names.iter().filter(|n| *n != "position") {
+        if seen.contains(&name.as_str()) {
+            continue;
+        }
+        seen.push(name);
+        match (schema.find(name), schema.rgb()) {
+            (Some(i), _) if Some(i) != class => extras.push(Extra::Own(i)),
+            (None, Some(rgb)) if name == RGBA => extras.push(Extra::Rgba(rgb)),
+            _ => {}
+        }
+    }
+    extras
+}
+
+/// `--attributes scene` names the value that a constant attribute has.
+fn mark_constants(run: &Run<'_>, dropped: &mut [DroppedAttribute]) {
+    for d in dropped.iter_mut().filter(|d| d.why == "constant") {
+        let values = run.job.schema.find(&d.name).and_then(|i| run.facts.ranges[i].constant());
+        let values: Vec<String> = values.unwrap_or_default().iter().map(f64::to_string).collect();
+        d.why = format!("constant {}", values.join(" "));
+    }
+}
+
+/// A little-endian number of any type.
+fn number(bytes: &[u8], ty: AttributeType) -> f64 {
+    fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
+        bytes.first_chunk().copied().unwrap_or([0; N])
+    }
+    match ty {
+        AttributeType::Int8 => f64::from(i8::from_le_bytes(array(bytes))),
+        AttributeType::UInt8 => f64::from(u8::from_le_bytes(array(bytes))),
+        AttributeType::Int16 => f64::from(i16::from_le_bytes(array(bytes))),
+        AttributeType::UInt16 => f64::from(u16::from_le_bytes(array(bytes))),
+        AttributeType::Int32 => f64::from(i32::from_le_bytes(array(bytes))),
+        AttributeType::UInt32 => f64::from(u32::from_le_bytes(array(bytes))),
+        AttributeType::Int64 => i64::from_le_bytes(array(bytes)) as f64,
+        AttributeType::UInt64 => u64::from_le_bytes(array(bytes)) as f64,
+        AttributeType::Float32 => f64::from(f32::from_le_bytes(array(bytes))),
+        AttributeType::Float64 => f64::from_le_bytes(array(bytes)),
+    }
+}

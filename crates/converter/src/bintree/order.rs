@@ -1,0 +1,95 @@
+//! The order of points in a leaf: Morton order relative to the leaf's least integers.
+
+use crate::build::sort::radix_sort;
+use crate::morton;
+
+use super::subtree::Item;
+
+/// Memory that is reused from leaf to leaf.
+#[derive(Debug, Default)]
+pub(super) struct OrderScratch {
+    keys: Vec<u64>,
+    swap: Vec<u64>,
+}
+
+/// Indices of `items` in Morton order, all bits of the coordinates; points of one place by `tail`, the bytes of their
+/// records behind the position.
+pub(super) fn order(
+    items: &[Item],
+    min: [i32; 3],
+    max: [i32; 3],
+    scratch: &mut OrderScratch,
+    out: &mut Vec<u32>,
+    tail: impl Fn(&Item) -> Vec<u8>,
+) {
+    let index_bits = usize::BITS - items.len().saturating_sub(1).leading_zeros();
+    let extent = (0..3).map(|a| max[a].abs_diff(min[a])).max().unwrap_or(0);
+    let width = u32::BITS - extent.leading_zeros();
+    let levels = ((u64::BITS - index_bits) / 3).min(width).min(21);
+    let shift = width - levels;
+    let relative = |item: &Item| -> [u32; 3] { std::array::from_fn(|a| item.q[a].abs_diff(min[a])) };
+    scratch.keys.clear();
+    scratch.keys.extend(items.iter().zip(0u64..).map(|(item, i)| {
+        let path = morton::interleave(relative(item).map(|r| r >> shift));
+        path << index_bits | i
+    }));
+    radix_sort(&mut scratch.keys, &mut scratch.swap, index_bits, index_bits + 3 * levels);
+    let mask = (1u64 << index_bits) - 1;
+    out.clear();
+    out.extend(scratch.keys.iter().map(|key| (key & mask) as u32));
+    // Runs whose keys agree are settled by all bits, then by bytes.
+    let path = |key: u64| if index_bits < u64::BITS { key >> index_bits } else { 0 };
+    let mut start = 0;
+    while start < out.len() {
+        let mut end = start + 1;
+        while end < out.len() && path(scratch.keys[end]) == path(scratch.keys[start]) {
+            end += 1;
+        }
+        if end - start > 1 {
+            let mut run: Vec<([u32; 3], Vec<u8>, u32)> =
+                out[start..end].iter().map(|&i| (relative(&items[i as usize]), tail(&items[i as usize]), i)).collect();
+            run.sort_by(|a, b| morton::compare(a.0, b.0).then_with(|| a.1.cmp(&b.1)));
+            out[start..end].iter_mut().zip(run).for_each(|(to, (.., i))| *to = i);
+        }
+        start = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sorted(items: &[Item]) -> Vec<u32> {
+        let ends = |f: fn(i32, i32) -> i32| [0, 1, 2].map(|a| items.iter().map(|i| i.q[a]).reduce(f).unwrap());
+        let mut out = Vec::new();
+        let tail = |i: &Item| vec![(i.record % 5) as u8];
+        order(items, ends(i32::min), ends(i32::max), &mut OrderScratch::default(), &mut out, tail);
+        out
+    }
+
+    #[test]
+    fn all_bits_count_however_wide_the_leaf_and_ties_go_by_bytes() {
+        let mut state = 3u64;
+        for spread in [0, 3, 12, 31] {
+            let mut items = Vec::new();
+            for record in 0..4000 {
+                let q = std::array::from_fn(|_| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    (state >> 32) as u32 as i32 >> (31 - spread).min(31)
+                });
+                items.push(Item { q, record });
+            }
+            let min: [i32; 3] = std::array::from_fn(|a| items.iter().map(|i| i.q[a]).min().unwrap());
+            let out = sorted(&items);
+            let mut seen = out.clone();
+            seen.sort_unstable();
+            assert_eq!(seen, (0..4000).collect::<Vec<u32>>());
+            for pair in out.windows(2) {
+                let [a, b] = [pair[0], pair[1]].map(|i| &items[i as usize]);
+                let at = |i: &Item| -> [u32; 3] { std::array::from_fn(|k| i.q[k].abs_diff(min[k])) };
+                let order = morton::compare(at(a), at(b)).then((a.record % 5).cmp(&(b.record % 5)));
+                assert_ne!(order, std::cmp::Ordering::Greater);
+            }
+        }
+    }
+}

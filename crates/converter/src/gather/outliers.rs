@@ -1,0 +1,132 @@
+//! A handful of points far from all others: they decide the extent, and with it the step and the tree of everybody.
+
+use pointmill_format::Aabb;
+
+use super::{Cell, Gathered};
+use crate::job::Job;
+
+/// So many points, or one in a million, are a handful.
+const HANDFUL: u64 = 16;
+
+/// Of a cloud so many times smaller they are no handful any more.
+const RARE: u64 = 100;
+
+/// The box without them must be so many times smaller to be worth a word.
+const WORTH: f64 = 10.0;
+
+/// The box that holds all but a handful of points, and how many these are, if it is much smaller than the cloud's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Outliers {
+    pub(crate) points: u64,
+    /// World coordinates; whole cells.
+    pub(crate) others: Aabb,
+    /// Longest side of the cloud over that of `others`.
+    pub(crate) factor: f64,
+}
+
+impl Outliers {
+    /// The line for people. `held_back`: a smaller extent would allow a finer step.
+    pub(crate) fn line(&self, held_back: bool) -> String {
+        let (lie, make, them) =
+            if self.points == 1 { ("point lies", "makes", "it") } else { ("points lie", "make", "them") };
+        let gain = if held_back { "the coordinate step could be finer and" } else { "" };
+        let corner = |c: [f64; 3], to: fn(f64) -> f64| c.map(|v| to(v).to_string()).join(",");
+        format!(
+            "{} {lie} far from all others and {make} the extent {} times larger; without {them} {gain} the tree would have \
+             fewer levels: --bounds {}..{} leaves {them} out",
+            self.points,
+            self.factor.floor(),
+            corner(self.others.min, f64::floor),
+            corner(self.others.max, f64::ceil)
+        )
+        .replace("  ", " ")
+    }
+}
+
+/// Looks at the cells of the partition, not at the points.
+pub(crate) fn find(gathered: &Gathered, job: &Job) -> Option<Outliers> {
+    let handful = handful(gathered.stats.points);
+    let cells: Vec<&Cell> = gathered.cells.iter().collect();
+    let (kept, left_out) = trim(cells, handful)?;
+    let cube = &gathered.cube;
+    let corner = cube.offset(&job.lattice);
+    let mut others = Aabb::EMPTY;
+    for cell in &kept {
+        let side = cube.side / 2f64.powi(i32::from(cell.key.level));
+        let at = [cell.key.x, cell.key.y, cell.key.z].map(f64::from);
+        others.grow(std::array::from_fn(|a| corner[a] + at[a] * side));
+        others.grow(std::array::from_fn(|a| corner[a] + (at[a] + 1.0) * side));
+    }
+    let bounds = &gathered.stats.bounds;
+    let longest = |extent: [f64; 3]| extent.into_iter().fold(0.0, f64::max);
+    let whole = longest([0, 1, 2].map(|a| bounds.max[a].abs_diff(bounds.min[a]) as f64 * job.lattice.scale[a]));
+    let factor = whole / longest(others.extent());
+    (left_out > 0 && factor >= WORTH).then_some(Outliers { points: left_out, others, factor })
+}
+
+/// How many of `points` points are too few to matter.
+fn handful(points: u64) -> u64 {
+    HANDFUL.max(points / 1_000_000).min(points / RARE)
+}
+
+/// Leaves out cells from both ends of every axis as long as the points in them are a handful.
+fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
+    let mut left_out = 0;
+    let along = |axis: usize, c: &Cell| [c.key.x, c.key.y, c.key.z][axis];
+    if cells.windows(2).any(|w| w[0].key.level != w[1].key.level) {
+        return None; // divided already
+    }
+    for axis in 0..3 {
+        for from_end in [false, true] {
+            cells.sort_by_key(|c| if from_end { u32::MAX - along(axis, c) } else { along(axis, c) });
+            // Largest gap wins: cells before it go, if they are few enough.
+            let mut points = 0;
+            let mut cut = (0, 0, 0);
+            for (i, pair) in cells.windows(2).enumerate() {
+                points += pair[0].points;
+                if left_out + points > handful {
+                    break;
+                }
+                let gap = along(axis, pair[0]).abs_diff(along(axis, pair[1]));
+                if gap > 1 && gap >= cut.0 {
+                    cut = (gap, i + 1, points);
+                }
+            }
+            cells.drain(..cut.1);
+            left_out += cut.2;
+        }
+    }
+    Some((cells, left_out))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gather::Moments;
+    use pointmill_format::NodeKey;
+
+    fn cell(x: u32, points: u64) -> Cell {
+        let key = NodeKey { level: 8, x, y: 3, z: 0 };
+        Cell { key, points, segments: vec![], is_one_place: false, moments: Moments::default() }
+    }
+
+    #[test]
+    fn few_points_beyond_a_gap_are_left_out_and_many_are_not() {
+        let cells = [cell(0, 3), cell(100, 50_000), cell(101, 70_000), cell(255, 2)];
+        let (kept, left_out) = trim(cells.iter().collect(), 16).unwrap();
+        assert_eq!((kept.len(), left_out), (2, 5));
+        let many = [cell(0, 30), cell(100, 50_000)];
+        assert_eq!(trim(many.iter().collect(), 16).unwrap().1, 0);
+    }
+
+    #[test]
+    fn most_of_a_small_cloud_are_no_outliers() {
+        assert_eq!([10, 99, 100, 2_000, 50_000_000].map(handful), [0, 0, 1, 16, 50]);
+    }
+
+    #[test]
+    fn thin_edges_without_a_gap_stay() {
+        let cells: Vec<Cell> = (0..200).map(|x| cell(x, if x < 5 { 1 } else { 9_000 })).collect();
+        assert_eq!(trim(cells.iter().collect(), 16).unwrap().1, 0);
+    }
+}

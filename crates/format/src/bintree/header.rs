@@ -1,0 +1,92 @@
+//! What `index.json` says beside the nodes.
+
+use serde_json::{Map, Value};
+
+use crate::Lattice;
+
+use super::RecordLayout;
+
+/// What the key `format` says.
+pub(super) const FORMAT: &str = "pointmill-bintree";
+
+/// What the key `version` says.
+pub(super) const VERSION: u64 = 1;
+
+/// Where the leaves are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// One file a leaf, named by its path.
+    Files,
+    /// All in `leaves.bin`.
+    Packed,
+}
+
+impl Layout {
+    /// The word in the index.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Files => "files",
+            Self::Packed => "packed",
+        }
+    }
+
+    /// The layout with that word, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Files, Self::Packed].into_iter().find(|l| l.name() == name)
+    }
+}
+
+/// How splitting planes are found (`docs/formats/bintree.md`, section 6.2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SplitRule {
+    /// At the exact mean, rounded down: the meaning of the format.
+    #[default]
+    Mean,
+    /// At the median.
+    Median,
+    /// In the middle of the box.
+    Midpoint,
+}
+
+impl SplitRule {
+    /// The word in the index.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Mean => "mean",
+            Self::Median => "median",
+            Self::Midpoint => "midpoint",
+        }
+    }
+
+    /// The rule with that word, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Mean, Self::Median, Self::Midpoint].into_iter().find(|r| r.name() == name)
+    }
+}
+
+/// Everything in `index.json` but the nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Program and version that wrote the dataset.
+    pub generator: String,
+    /// Name of the cloud.
+    pub name: String,
+    /// Points of all leaves together.
+    pub points: u64,
+    /// Most points of a leaf, ≥ 1.
+    pub capacity: u64,
+    /// Where the leaves are.
+    pub layout: Layout,
+    /// How splitting planes were found.
+    pub split: SplitRule,
+    /// A local frame for renderers; nothing in the files is relative to it.
+    pub origin: [f64; 3],
+    /// A proj4 definition or nothing.
+    pub projection: String,
+    /// Where the sources' positions lie: world = X · scale + offset.
+    pub lattice: Lattice,
+    /// The free key `pointmill`.
+    pub pointmill: Map<String, Value>,
+    /// The columns of a leaf record.
+    pub record: RecordLayout,
+}

@@ -1,0 +1,198 @@
+//! What is under the cursor.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::sync::Arc;
+
+use crate::{Aabb, ReadError};
+
+use super::camera::{cross, dot};
+use super::leaf_cache::{BLOCK_POINTS, CachedLeaf, LeafCache};
+use super::{Bintree, NodeKind};
+
+/// A ray that is wide enough to meet points: from `origin` along `direction`, all that lies within
+/// `radius + spread · distance` of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    origin: [f64; 3],
+    direction: [f64; 3],
+    radius: f64,
+    spread: f64,
+}
+
+impl Ray {
+    /// `origin` in world coordinates, `direction` of any length, `radius` ≥ 0 in world units. Nothing if a number is
+    /// not finite or the direction has no length.
+    pub fn new(origin: [f64; 3], direction: [f64; 3], radius: f64) -> Option<Self> {
+        // Scaled first, so that no square overflows or vanishes.
+        let largest = direction.iter().fold(0.0, |l: f64, v| l.max(v.abs()));
+        let scaled = direction.map(|v| v / largest);
+        let length = dot(scaled, scaled).sqrt();
+        let direction = scaled.map(|v| v / length);
+        let finite = origin.iter().chain(&direction).all(|v| v.is_finite());
+        (finite && radius.is_finite() && radius >= 0.0).then_some(Self { origin, direction, radius, spread: 0.0 })
+    }
+
+    /// The same ray, wider by `spread` ≥ 0 for each unit of distance: for a tolerance of n pixels the n-fold of the
+    /// tangent of a pixel's angle. What is not a finite number ≥ 0 counts as 0.
+    #[must_use]
+    pub fn with_spread(self, spread: f64) -> Self {
+        Self { spread: if spread.is_finite() { spread.max(0.0) } else { 0.0 }, ..self }
+    }
+
+    /// The distance along the ray at which it enters `bounds`, enlarged by its greatest width there: no point in the box
+    /// is met before. Nothing if it misses.
+    fn enter(&self, bounds: &Aabb) -> Option<f64> {
+        let Self { origin: o, direction: d, radius, spread } = *self;
+        // Of the rounding below nothing may be lost: it is proportional to the coordinates.
+        let mut width = radius;
+        if spread > 0.0 {
+            let ahead = |a: usize| ((bounds.min[a] - o[a]) * d[a]).max((bounds.max[a] - o[a]) * d[a]);
+            width += spread * (ahead(0) + ahead(1) + ahead(2)).max(0.0);
+        }
+        let (mut t_in, mut t_out) = (0.0_f64, f64::INFINITY);
+        for a in 0..3 {
+            let (min, max) = (bounds.min[a], bounds.max[a]);
+            let margin = width * (1.0 + 1e-12) + 1e-15 * (min.abs().max(max.abs()) + o[a].abs());
+            let (low, high) = (min - margin - o[a], max + margin - o[a]);
+            if d[a] == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (t0, t1) = (low / d[a], high / d[a]);
+            t_in = t_in.max(t0.min(t1));
+            t_out = t_out.min(t0.max(t1));
+        }
+        (t_in <= t_out).then_some(t_in)
+    }
+
+    /// Distance along the ray and squared distance from it, if `p` is within its width.
+    #[inline]
+    fn meet(&self, p: [f64; 3], nearest: f64) -> Option<(f64, f64)> {
+        let v = [p[0] - self.origin[0], p[1] - self.origin[1], p[2] - self.origin[2]];
+        let t = dot(v, self.direction);
+        // Not a number is not met. A cross product, as |v|² − t² would lose all digits far away.
+        if !(0.0..=nearest).contains(&t) {
+            return None;
+        }
+        let away = cross(v, self.direction);
+        let (away2, width) = (dot(away, away), self.radius + self.spread * t);
+        (away2 <= width * width).then_some((t, away2))
+    }
+}
+
+/// A point that a ray met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// World coordinates, as [`Bintree::read_leaf`] gives them.
+    pub position: [f64; 3],
+    /// Class as stored.
+    pub class: f32,
+    /// The node that the point is in.
+    pub leaf: u32,
+    /// Its index among the points of the leaf, in stored order.
+    pub point: u32,
+    /// Distance along the ray from its origin, world units.
+    pub distance: f64,
+    /// Distance from the ray, world units.
+    pub off_ray: f64,
+}
+
+/// Finds the points that rays meet, and keeps leaves in memory from pick to pick.
+///
+/// ```no_run
+/// use pointmill_format::bintree::{Bintree, Picker, Ray};
+/// use std::sync::Arc;
+///
+/// # fn main() -> Result<(), pointmill_format::ReadError> {
+/// let tree = Arc::new(Bintree::open("clouds/line 12".as_ref())?);
+/// let mut picker = Picker::new(tree, 512 << 20);
+/// let ray = Ray::new([0.0, 0.0, 100.0], [0.3, 0.1, -1.0], 0.05);
+/// if let Some(hit) = ray.map(|ray| picker.pick(&ray)).transpose()?.flatten() {
+///     println!("{:?} of class {}", hit.position, hit.class);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Picker {
+    tree: Arc<Bintree>,
+    cache: LeafCache,
+}
+
+impl Picker {
+    /// A picker whose leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes a point and a
+    /// little.
+    pub fn new(tree: Arc<Bintree>, cache_bytes: usize) -> Self {
+        Self { tree, cache: LeafCache::new(cache_bytes) }
+    }
+
+    /// The point that `ray` meets first: of those within its width the one of the least distance along it; of several,
+    /// the one nearest to the ray, then the one of the lowest leaf and index.
+    ///
+    /// Visits boxes in the order in which the ray enters them and stops when none can hold a nearer point.
+    ///
+    /// # Errors
+    /// A leaf that cannot be read ([`Bintree::read_leaf`]).
+    pub fn pick(&mut self, ray: &Ray) -> Result<Option<Hit>, ReadError> {
+        let mut best = None;
+        // Distances are positive: their bits are ordered as they are.
+        let mut queue = BinaryHeap::new();
+        let enter = |index: u32| {
+            let distance = ray.enter(&self.tree.node(index)?.bounds)?;
+            Some(Reverse((distance.to_bits(), index)))
+        };
+        queue.extend(enter(0));
+        while let Some(Reverse((distance, index))) = queue.pop() {
+            if best.as_ref().is_some_and(|hit: &Hit| f64::from_bits(distance) > hit.distance) {
+                break;
+            }
+            match self.tree.children(index) {
+                Some(children) => queue.extend(children.into_iter().filter_map(enter)),
+                None => {
+                    let leaf = self.cache.get(&self.tree, index)?;
+                    if let Some(node) = self.tree.node(index)
+                        && let NodeKind::Leaf { center, .. } = node.kind
+                    {
+                        scan(ray, &leaf, index, center, &mut best);
+                    }
+                }
+            }
+        }
+        Ok(best)
+    }
+
+    /// Bytes of leaves in memory.
+    pub fn cached_bytes(&self) -> usize {
+        self.cache.bytes()
+    }
+}
+
+/// Looks for a better hit in a leaf: block by block, points only of blocks that the ray meets early enough.
+fn scan(ray: &Ray, leaf: &CachedLeaf, index: u32, center: [f64; 3], best: &mut Option<Hit>) {
+    for (block, bounds) in leaf.block_bounds.iter().enumerate() {
+        let nearest = best.as_ref().map_or(f64::INFINITY, |hit| hit.distance);
+        if !ray.enter(bounds).is_some_and(|t| t <= nearest) {
+            continue;
+        }
+        let first = block * BLOCK_POINTS;
+        for (i, &[x, y, z, class]) in leaf.points.iter().enumerate().skip(first).take(BLOCK_POINTS) {
+            let position = super::encode::decode(center, [x, y, z]);
+            let nearest = best.as_ref().map_or(f64::INFINITY, |hit| hit.distance);
+            let Some((distance, away2)) = ray.meet(position, nearest) else { continue };
+            let hit = Hit { position, class, leaf: index, point: i as u32, distance, off_ray: away2.sqrt() };
+            if best.as_ref().is_none_or(|best| hit.is_before(best)) {
+                *best = Some(hit);
+            }
+        }
+    }
+}
+
+impl Hit {
+    fn is_before(&self, other: &Self) -> bool {
+        let order = self.distance.total_cmp(&other.distance).then(self.off_ray.total_cmp(&other.off_ray));
+        order.then((self.leaf, self.point).cmp(&(other.leaf, other.point))).is_lt()
+    }
+}

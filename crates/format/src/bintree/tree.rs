@@ -1,0 +1,174 @@
+//! A dataset that is open for reading.
+
+use std::path::{Path, PathBuf};
+
+use crate::ReadError;
+
+use super::read_index::read_index;
+use super::{ByteSource, Folder, Header, LeafPoints, Node, NodeKind, PACKED_FILE, leaf_file_name};
+
+/// A mean-split binary tree: its index in memory, its leaves where they are. Threads may share it; reading a leaf keeps
+/// nothing.
+///
+/// Nodes are told by their index in preorder; the root, if there is one, is 0.
+pub struct Bintree {
+    source: Box<dyn ByteSource>,
+    header: Header,
+    nodes: Vec<Node>,
+}
+
+impl Bintree {
+    /// Opens the dataset in `folder` (or beside the `index.json` that is named) and reads its index, flat or nested.
+    ///
+    /// # Errors
+    /// A missing file; an index that section 9 of `docs/formats/bintree.md` refuses, with the byte; byte ranges that
+    /// leave `leaves.bin` or overlap.
+    pub fn open(folder: &Path) -> Result<Self, ReadError> {
+        Self::from_source(Box::new(Folder::new(folder)))
+    }
+
+    /// Opens a dataset wherever its bytes are.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_source(source: Box<dyn ByteSource>) -> Result<Self, ReadError> {
+        let (header, nodes) = read_index(source.as_ref())?;
+        let tree = Self { source, header, nodes };
+        tree.check_ranges()?;
+        Ok(tree)
+    }
+
+    /// Everything in the index but the nodes.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// All nodes in preorder; none if the cloud is empty.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// The node of that index, if there is one.
+    pub fn node(&self, index: u32) -> Option<&Node> {
+        self.nodes.get(index as usize)
+    }
+
+    /// The children of a node, low and high; none of a leaf.
+    pub fn children(&self, index: u32) -> Option<[u32; 2]> {
+        Some([index + 1, self.node(index)?.high()?])
+    }
+
+    /// The indices of all leaves, in preorder.
+    pub fn leaves(&self) -> impl Iterator<Item = u32> + '_ {
+        (0u32..).zip(&self.nodes).filter(|(_, node)| node.is_leaf()).map(|(index, _)| index)
+    }
+
+    /// The steps from the root down to a node: true for the high side. Empty if there is no such node.
+    pub fn path(&self, index: u32) -> Vec<bool> {
+        let (mut path, mut at) = (Vec::new(), 0);
+        while at < index
+            && let Some([low, high]) = self.children(at)
+        {
+            path.push(index >= high);
+            at = if index >= high { high } else { low };
+        }
+        path
+    }
+
+    /// What a leaf's file is called in layout `files`; in layout `packed` a name all the same.
+    pub fn leaf_name(&self, index: u32) -> String {
+        leaf_file_name(self.path(index))
+    }
+
+    /// What a file of the dataset is called in messages.
+    pub fn locate(&self, file: &str) -> PathBuf {
+        self.source.locate(file)
+    }
+
+    /// Reads the records of a leaf as stored; replaces the contents of `out`.
+    ///
+    /// # Errors
+    /// An index that is no leaf's; a file that is missing, or not as long as the leaf's points.
+    pub fn read_leaf_bytes(&self, index: u32, out: &mut Vec<u8>) -> Result<(), ReadError> {
+        let Some(&Node { kind: NodeKind::Leaf { start, .. }, count, .. }) = self.node(index) else {
+            let what = format!("node {index} is no leaf: it has no points of its own");
+            return Err(ReadError::unsupported(self.locate(super::INDEX_FILE), what));
+        };
+        out.clear();
+        let file = if start.is_some() { PACKED_FILE.to_owned() } else { self.leaf_name(index) };
+        let io = |e| ReadError::io(self.locate(&file), &format!("reading leaf {index}"), e).advise(COPY_AGAIN);
+        let (start, needed) = (start.unwrap_or(0), u128::from(count) * self.header.record.stride() as u128);
+        // In layout packed the range was checked when the index was read.
+        if file != PACKED_FILE {
+            let size = self.source.size(&file).map_err(io)?;
+            if u128::from(size) != needed {
+                let stride = self.header.record.stride();
+                let what =
+                    format!("leaf {index} has {count} points of {stride} bytes, {needed}, but the file has {size}");
+                let at = u64::try_from(needed).unwrap_or(u64::MAX).min(size);
+                return Err(ReadError::broken(self.locate(&file), at, what).advise(COPY_AGAIN));
+            }
+        }
+        let len = usize::try_from(needed).map_err(|_| {
+            ReadError::unsupported(self.locate(&file), format!("the {needed} bytes of leaf {index} do not fit memory"))
+        })?;
+        out.resize(len, 0);
+        self.source.read_at(&file, start, out).map_err(io)
+    }
+
+    /// Reads the points of a leaf; replaces the contents of `out`.
+    ///
+    /// # Errors
+    /// As [`Self::read_leaf_bytes`].
+    pub fn read_leaf(&self, index: u32, out: &mut LeafPoints) -> Result<(), ReadError> {
+        out.reset(&self.header.record);
+        self.read_leaf_bytes(index, &mut out.bytes)?;
+        if let Some(Node { kind: NodeKind::Leaf { center, .. }, .. }) = self.node(index) {
+            out.fill(&self.header.record, *center);
+        }
+        Ok(())
+    }
+
+    /// Layout `packed`: every range is in the file, and no byte is in two.
+    fn check_ranges(&self) -> Result<(), ReadError> {
+        let stride = self.header.record.stride() as u64;
+        let mut ranges = Vec::new();
+        for (index, node) in (0u32..).zip(&self.nodes) {
+            if let NodeKind::Leaf { start: Some(start), .. } = node.kind {
+                let end = node.count.checked_mul(stride).and_then(|bytes| start.checked_add(bytes));
+                ranges.push((start, end, index));
+            }
+        }
+        if ranges.is_empty() {
+            return Ok(());
+        }
+        let path = self.locate(PACKED_FILE);
+        let size = self.source.size(PACKED_FILE).map_err(|e| ReadError::io(&path, "opening", e).advise(COPY_AGAIN))?;
+        ranges.sort_unstable();
+        let (mut last_end, mut last) = (0, 0);
+        for (start, end, index) in ranges {
+            let Some(end) = end.filter(|end| *end <= size) else {
+                let count = self.nodes[index as usize].count;
+                let what =
+                    format!("leaf {index} has {count} points from byte {start} on, but the file has {size} bytes");
+                return Err(ReadError::broken(path, start, what).advise(COPY_AGAIN));
+            };
+            if start < last_end {
+                let what =
+                    format!("the points of leaf {index} begin before those of leaf {last} end, at byte {last_end}");
+                return Err(ReadError::broken(path, start, what).advise("convert the sources again"));
+            }
+            (last_end, last) = (end, index);
+        }
+        Ok(())
+    }
+}
+
+const COPY_AGAIN: &str = "the file was cut short or belongs to another dataset; copy or convert it again";
+
+impl std::fmt::Debug for Bintree {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let at = self.locate(super::INDEX_FILE);
+        f.debug_struct("Bintree").field("at", &at).field("nodes", &self.nodes.len()).finish_non_exhaustive()
+    }
+}

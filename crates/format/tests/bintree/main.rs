@@ -1,0 +1,11 @@
+//! Mean-split binary trees: what is written is what the page says, and reads back; queries tell what a search of all
+//! points tells; bytes that lie are refused.
+
+mod build;
+mod golden;
+mod hostile;
+#[cfg(feature = "rstar")]
+mod nearest;
+mod queries;
+mod round_trip;
+mod util;

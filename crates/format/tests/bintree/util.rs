@@ -1,0 +1,90 @@
+//! What the tests share.
+
+use std::path::PathBuf;
+
+use pointmill_format::bintree::{Bintree, Layout, LeafPoints, Memory};
+use pointmill_format::{Lattice, ReadError};
+
+use crate::build::{Builder, Point, header};
+
+/// The folder of the golden dataset in that layout.
+pub(crate) fn golden(layout: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/bintree").join(layout)
+}
+
+/// The files of the golden dataset, to be changed.
+pub(crate) fn load(layout: &str) -> Memory {
+    let files = std::fs::read_dir(golden(layout)).unwrap().map(|entry| entry.unwrap().path());
+    files.map(|f| (f.file_name().unwrap().to_str().unwrap().to_owned(), std::fs::read(&f).unwrap())).collect()
+}
+
+pub(crate) fn open(files: &Memory) -> Result<Bintree, ReadError> {
+    Bintree::from_source(Box::new(files.clone()))
+}
+
+/// A small generator of pseudo-random numbers (SplitMix64): same seed, same numbers, everywhere.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// A number below `end`.
+    pub(crate) fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+
+    /// A number from `min` to `max`.
+    pub(crate) fn between(&mut self, min: f64, max: f64) -> f64 {
+        min + (max - min) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Millimetres around a place far from the origin.
+pub(crate) const FAR: Lattice = Lattice { scale: [0.001; 3], offset: [4_428_000.0, 512_000.0, -20.0] };
+
+/// The class that [`files_of`] gives to a point.
+pub(crate) fn class_of(id: u32) -> f64 {
+    f64::from(id % 19)
+}
+
+/// A dataset of these points, of the core alone.
+pub(crate) fn files_of(points: &mut [Point], capacity: u64, layout: Layout, lattice: Lattice) -> Memory {
+    let header = header(points.len() as u64, capacity, layout, lattice);
+    Builder { header, class: &class_of, extras: &|_, _| {} }.files(points)
+}
+
+/// Points along a wavy corridor `length` lattice units long: clumps, lines and lonely ones.
+pub(crate) fn corridor(n: usize, length: f64, seed: u64) -> Vec<Point> {
+    let random = &mut Random(seed);
+    let point = |id| {
+        let along = random.between(0.0, length);
+        let wire = random.below(3) as f64;
+        let q = match random.below(10) {
+            0 => [along, random.between(-40_000.0, 40_000.0), random.between(0.0, 30_000.0)],
+            1..=4 => [along, (along / 50_000.0).sin() * 9000.0 + wire * 4000.0, 20_000.0 + wire * 100.0],
+            _ => [along, random.between(-30_000.0, 30_000.0), random.between(0.0, 2000.0) * (along / 9000.0).cos()],
+        };
+        Point { q: q.map(|v| v as i32), id }
+    };
+    (0..n as u32).map(point).collect()
+}
+
+/// A point as read: world position, class, leaf, index in the leaf.
+pub(crate) type Told = ([f64; 3], f32, u32, u32);
+
+/// All points, in preorder of the leaves.
+pub(crate) fn read_all(tree: &Bintree) -> Result<Vec<Told>, ReadError> {
+    let (mut all, mut points) = (Vec::new(), LeafPoints::default());
+    for leaf in tree.leaves() {
+        tree.read_leaf(leaf, &mut points)?;
+        let told = |i| (points.world(i).unwrap(), points.classes[i], leaf, i as u32);
+        all.extend((0..points.len()).map(told));
+    }
+    Ok(all)
+}

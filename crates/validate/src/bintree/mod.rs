@@ -1,0 +1,169 @@
+//! Mean-split binary trees. `docs/formats/bintree.md` is the only source of what is expected.
+//!
+//! The reader of the format crate refuses an index that makes no tree; what it says is a finding then, and nothing else
+//! can be looked at. Everything about leaves and splits is worked out here, from the bytes of the leaves.
+//!
+//! # Tolerances
+//! None but for the distance of a decoded position from its lattice point: the bound of §5 of the page and two ulps of
+//! the coordinate. Splits, boxes, centers and offsets are compared exactly.
+//!
+//! # Memory
+//! About 300 bytes a node. Leaves are read in parallel, one a thread, each as a whole; what a split needs of the points
+//! below it (exact sums, extremes, how many lie at the greatest coordinate) goes up the tree, so every point is read
+//! once.
+
+mod degenerate;
+mod files;
+mod head;
+mod leaf;
+mod lenient;
+mod precision;
+mod quality;
+mod records;
+mod scan;
+mod splits;
+mod summary;
+mod tree;
+
+use std::path::Path;
+
+use pointmill_format::bintree::{Bintree, PACKED_FILE};
+use pointmill_format::{ErrorKind, ReadError};
+
+pub use quality::LeafQuality;
+
+use crate::against::{Against, AgainstSummary, Context};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::{Format, Options, Outcome, ProgressFn};
+use lenient::Lenient;
+use records::Records;
+use scan::{Scan, Scanned};
+use tree::Tree;
+
+/// Checks the dataset in `folder`.
+///
+/// # Errors
+/// As [`crate::validate`].
+pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
+    let findings = Findings::new(Format::Bintree, options.max_problems);
+    let dataset = match Bintree::from_source(Box::new(Lenient::new(folder))) {
+        Ok(dataset) => dataset,
+        Err(error) if matches!(error.kind, ErrorKind::Io(_)) => return Err(error),
+        Err(error) => return Ok(unreadable_index(findings, error)),
+    };
+    let tree = Tree::new(&dataset);
+    let lattice_known = head::check(folder, &tree, &findings)?;
+    tree.check_capacity(&findings);
+    tree.check_unions(&findings);
+    let readable = files::check(folder, &tree, &findings)?;
+    let against = match options.against.as_slice() {
+        [] => None,
+        paths => Some(Against::open(paths, &options.open, records::rules(dataset.header()))?),
+    };
+    let sums = against.as_ref().map(|a| &a.sums);
+    let scan = Scan { tree: &tree, readable: &readable, lattice_known, sums, findings: &findings, progress };
+    let Scanned { summaries, ends, quality } = scan.run()?;
+    let leaves_unread = tree.leaves().filter(|(index, _)| !readable[*index as usize]).count() as u64;
+    let unknown = Unknown { lattice: !lattice_known, uncertain: quality.uncertain, unread: leaves_unread };
+    let summaries = splits::check(&tree, summaries, &findings);
+    degenerate::check(&tree, &summaries, &ends, &findings);
+    unknown.say_what_was_passed_over(&findings);
+
+    let records = Records { tree: &tree, readable: &readable };
+    let memory_bytes = options.memory_bytes;
+    let context = Context { records: &records, findings: &findings, progress, memory_bytes };
+    let against = compare(against.as_ref(), &unknown, &context)?;
+
+    let header = dataset.header();
+    let (checks, problems) = findings.finish();
+    Ok(Outcome {
+        ok: checks.iter().all(|c| c.ok),
+        format: Format::Bintree,
+        encoding: Some(header.layout.name()),
+        points: header.points,
+        nodes: dataset.nodes().len() as u64,
+        checks,
+        problems,
+        quality: Vec::new(),
+        leaves: Some(quality),
+        against,
+    })
+}
+
+/// Why some things cannot be known.
+struct Unknown {
+    /// The index does not say what the lattice is.
+    lattice: bool,
+    /// Leaves that are too long for their integers to be certain.
+    uncertain: u64,
+    /// Leaves that could not be read.
+    unread: u64,
+}
+
+impl Unknown {
+    /// Why integers are not certain, if they are not.
+    fn integers(&self) -> Option<String> {
+        match self.uncertain {
+            _ if self.lattice => Some("the index does not say what the lattice is".into()),
+            0 => None,
+            1 => Some("in 1 leaf single precision is too coarse for the lattice".into()),
+            n => Some(format!("in {n} leaves single precision is too coarse for the lattice")),
+        }
+    }
+
+    fn say_what_was_passed_over(&self, findings: &Findings) {
+        let unread = (self.unread > 0).then(|| format!("{} leaves could not be read", self.unread));
+        if let Some(why) = self.integers() {
+            [Check::Positions, Check::LeafOrder]
+                .into_iter()
+                .for_each(|c| findings.note(c, format!("{why}: passed over")));
+        }
+        if let Some(why) = self.integers().or(unread) {
+            for check in [Check::SplitAxis, Check::Split, Check::Sides, Check::Degenerate] {
+                findings.note(check, format!("{why}: nodes above were passed over"));
+            }
+        }
+    }
+}
+
+/// The comparison with the sources, which needs all integers.
+fn compare(
+    against: Option<&Against>,
+    unknown: &Unknown,
+    context: &Context<'_>,
+) -> Result<Option<AgainstSummary>, ReadError> {
+    let Some(against) = against else {
+        context.findings.skip(Check::Against, "no sources were given");
+        return Ok(None);
+    };
+    if let Some(why) = unknown.integers() {
+        context.findings.skip(Check::Against, why);
+        return Ok(None);
+    }
+    against.compare(context).map(Some)
+}
+
+/// All that can be said of a dataset whose index makes no tree.
+fn unreadable_index(findings: Findings, error: ReadError) -> Outcome {
+    let is_leaves = error.path.file_name().is_some_and(|name| name == PACKED_FILE);
+    let (check, subject) = if is_leaves { (Check::LeafFiles, PACKED_FILE) } else { (Check::Index, "index.json") };
+    for other in Check::BINTREE.iter().filter(|c| **c != check) {
+        findings.skip(*other, "index.json cannot be used");
+    }
+    let at = error.offset.map_or_else(String::new, |at| format!(" (byte {at})"));
+    findings.push(Finding::new(check, subject, "a tree", error.what + &at));
+    let (checks, problems) = findings.finish();
+    Outcome {
+        ok: false,
+        format: Format::Bintree,
+        encoding: None,
+        points: 0,
+        nodes: 0,
+        checks,
+        problems,
+        quality: Vec::new(),
+        leaves: None,
+        against: None,
+    }
+}

@@ -1,0 +1,107 @@
+//! Records of leaves as the comparison with the sources wants them.
+
+use pointmill_format::bintree::{Header, NodeKind};
+use pointmill_format::{Attribute, AttributeType, ErrorKind, ReadError};
+use rayon::prelude::*;
+use serde_json::Value;
+
+use super::leaf::Points;
+use super::tree::Tree;
+use crate::against::block::{BLOCK_POINTS, Block};
+use crate::against::rules::Conversion;
+use crate::against::{self, Rules, Sink};
+use crate::place::Place;
+
+/// What is compared: class, and every column behind the core. Colours of 8 bits are compared as such; beside `rgb` they
+/// were checked against it, point by point.
+pub(super) fn rules(header: &Header) -> Rules {
+    let extras = || header.record.extras().iter().map(|e| &e.attribute);
+    let only_bytes = extras().all(|a| a.name != "rgb");
+    let mut attributes = vec![Attribute::new("classification", AttributeType::Float32, 1)];
+    for attribute in extras() {
+        match is_rgba(attribute) {
+            true if only_bytes => attributes.push(Attribute::new("rgb", AttributeType::UInt16, 3)),
+            true => {}
+            false => attributes.push(attribute.clone()),
+        }
+    }
+    let own = if header.pointmill.is_empty() { Value::Null } else { Value::Object(header.pointmill.clone()) };
+    let mut rules = Rules::new(attributes, header.lattice, &own);
+    rules.conversions[0] = Conversion::WholeClass;
+    rules.rgb_as_bytes = only_bytes && rules.rgb.is_some();
+    rules
+}
+
+fn is_rgba(attribute: &Attribute) -> bool {
+    attribute.name == "rgba" && attribute.ty == AttributeType::UInt8 && attribute.elements == 4
+}
+
+/// Where in a record the words of the compared attributes stand.
+pub(super) struct Filler {
+    stride: usize,
+    /// For each attribute of the rules: byte, bytes of an element, elements.
+    columns: Vec<(usize, usize, usize)>,
+}
+
+impl Filler {
+    pub(super) fn new(header: &Header, rules: &Rules) -> Self {
+        let place = |attribute: &Attribute| {
+            let name = if rules.rgb_as_bytes && attribute.name == "rgb" { "rgba" } else { attribute.name.as_str() };
+            let stored = header.record.columns().find(|c| c.attribute.name == name);
+            stored.map_or((0, 0, 0), |c| (c.offset, c.attribute.ty.size(), attribute.elements))
+        };
+        Self { stride: header.record.stride(), columns: rules.attributes.iter().map(place).collect() }
+    }
+
+    /// Hands over a leaf's records in blocks.
+    pub(super) fn fill(&self, points: &Points, block: &mut Block, sink: &mut Sink<'_>) {
+        for start in (0..points.len()).step_by(BLOCK_POINTS) {
+            let end = points.len().min(start + BLOCK_POINTS);
+            block.reset(self.columns.len());
+            block.keep.resize(end - start, true);
+            for (to, from) in block.positions.iter_mut().zip(&points.steps) {
+                to.extend_from_slice(&from[start..end]);
+            }
+            let bytes = points.bytes.get(start * self.stride..end * self.stride).unwrap_or_default();
+            for (words, (at, size, elements)) in block.words.iter_mut().zip(&self.columns) {
+                for record in bytes.chunks_exact(self.stride) {
+                    words.extend((0..*elements).map(|e| word(&record[at + e * size..at + (e + 1) * size])));
+                }
+            }
+            sink(block);
+        }
+    }
+}
+
+/// The bits of an element.
+fn word(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte))
+}
+
+/// All leaves of a dataset.
+pub(super) struct Records<'a> {
+    pub(super) tree: &'a Tree<'a>,
+    pub(super) readable: &'a [bool],
+}
+
+impl against::Records for Records<'_> {
+    fn each_block(&self, rules: &Rules, work: &(dyn Fn(&mut Block, Place) + Sync)) -> Result<(), ReadError> {
+        let header = self.tree.header();
+        let filler = Filler::new(header, rules);
+        let nodes = 0..self.tree.nodes().len() as u32;
+        let readable = nodes.into_par_iter().filter(|index| self.readable[*index as usize]);
+        readable.try_for_each_init(<(Points, Block)>::default, |(points, block), index| {
+            let Some(NodeKind::Leaf { center, .. }) = self.tree.dataset.node(index).map(|n| n.kind) else {
+                return Ok(());
+            };
+            match self.tree.dataset.read_leaf_bytes(index, &mut points.bytes) {
+                Err(error) if !matches!(error.kind, ErrorKind::Io(_)) => return Ok(()), // reported by the pass
+                other => other?,
+            }
+            points.decode(header.record.stride(), center, &header.lattice);
+            let place = self.tree.place(index);
+            filler.fill(points, block, &mut |block| work(block, place));
+            Ok(())
+        })
+    }
+}

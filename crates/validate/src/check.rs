@@ -1,0 +1,223 @@
+//! The promises that formats make.
+
+use serde::{Serialize, Serializer};
+
+/// A promise of a format. Each check stands for one; [`Format::checks`](crate::Format::checks) has those of a format in
+/// the order of reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs)] // `promise` says it
+pub enum Check {
+    Metadata,
+    Hierarchy,
+    NodeTypes,
+    EmptyNodes,
+    Depth,
+    PointCount,
+    PayloadRanges,
+    Payloads,
+    Order,
+    Coordinates,
+    Boxes,
+    TightBox,
+    AttributeRanges,
+    Histogram,
+    Spacing,
+    Coverage,
+    Index,
+    LeafFiles,
+    Capacity,
+    Unions,
+    LeafBoxes,
+    Values,
+    Padding,
+    Positions,
+    LeafOrder,
+    SplitAxis,
+    Split,
+    Sides,
+    Degenerate,
+    Against,
+}
+
+impl Check {
+    /// Every check of every format; [`Self::index`] is the place in it.
+    pub(crate) const ALL: &[Self] = &[
+        Self::Metadata,
+        Self::Hierarchy,
+        Self::NodeTypes,
+        Self::EmptyNodes,
+        Self::Depth,
+        Self::PointCount,
+        Self::PayloadRanges,
+        Self::Payloads,
+        Self::Order,
+        Self::Coordinates,
+        Self::Boxes,
+        Self::TightBox,
+        Self::AttributeRanges,
+        Self::Histogram,
+        Self::Spacing,
+        Self::Coverage,
+        Self::Index,
+        Self::LeafFiles,
+        Self::Capacity,
+        Self::Unions,
+        Self::LeafBoxes,
+        Self::Values,
+        Self::Padding,
+        Self::Positions,
+        Self::LeafOrder,
+        Self::SplitAxis,
+        Self::Split,
+        Self::Sides,
+        Self::Degenerate,
+        Self::Against,
+    ];
+
+    /// The checks of Potree 2.0.
+    pub(crate) const POTREE2: &[Self] = &[
+        Self::Metadata,
+        Self::Hierarchy,
+        Self::NodeTypes,
+        Self::EmptyNodes,
+        Self::Depth,
+        Self::PointCount,
+        Self::PayloadRanges,
+        Self::Payloads,
+        Self::Order,
+        Self::Coordinates,
+        Self::Boxes,
+        Self::TightBox,
+        Self::AttributeRanges,
+        Self::Histogram,
+        Self::Spacing,
+        Self::Coverage,
+        Self::Against,
+    ];
+
+    /// The checks of mean-split binary trees.
+    pub(crate) const BINTREE: &[Self] = &[
+        Self::Index,
+        Self::LeafFiles,
+        Self::Capacity,
+        Self::Unions,
+        Self::LeafBoxes,
+        Self::Values,
+        Self::Padding,
+        Self::Positions,
+        Self::LeafOrder,
+        Self::SplitAxis,
+        Self::Split,
+        Self::Sides,
+        Self::Degenerate,
+        Self::Against,
+    ];
+
+    /// Which of [`Self::ALL`] it is.
+    pub(crate) const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The word in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Metadata => "metadata",
+            Self::Hierarchy => "hierarchy",
+            Self::NodeTypes => "node-types",
+            Self::EmptyNodes => "empty-nodes",
+            Self::Depth => "depth",
+            Self::PointCount => "point-count",
+            Self::PayloadRanges => "payload-ranges",
+            Self::Payloads => "payloads",
+            Self::Order => "order",
+            Self::Coordinates => "coordinates",
+            Self::Boxes => "boxes",
+            Self::TightBox => "tight-box",
+            Self::AttributeRanges => "attribute-ranges",
+            Self::Histogram => "histogram",
+            Self::Spacing => "spacing",
+            Self::Coverage => "coverage",
+            Self::Index => "index",
+            Self::LeafFiles => "leaf-files",
+            Self::Capacity => "capacity",
+            Self::Unions => "unions",
+            Self::LeafBoxes => "leaf-boxes",
+            Self::Values => "values",
+            Self::Padding => "padding",
+            Self::Positions => "positions",
+            Self::LeafOrder => "leaf-order",
+            Self::SplitAxis => "split-axis",
+            Self::Split => "split",
+            Self::Sides => "sides",
+            Self::Degenerate => "degenerate",
+            Self::Against => "against",
+        }
+    }
+
+    /// What the dataset promises, in one line.
+    pub const fn promise(self) -> &'static str {
+        match self {
+            Self::Metadata => "metadata.json is complete, in range and consistent",
+            Self::Hierarchy => {
+                "every hierarchy chunk holds exactly its records; chunks are disjoint and none is orphaned"
+            }
+            Self::NodeTypes => "a node is of type 0 exactly if it has children",
+            Self::EmptyNodes => "no node is empty",
+            Self::Depth => "hierarchy.depth is the deepest level that has a node",
+            Self::PointCount => "the points of all nodes add up to points",
+            Self::PayloadRanges => "payloads have the right size, do not overlap and cover octree.bin",
+            Self::Payloads => "every payload decodes to exactly its points",
+            Self::Order => "points of a BROTLI node are sorted by Morton code",
+            Self::Coordinates => "stored coordinates are 0 or more and below 2^31",
+            Self::Boxes => "every point lies in the box of its node",
+            Self::TightBox => "min and max of position are the tight box of the points",
+            Self::AttributeRanges => "min and max of every attribute bound its values and are attained",
+            Self::Histogram => "histograms count the values that are there",
+            Self::Spacing => "inner nodes are sampled as promised: no pair closer than the spacing of the level",
+            Self::Coverage => "no hole: every point is within two spacings of a point drawn at each level above it",
+            Self::Index => "index.json is complete, in range and consistent",
+            Self::LeafFiles => "leaves have the right size, do not overlap, and no file or byte belongs to none",
+            Self::Capacity => "no leaf has more points than the capacity, and every other node does",
+            Self::Unions => "the box of an inner node is the union of its children's",
+            Self::LeafBoxes => "the box of a leaf is exactly that of its decoded points",
+            Self::Values => "classes are whole numbers, rgba is opaque and the colour of rgb",
+            Self::Padding => "bytes that belong to no column are zero",
+            Self::Positions => "every decoded position is as near to its lattice point as single precision gets",
+            Self::LeafOrder => "points of a leaf are in Morton order, those of one place in the order of their bytes",
+            Self::SplitAxis => "every node is split along its longest axis, of equal ones the lowest",
+            Self::Split => "every split is the exact mean (median, midpoint) of the points below",
+            Self::Sides => "the low side is at the plane or below, the high side above",
+            Self::Degenerate => "points of one place, and no others, are cut by number",
+            Self::Against => "every point and attribute of the sources is in the dataset exactly once",
+        }
+    }
+}
+
+impl Serialize for Check {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::Format;
+
+    #[test]
+    fn checks_are_indexed_by_their_place_in_the_list() {
+        assert!(Check::ALL.iter().enumerate().all(|(i, c)| c.index() == i));
+    }
+
+    #[test]
+    fn no_format_has_two_checks_of_one_name_and_every_check_serves_a_format() {
+        for format in Format::ALL {
+            let names: BTreeSet<_> = format.checks().iter().map(|c| c.name()).collect();
+            assert_eq!(names.len(), format.checks().len(), "{format}");
+        }
+        let used = |check: &&Check| Format::ALL.iter().any(|f| f.checks().contains(check));
+        assert_eq!(Check::ALL.iter().filter(used).count(), Check::ALL.len());
+    }
+}

@@ -1,0 +1,75 @@
+//! Sampling of inner nodes: no pair closer than the spacing, or at most one point a cell.
+
+use pointmill_format::NodeKey;
+use serde_json::json;
+
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::potree2::expect::Geometry;
+use crate::potree2::grid::{Grid, Origin, square};
+use crate::potree2::quality::Tally;
+
+/// What inner nodes promise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sampling {
+    /// No two points of a node closer than the spacing of its level, less one lattice step.
+    Poisson,
+    /// At most one point in each cell of the node's 128³ grid (grid and random sampling).
+    Cells,
+    /// The dataset does not say: one of the two, throughout.
+    Unknown,
+}
+
+impl Sampling {
+    /// Reads the word that pointmill leaves in the metadata.
+    pub(crate) fn from_word(word: Option<&str>) -> Self {
+        match word {
+            Some("poisson") => Self::Poisson,
+            Some("grid" | "random") => Self::Cells,
+            _ => Self::Unknown,
+        }
+    }
+}
+
+/// How far the nearest neighbour inside the node is looked for, in cells of two spacings.
+const RINGS: i32 = 4;
+
+/// Measures the nearest neighbour of each point of an inner node, within the node and across its borders, and reports
+/// pairs closer than the spacing.
+pub(crate) fn pairs(key: NodeKey, grid: &Grid, geometry: &Geometry, tally: &Tally, findings: &Findings) {
+    let spacing = geometry.spacing_at(key.level);
+    let allowed_squared = square((spacing - geometry.step()).max(0.0));
+    let (mut close, mut closest, mut looked_at) = (0, f64::INFINITY, 0);
+    let mut node = crate::potree2::quality::NodeFigures::default();
+    for (i, _) in grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own) {
+        let (own_squared, across_squared) = grid.nearest_by_origin(i, RINGS);
+        looked_at += 1;
+        node.nearest(own_squared.sqrt() / spacing);
+        node.across(across_squared.sqrt() / spacing, across_squared < allowed_squared);
+        if own_squared < allowed_squared {
+            close += 1;
+            closest = f64::min(closest, own_squared.sqrt());
+        }
+    }
+    tally.add_node(&node);
+    findings.checked(Check::Spacing, looked_at);
+    if close > 0 {
+        let expected = json!(spacing);
+        let finding = Finding::new(Check::Spacing, "distance of the nearest pair", expected, json!(closest));
+        findings.push(finding.at(key).points(close));
+    }
+}
+
+/// Reports cells of an inner node's 128³ grid that hold more than one point.
+pub(crate) fn cells(key: NodeKey, positions: &[[i32; 3]], geometry: &Geometry, findings: &Findings) {
+    findings.checked(Check::Spacing, positions.len() as u64);
+    let node = geometry.node_box(key);
+    let mut cells: Vec<u32> = positions.iter().filter_map(|p| geometry.sample_cell(key.level, &node, *p)).collect();
+    cells.sort_unstable();
+    let surplus = cells.windows(2).filter(|w| w[0] == w[1]).count() as u64;
+    if surplus > 0 {
+        let fullest = cells.chunk_by(|a, b| a == b).map(<[u32]>::len).max();
+        let finding = Finding::new(Check::Spacing, "points of a cell of the 128³ grid", 1, fullest);
+        findings.push(finding.at(key).points(surplus));
+    }
+}

@@ -1,0 +1,183 @@
+//! Potree 2.0. `docs/formats/potree2.md` is the only source of what is expected.
+//!
+//! # Tolerances
+//! * Boxes and the tight box: 4 ulps of the cube's largest coordinate on the axis; everything else about positions is
+//!   exact, on integers.
+//! * Distances (spacing, coverage): one step of the lattice.
+//! * Sides of the cube against each other: 10⁻⁹, relative, and two ulps of its largest coordinate; spacing against
+//!   side / 128: 10⁻⁹, relative.
+//! * Attributes, counts, byte ranges, checksums: none.
+//!
+//! # Memory
+//! Nodes are streamed. What stays is the table of nodes (about 100 bytes each), for every thread the points of the
+//! inner nodes on the path from the root (some megabytes), and a cache of a quarter of [`Options::memory_bytes`].
+//! A single node is read as a whole.
+
+mod cache;
+mod checks;
+mod expect;
+mod grid;
+mod quality;
+mod records;
+mod tree;
+mod walk;
+
+use std::path::Path;
+
+use pointmill_format::potree2::{ByteSource, Dataset, DatasetFile, Encoding, Folder};
+use pointmill_format::{ErrorKind, ReadError};
+use serde_json::Value;
+
+pub use quality::LevelQuality;
+
+use crate::against::{Against, Context, Rules};
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::{Format, Options, Outcome, ProgressFn};
+use checks::spacing::Sampling;
+use expect::Geometry;
+use records::Records;
+use tree::Tree;
+use walk::{Task, Walked, walk};
+
+/// Checks the dataset in `folder`.
+///
+/// # Errors
+/// As [`crate::validate`].
+pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
+    let source = Folder::open(folder)?;
+    let findings = Findings::new(Format::Potree2, options.max_problems);
+    let dataset = match Dataset::open(folder) {
+        Ok(dataset) => dataset,
+        Err(error) if matches!(error.kind, ErrorKind::Io(_)) => return Err(error),
+        Err(error) => return unreadable_metadata(folder, findings, error),
+    };
+    checks::metadata::check(&read_json(folder)?.unwrap_or_default(), &findings);
+    let metadata = dataset.metadata();
+    let geometry = Geometry { lattice: metadata.lattice, cube: metadata.cube, spacing: metadata.spacing };
+    let against = match options.against.as_slice() {
+        [] => None,
+        paths => {
+            let attributes = metadata.attributes.iter().map(|a| a.attribute.clone());
+            let attributes = attributes.filter(|a| a.name != "position").collect();
+            let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
+            Some(Against::open(paths, &options.open, Rules::new(attributes, metadata.lattice, own))?)
+        }
+    };
+
+    let mut tree = tree::walk(&source, metadata.first_chunk_size, &findings)?;
+    checks::structure::check(&tree, metadata.points, metadata.depth, &findings);
+    let octree_bytes = tree::size_of(&source as &dyn ByteSource, DatasetFile::Octree)?;
+    let record_len = (metadata.encoding == Encoding::Default).then(|| metadata.record_len() as u64);
+    checks::payload_ranges::check(&mut tree, octree_bytes, record_len, &findings);
+
+    let walked = walk(&Task {
+        dataset: &dataset,
+        tree: &tree,
+        geometry,
+        findings: &findings,
+        neighbourhoods: options.neighbourhoods && geometry.spacing_is_sane(),
+        sampling: Sampling::from_word(metadata.extra.get("pointmill").and_then(|own| own["sampling"].as_str())),
+        sums: against.as_ref().map(|a| &a.sums),
+        progress,
+        cache_bytes: usize::try_from(options.memory_bytes / 4).unwrap_or(usize::MAX),
+        max_problems: options.max_problems,
+    })?;
+    checks::ranges::check(metadata, &geometry, &walked.seen, walked.unreadable == 0, &findings);
+    say_what_was_skipped(&walked, &dataset, &geometry, options, &findings);
+    let summary = match &against {
+        Some(against) => Some(against.compare(&Context {
+            records: &Records { dataset: &dataset, tree: &tree },
+            findings: &findings,
+            progress,
+            memory_bytes: options.memory_bytes,
+        })?),
+        None => None,
+    };
+
+    let quality = quality(&tree, &walked, &geometry);
+    let (checks, problems) = findings.finish();
+    Ok(Outcome {
+        ok: checks.iter().all(|c| c.ok),
+        format: Format::Potree2,
+        encoding: Some(metadata.encoding.name()),
+        points: metadata.points,
+        nodes: tree.nodes.len() as u64,
+        checks,
+        problems,
+        quality,
+        leaves: None,
+        against: summary,
+    })
+}
+
+/// `metadata.json` as a JSON value; `None` if it is none.
+fn read_json(folder: &Path) -> Result<Option<Value>, ReadError> {
+    let path = folder.join(DatasetFile::Metadata.name());
+    let bytes = std::fs::read(&path).map_err(|e| ReadError::io(&path, "reading", e))?;
+    Ok(serde_json::from_slice(&bytes).ok())
+}
+
+/// All that can be said of a dataset whose metadata makes no sense.
+fn unreadable_metadata(folder: &Path, findings: Findings, error: ReadError) -> Result<Outcome, ReadError> {
+    for check in Check::POTREE2.iter().copied().filter(|c| *c != Check::Metadata) {
+        findings.skip(check, "metadata.json cannot be used");
+    }
+    if let Some(json) = read_json(folder)? {
+        checks::metadata::check(&json, &findings);
+    }
+    if findings.found(Check::Metadata) == 0 {
+        findings.push(Finding::new(Check::Metadata, "metadata.json", "valid metadata", error.what));
+    }
+    let (checks, problems) = findings.finish();
+    Ok(Outcome {
+        ok: false,
+        format: Format::Potree2,
+        encoding: None,
+        points: 0,
+        nodes: 0,
+        checks,
+        problems,
+        quality: Vec::new(),
+        leaves: None,
+        against: None,
+    })
+}
+
+fn say_what_was_skipped(
+    walked: &Walked,
+    dataset: &Dataset,
+    geometry: &Geometry,
+    options: &Options,
+    findings: &Findings,
+) {
+    let metadata = dataset.metadata();
+    if metadata.encoding == Encoding::Default {
+        findings.skip(Check::Order, "only BROTLI promises an order");
+    }
+    if metadata.attributes.iter().all(|a| a.histogram.is_none()) {
+        findings.skip(Check::Histogram, "there are none");
+    }
+    if !options.neighbourhoods || !geometry.spacing_is_sane() {
+        let why = if options.neighbourhoods { "the spacing is out of proportion" } else { "not asked for" };
+        findings.skip(Check::Spacing, why);
+        findings.skip(Check::Coverage, why);
+    } else if walked.unreadable > 0 {
+        findings.skip(Check::Coverage, format!("the points of {} nodes could not be read", walked.unreadable));
+    }
+    if options.against.is_empty() {
+        findings.skip(Check::Against, "no sources were given");
+    }
+}
+
+fn quality(tree: &Tree, walked: &Walked, geometry: &Geometry) -> Vec<LevelQuality> {
+    let levels = walked.tallies.iter().zip(0..);
+    let mut quality: Vec<_> = levels.map(|(t, level)| t.figures(level, geometry.spacing_at(level))).collect();
+    for node in &tree.nodes {
+        let level = &mut quality[usize::from(node.key.level)];
+        level.nodes += 1;
+        level.inner_nodes += u64::from(node.record.child_mask != 0);
+        level.points += u64::from(node.record.points);
+    }
+    quality
+}

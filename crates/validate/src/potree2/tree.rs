@@ -1,0 +1,160 @@
+//! The octree as `hierarchy.bin` tells it, walked chunk by chunk without trust.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+
+use pointmill_format::potree2::{ByteSource, DatasetFile, NodeRecord};
+use pointmill_format::{NodeKey, ReadError};
+
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+
+/// A node with the record that locates its payload.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TreeNode {
+    pub(crate) key: NodeKey,
+    pub(crate) record: NodeRecord,
+    /// Its payload range makes sense and may be read.
+    pub(crate) readable: bool,
+}
+
+/// All nodes that could be reached from the root.
+#[derive(Debug, Default)]
+pub(crate) struct Tree {
+    pub(crate) nodes: Vec<TreeNode>,
+    index: HashMap<NodeKey, u32>,
+}
+
+impl Tree {
+    /// Where a node stands in `nodes`.
+    pub(crate) fn find(&self, key: NodeKey) -> Option<usize> {
+        self.index.get(&key).map(|i| *i as usize)
+    }
+
+    /// The children that are there, by child index.
+    pub(crate) fn children(&self, node: &TreeNode) -> Vec<usize> {
+        let mask = node.record.child_mask;
+        (0..8).filter(|c| mask >> c & 1 == 1).filter_map(|c| self.find(node.key.child(c)?)).collect()
+    }
+
+    /// The node's neighbours of its own level, sharing a face, an edge or a corner; at most 26.
+    pub(crate) fn neighbours(&self, key: NodeKey) -> impl Iterator<Item = usize> + '_ {
+        let around = |cell: u32| [cell.checked_sub(1), Some(cell), cell.checked_add(1)].into_iter().flatten();
+        around(key.x)
+            .flat_map(move |x| around(key.y).flat_map(move |y| around(key.z).map(move |z| NodeKey { x, y, z, ..key })))
+            .filter(move |other| *other != key)
+            .filter_map(|other| self.find(other))
+    }
+}
+
+/// A chunk that is still to be read.
+struct Pending {
+    root: NodeKey,
+    offset: u64,
+    size: u64,
+    /// What the proxy that led here says; `None` for the root chunk.
+    points: Option<u32>,
+}
+
+/// Reads every chunk and reports what is wrong with them.
+///
+/// # Errors
+/// The operating system could not read the file.
+pub(crate) fn walk(source: &dyn ByteSource, first_chunk_size: u64, findings: &Findings) -> Result<Tree, ReadError> {
+    let file_size = size_of(source, DatasetFile::Hierarchy)?;
+    let mut tree = Tree::default();
+    let mut chunks = BTreeMap::<u64, u64>::new(); // start → end, disjoint: this bounds the walk by the file
+    let mut queue = VecDeque::from([Pending { root: NodeKey::ROOT, offset: 0, size: first_chunk_size, points: None }]);
+    while let Some(chunk) = queue.pop_front() {
+        findings.checked(Check::Hierarchy, 1);
+        let Some(end) = admit(&chunk, file_size, &chunks, findings) else { continue };
+        chunks.insert(chunk.offset, end);
+        let mut bytes = vec![0; (end - chunk.offset) as usize];
+        source
+            .read_at(DatasetFile::Hierarchy, chunk.offset, &mut bytes)
+            .map_err(|e| ReadError::io(source.locate(DatasetFile::Hierarchy), "reading a hierarchy chunk", e))?;
+        parse(&chunk, &bytes, &mut tree, &mut queue, findings);
+    }
+    orphans(&chunks, file_size, findings);
+    tree.index = tree.nodes.iter().enumerate().map(|(i, n)| (n.key, i as u32)).collect();
+    Ok(tree)
+}
+
+/// Bytes of a file of the dataset.
+pub(crate) fn size_of(source: &dyn ByteSource, file: DatasetFile) -> Result<u64, ReadError> {
+    source.size(file).map_err(|e| ReadError::io(source.locate(file), "asking for the size", e))
+}
+
+/// The end of the part of the chunk that can be read, if any.
+fn admit(chunk: &Pending, file_size: u64, chunks: &BTreeMap<u64, u64>, findings: &Findings) -> Option<u64> {
+    let record = NodeRecord::LEN as u64;
+    let blame = |subject, expected: String, found: String| {
+        findings.push(Finding::new(Check::Hierarchy, subject, expected, found).at(chunk.root));
+    };
+    if chunk.size < record || !chunk.size.is_multiple_of(record) {
+        blame("size of a chunk", format!("a multiple of {record} bytes"), format!("{} bytes", chunk.size));
+    }
+    let end = chunk.offset.saturating_add(chunk.size);
+    if end > file_size {
+        blame("end of a chunk", format!("at most byte {file_size}"), format!("byte {end}"));
+    }
+    let whole = end.min(file_size).saturating_sub(chunk.offset) / record * record;
+    if whole == 0 {
+        return None;
+    }
+    let before = chunks.range(..chunk.offset + whole).next_back();
+    if let Some((&start, &other_end)) = before.filter(|(_, e)| **e > chunk.offset) {
+        let expected = format!("bytes of its own from {}", chunk.offset);
+        blame("range of a chunk", expected, format!("bytes {start} to {other_end} belong to another chunk"));
+        return None;
+    }
+    Some(chunk.offset + whole)
+}
+
+fn parse(chunk: &Pending, bytes: &[u8], tree: &mut Tree, queue: &mut VecDeque<Pending>, findings: &Findings) {
+    let mut keys = vec![chunk.root];
+    let (records, _) = bytes.as_chunks::<{ NodeRecord::LEN }>();
+    for (i, bytes) in records.iter().enumerate() {
+        let Some(&key) = keys.get(i) else { break };
+        let record = NodeRecord::from_bytes(bytes);
+        let blame = |subject, expected: String, found: String| {
+            findings.push(Finding::new(Check::Hierarchy, subject, expected, found).at(key));
+        };
+        if record.node_type > 2 {
+            blame("type", "0, 1 or 2".into(), record.node_type.to_string());
+        }
+        if record.is_proxy() {
+            if i == 0 {
+                blame("first record of a chunk", "type 0 or 1".into(), "a proxy".into());
+                return;
+            }
+            let (offset, size) = (record.byte_offset, record.byte_size);
+            queue.push_back(Pending { root: key, offset, size, points: Some(record.points) });
+            continue;
+        }
+        if let Some(points) = chunk.points.filter(|p| i == 0 && *p != record.points) {
+            blame("numPoints of a proxy", record.points.to_string(), points.to_string());
+        }
+        tree.nodes.push(TreeNode { key, record, readable: false });
+        for child in (0..8).filter(|c| record.child_mask >> c & 1 == 1) {
+            match key.child(child) {
+                Some(child) => keys.push(child),
+                None => blame("level", format!("at most {}", NodeKey::MAX_LEVEL), "deeper".into()),
+            }
+        }
+    }
+    if keys.len() != records.len() {
+        let (expected, found) = (keys.len(), records.len());
+        findings.push(Finding::new(Check::Hierarchy, "records of a chunk", expected, found).at(chunk.root));
+    }
+}
+
+fn orphans(chunks: &BTreeMap<u64, u64>, file_size: u64, findings: &Findings) {
+    let mut covered = 0;
+    for (start, end) in chunks.iter().map(|(s, e)| (*s, *e)).chain([(file_size, file_size)]) {
+        if start > covered {
+            let found = format!("bytes {covered} to {start} belong to no chunk");
+            findings.push(Finding::new(Check::Hierarchy, "orphaned bytes of hierarchy.bin", "none", found));
+        }
+        covered = covered.max(end);
+    }
+}

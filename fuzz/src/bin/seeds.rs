@@ -1,0 +1,41 @@
+//! Puts the fixtures where the fuzzer looks for its first inputs: `corpus/<target>/`.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+fn main() -> io::Result<()> {
+    let fuzz = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let fixtures = fuzz.join("../fixtures");
+    for (target, folder, endings) in [
+        ("las", "las", &["las", "laz"][..]),
+        ("e57", "e57", &["e57"]),
+        ("ply", "rows", &["ply"]),
+        ("pcd", "rows", &["pcd"]),
+        ("text", "rows", &["xyz", "txt", "asc", "csv", "pts", "ptx", "off"]),
+    ] {
+        let corpus = fuzz.join("corpus").join(target);
+        fs::create_dir_all(&corpus)?;
+        for entry in fs::read_dir(fixtures.join(folder))? {
+            let path = entry?.path();
+            let (Some(name), Some(ending)) = (path.file_name(), path.extension().and_then(|e| e.to_str())) else {
+                continue;
+            };
+            if !endings.contains(&ending) || path.metadata()?.len() > 100_000 {
+                continue;
+            }
+            let bytes = fs::read(&path)?;
+            let bytes = if target == "text" { [b"0".as_slice(), &bytes].concat() } else { bytes };
+            fs::write(corpus.join(name), bytes)?;
+        }
+    }
+    let corpus = fuzz.join("corpus/potree2");
+    fs::create_dir_all(&corpus)?;
+    for name in ["default", "brotli"] {
+        let file = |file: &str| fs::read(fixtures.join("potree2").join(name).join(file));
+        let (metadata, hierarchy, octree) = (file("metadata.json")?, file("hierarchy.bin")?, file("octree.bin")?);
+        let lengths = [metadata.len() as u32, hierarchy.len() as u32].map(u32::to_le_bytes).concat();
+        fs::write(corpus.join(name), [lengths, metadata, hierarchy, octree].concat())?;
+    }
+    Ok(())
+}
