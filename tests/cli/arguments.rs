@@ -41,9 +41,7 @@ fn mistakes_end_with_code_2_and_leave_nothing_behind() {
 fn formats_to_come_are_not_supported_yet() {
     let dir = Dir::new();
     dir.write("a.las", &Las::terrain(10, 1).bytes());
-    for format in ["potree1"] {
-        dir.run(["convert", "a.las", "-o", "out", "--to", format]).failed_with(4, &[format, "potree2"]);
-    }
+    dir.run(["convert", "a.las", "-o", "out", "--to", "potree1"]).failed_with(4, &["potree1", "potree2", "bintree"]);
     dir.succeed(["convert", "a.las", "-o", "out", "--to", "potree2"]);
 }
 

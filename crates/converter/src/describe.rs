@@ -79,14 +79,10 @@ impl Description {
             own.insert("wkt".into(), wkt.clone().into());
         }
         // Those that were not asked for are no matter of the dataset: which there were depends on the kind of the scans.
-        if plan.attributes == AttributeChoice::Scene {
-            let names: Vec<&str> = dropped.iter().map(|d| d.name.as_str()).collect();
-            let constant = |name: &str| self.ranges.get(job.schema.find(name)?)?.constant();
-            let constants: Map<_, _> =
-                names.iter().filter_map(|n| Some(((*n).to_owned(), json!(constant(n)?)))).collect();
-            if !constants.is_empty() {
-                own.insert("attributesDropped".into(), constants.into());
-            }
+        let constants: Map<_, _> =
+            dropped.iter().filter_map(|d| Some((d.name.clone(), json!(d.constant.as_ref()?)))).collect();
+        if !constants.is_empty() {
+            own.insert("attributesDropped".into(), constants.into());
         }
         own
     }

@@ -76,7 +76,9 @@ pub(crate) fn dropped(
     why: &str,
 ) -> Vec<DroppedAttribute> {
     let read = (0..schema.attributes.len()).filter(|i| !kept(*i)).map(|i| &schema.attributes[i].name);
-    read.chain(unread).map(|name| DroppedAttribute { name: name.clone(), why: why.to_owned() }).collect()
+    read.chain(unread)
+        .map(|name| DroppedAttribute { name: name.clone(), why: why.to_owned(), constant: None })
+        .collect()
 }
 
 #[cfg(test)]

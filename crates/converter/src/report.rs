@@ -152,6 +152,9 @@ pub struct DroppedAttribute {
     pub name: String,
     /// Why ("constant 0", "not asked for", …).
     pub why: String,
+    /// What all points agree on, by element, if that is why.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub constant: Option<Vec<f64>>,
 }
 
 /// The tree.

@@ -57,8 +57,15 @@ impl ReadError {
     }
 
     fn new(kind: ErrorKind, path: impl AsRef<Path>, offset: Option<u64>, what: impl Into<String>) -> Self {
-        Self { kind, path: path.as_ref().to_path_buf(), offset, what: what.into(), advice: String::new() }
+        let what = one_line(what.into());
+        Self { kind, path: path.as_ref().to_path_buf(), offset, what, advice: String::new() }
     }
+}
+
+/// Text for people that may quote a file: control characters become blanks, so that it stays one line and no terminal
+/// obeys it.
+fn one_line(text: String) -> String {
+    if text.contains(char::is_control) { text.replace(char::is_control, " ") } else { text }
 }
 
 impl fmt::Display for ReadError {
@@ -83,6 +90,12 @@ impl std::error::Error for ReadError {
     }
 }
 
+/// [`one_line`] for each warning of a scan.
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+pub(crate) fn as_lines(warnings: Vec<String>) -> Vec<String> {
+    warnings.into_iter().map(one_line).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,5 +104,11 @@ mod tests {
     fn prints_what_where_and_what_to_do_on_one_line() {
         let e = ReadError::broken("a.las", 227, "3 of 10 records are there").advise("copy the file again");
         assert_eq!(e.to_string(), "a.las: 3 of 10 records are there (byte 227); copy the file again");
+    }
+
+    #[test]
+    fn what_a_file_smuggles_in_stays_one_line() {
+        let e = ReadError::broken("a.las", None, "the name \"a\r\nb\u{1b}[31m\" is odd");
+        assert_eq!(e.to_string(), "a.las: the name \"a  b [31m\" is odd");
     }
 }

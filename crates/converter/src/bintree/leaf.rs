@@ -148,9 +148,10 @@ fn named(schema: &Schema, names: &[String], class: Option<usize>) -> Vec<Extra> 
 /// `--attributes scene` names the value that a constant attribute has.
 fn mark_constants(run: &Run<'_>, dropped: &mut [DroppedAttribute]) {
     for d in dropped.iter_mut().filter(|d| d.why == "constant") {
-        let values = run.job.schema.find(&d.name).and_then(|i| run.facts.ranges[i].constant());
-        let values: Vec<String> = values.unwrap_or_default().iter().map(f64::to_string).collect();
-        d.why = format!("constant {}", values.join(" "));
+        let values = run.job.schema.find(&d.name).and_then(|i| run.facts.ranges[i].constant()).unwrap_or_default();
+        let texts: Vec<String> = values.iter().map(f64::to_string).collect();
+        d.why = format!("constant {}", texts.join(" "));
+        d.constant = Some(values.to_vec());
     }
 }
 

@@ -34,7 +34,8 @@ pub(crate) fn choose_attributes(choice: &AttributeChoice, job: &Job, ranges: &[R
                     Some(values) => {
                         let text: Vec<String> = values.iter().map(f64::to_string).collect();
                         let name = job.schema.attributes[i].name.clone();
-                        dropped.push(DroppedAttribute { name, why: format!("constant {}", text.join(" ")) });
+                        let why = format!("constant {}", text.join(" "));
+                        dropped.push(DroppedAttribute { name, why, constant: Some(values.to_vec()) });
                     }
                     None => kept.push(i),
                 }

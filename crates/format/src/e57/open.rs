@@ -76,7 +76,7 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
         attributes,
         crs: crs(document.coordinate_metadata.as_deref(), &mut warnings),
         file_bytes: source.len(),
-        warnings,
+        warnings: crate::error::as_lines(warnings),
     };
     Ok(E57Scan { source, info, scans, pieces: pieces(&cuts), cuts })
 }

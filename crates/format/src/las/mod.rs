@@ -100,7 +100,7 @@ impl LasScan {
             attributes: schema.attributes.clone(),
             crs,
             file_bytes: source.len(),
-            warnings,
+            warnings: crate::error::as_lines(warnings),
         };
         Ok(Self { source, info, schema, record_len: header.record_len, laszip, plan })
     }

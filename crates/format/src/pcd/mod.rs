@@ -52,7 +52,7 @@ pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
     let format = format!("PCD {}, {}, {} positions", header.version, header.encoding.name(), precision(axis));
     let mut scan = RowScan::new(source, format, header.points, schema, storage);
     scan.pieces = pieces;
-    scan.info.warnings = warnings;
+    scan.info.warnings = crate::error::as_lines(warnings);
     scan.info.resolution = resolution(axis);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))

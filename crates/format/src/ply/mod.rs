@@ -62,7 +62,7 @@ pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
     let format = format!("PLY 1.0, {}, {} positions", header.encoding.name(), precision(axis));
     let mut scan = RowScan::new(source, format, header.elements[vertices].count, schema, placed.storage);
     scan.pieces = placed.pieces;
-    scan.info.warnings = warnings;
+    scan.info.warnings = crate::error::as_lines(warnings);
     scan.info.resolution = resolution(axis);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))

@@ -142,7 +142,7 @@ impl Table {
             shift_intensity(&mut schema, i);
         }
         scan.info.attributes = schema.attributes.clone();
-        scan.info.warnings = self.warnings;
+        scan.info.warnings = crate::error::as_lines(self.warnings);
         scan.schema = schema;
         Ok(scan)
     }

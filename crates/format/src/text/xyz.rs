@@ -91,7 +91,8 @@ pub(super) fn named(
         if columns.len() == count {
             return Ok(columns);
         }
-        let what = format!("{} columns are named ({}) but the row has {count}", columns.len(), names.join(", "));
+        let shown: String = names.join(", ").chars().take(100).collect();
+        let what = format!("{} columns are named ({shown}) but the row has {count}", columns.len());
         Err(ReadError::broken(source.path(), at, what).advise("name every column in order, - for those to leave out"))
     };
     if let Some(names) = &options.columns {

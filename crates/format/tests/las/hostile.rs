@@ -131,3 +131,14 @@ fn a_laszip_record_left_over_in_an_unpacked_file_does_not_matter() {
     assert_eq!(cloud.xyz, read_bytes(&las).unwrap().xyz);
     assert!(cloud.warned("ignored"));
 }
+
+/// Found by fuzzing: the user id of a record stood in a warning as it was.
+#[test]
+fn names_with_line_breaks_leave_warnings_one_line() {
+    let mut bytes = fixture("evlrs.las");
+    let at = u64::from_le_bytes(*bytes[235..].first_chunk().unwrap()) as usize;
+    put(&mut bytes, at + 2, b"a\nb\r\x1b[31m");
+    put(&mut bytes, at + 20, &u64::MAX.to_le_bytes());
+    let cloud = read_bytes(&bytes).unwrap();
+    assert!(cloud.warned("a b  [31m") && cloud.info.warnings.iter().all(|w| !w.contains(char::is_control)));
+}
