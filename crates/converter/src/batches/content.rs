@@ -61,20 +61,23 @@ impl Content {
         let extras: Vec<usize> = choice.into_iter().filter(|i| !(is_rgb && Some(*i) == colour_index)).collect();
         let mut kept: Vec<usize> = colour_index.filter(|_| is_rgb).into_iter().collect();
         kept.extend(&extras);
-        let why = |i: usize| match run.plan.attributes {
-            AttributeChoice::Scene => match run.facts.ranges[i].constant() {
+        let usual = "not part of the usual record; --attributes adds it";
+        let unasked = if run.plan.attributes == AttributeChoice::Usual { usual } else { "not asked for" };
+        let left = |i: usize| {
+            let is_scene = run.plan.attributes == AttributeChoice::Scene;
+            let constant = run.facts.ranges[i].constant().filter(|_| is_scene).map(<[f64]>::to_vec);
+            let why = match &constant {
                 Some(values) => {
                     format!("constant {}", values.iter().map(f64::to_string).collect::<Vec<_>>().join(" "))
                 }
-                None => "not asked for".to_owned(),
-            },
-            _ if !is_rgb && Some(i) == colour_index => "shown as grey of 8 bits".to_owned(),
-            _ => "not asked for".to_owned(),
+                None if !is_rgb && Some(i) == colour_index => "shown as grey of 8 bits".to_owned(),
+                None => unasked.to_owned(),
+            };
+            DroppedAttribute { name: schema.attributes[i].name.clone(), why, constant }
         };
         let left_out = (0..schema.attributes.len()).filter(|i| !kept.contains(i));
-        let mut dropped: Vec<DroppedAttribute> =
-            left_out.map(|i| DroppedAttribute { name: schema.attributes[i].name.clone(), why: why(i) }).collect();
-        dropped.extend(needs::dropped(schema, &job.unread, |_| true, "not asked for"));
+        let mut dropped: Vec<DroppedAttribute> = left_out.map(left).collect();
+        dropped.extend(needs::dropped(schema, &job.unread, |_| true, unasked));
         let colour = match colour_index {
             Some(i) if is_rgb => Colour::Rgb {
                 at: schema.offsets[i],
