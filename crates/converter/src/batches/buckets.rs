@@ -6,9 +6,7 @@
 
 use std::collections::HashMap;
 
-use pointmill_format::batches::morton21;
-
-use super::frame::{BUCKET_LEVELS, Frame};
+use super::frame::{BUCKET_LEVELS, Frame, code_of};
 use super::work::in_parallel;
 use crate::convert::Run;
 use crate::error::ConvertError;
@@ -71,7 +69,7 @@ pub(super) fn tasks(run: &Run<'_>, frame: &Frame, max_points: u64) -> Result<Vec
 }
 
 fn start_of(bucket: [u32; 3], level: u32) -> u64 {
-    morton21(bucket.map(|c| c >> (BUCKET_LEVELS - level) << (BUCKET_LEVELS - level)))
+    code_of(bucket.map(|c| c >> (BUCKET_LEVELS - level) << (BUCKET_LEVELS - level)))
 }
 
 fn points_of(segments: &[Segment]) -> u64 {
@@ -159,21 +157,23 @@ fn cell_bounds(cell: &Cell, gathered: &Gathered) -> LatticeBounds {
 struct Pieces {
     done: Vec<(Vec<Segment>, u32)>,
     open: (Vec<Segment>, u32),
+    open_points: u64,
 }
 
 impl Pieces {
     fn add(&mut self, segments: &[Segment], level: u32) {
-        self.open.1 = level;
         for segment in segments {
+            self.open.1 = level;
             self.open.0.push(*segment);
-            if points_of(&self.open.0) >= PIECE_POINTS {
+            self.open_points += u64::from(segment.count);
+            if self.open_points >= PIECE_POINTS {
                 self.close();
-                self.open.1 = level;
             }
         }
     }
 
     fn close(&mut self) {
+        self.open_points = 0;
         if !self.open.0.is_empty() {
             self.done.push(std::mem::take(&mut self.open));
         }

@@ -38,6 +38,9 @@ pub(super) struct Finished {
     pub(super) errors: ErrorSums,
     pub(super) lod_points: [u64; LEVELS + 1],
     pub(super) layout: Layout,
+    pub(super) originals_bytes: u64,
+    /// Header and description.
+    pub(super) end: Finish,
     pub(super) bytes: u64,
 }
 
@@ -80,7 +83,8 @@ pub(super) fn finish(
     output.write(&end.description_bytes, end.description_offset)?;
     output.write(&end.header_bytes, 0)?;
     let bytes = end.description_offset + end.header.description_bytes;
-    Ok(Finished { precision: layout.precision(), records, errors, lod_points, layout, bytes })
+    let originals_bytes = if keeps_originals { Layout::originals_bytes(count) } else { 0 };
+    Ok(Finished { precision: layout.precision(), records, errors, lod_points, layout, originals_bytes, end, bytes })
 }
 
 /// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.

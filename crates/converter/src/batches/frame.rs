@@ -1,12 +1,13 @@
 //! From stored records to the grid of the batches, and the size of the grid's cells.
 
-use pointmill_format::batches::{Grid, WriteError, morton21, morton32};
+use pointmill_format::batches::{Grid, WriteError, morton32};
 use pointmill_format::{Aabb, Lattice};
 
 use crate::convert::Run;
 use crate::error::ConvertError;
 use crate::gather::Gathered;
 use crate::grid::LatticeBounds;
+use crate::morton::interleave;
 
 /// Levels of buckets: what is called a start is a Morton code of that many bits an axis.
 pub(super) const BUCKET_LEVELS: u32 = 21;
@@ -57,21 +58,16 @@ impl Frame {
         }
     }
 
-    /// X of a stored position.
-    #[inline]
-    pub(super) fn quantized(&self, stored: [i32; 3]) -> [i64; 3] {
-        std::array::from_fn(|a| i64::from(stored[a]) + self.base[a])
-    }
-
     /// r of a stored position: relative to the origin, world units.
     #[inline]
     pub(super) fn relative(&self, stored: [i32; 3]) -> [f64; 3] {
-        self.relative_of(self.quantized(stored))
+        self.relative_of(std::array::from_fn(|a| i64::from(stored[a]) + self.base[a]))
     }
 
     #[inline]
     fn relative_of(&self, quantized: [i64; 3]) -> [f64; 3] {
-        self.grid.relative(self.lattice.world(quantized))
+        let Self { grid, lattice, .. } = self;
+        std::array::from_fn(|a| (quantized[a] as f64 * lattice.scale[a] + lattice.offset[a]) - grid.origin[a])
     }
 
     /// u of a relative position: in cells.
@@ -92,7 +88,13 @@ impl Frame {
     /// The code of Morton coordinates, 63 or 96 bits.
     #[inline]
     pub(super) fn code(&self, morton: [u32; 3]) -> u128 {
-        if self.is_wide() { morton32(morton) } else { u128::from(morton21(morton)) }
+        if self.is_wide() { morton32(morton) } else { u128::from(code_of(morton)) }
+    }
+
+    /// The code of a stored position, if codes have 63 bits.
+    #[inline]
+    pub(super) fn narrow_code(&self, stored: [i32; 3]) -> u64 {
+        code_of(self.morton(stored))
     }
 
     /// True if codes have more than 63 bits.
@@ -122,6 +124,12 @@ impl Frame {
         let step = finest / self.grid.cell * self.morton_scale;
         if step >= 2.0 { (step.log2() as u32).min(self.grid.morton_bits - 1) } else { 0 }
     }
+}
+
+/// The code of coordinates of 21 bits: here x has the lowest bit of each triple, in octrees the highest.
+#[inline]
+pub(super) fn code_of([x, y, z]: [u32; 3]) -> u64 {
+    interleave([z, y, x])
 }
 
 /// A power of two such that cells hold about [`POINTS_PER_CELL`] points of a surface: from the number of points in the
@@ -175,7 +183,7 @@ mod tests {
                 assert_eq!(f.code(f.morton(stored)), f.grid.morton_code(u), "{cell}");
                 let shift = f.grid.morton_bits - BUCKET_LEVELS;
                 assert_eq!(f.bucket(stored), f.morton(stored).map(|m| m >> shift));
-                assert!(f.first_code(morton21(f.bucket(stored))) <= f.code(f.morton(stored)));
+                assert!(f.first_code(code_of(f.bucket(stored))) <= f.code(f.morton(stored)));
             }
         }
     }

@@ -2,6 +2,7 @@
 //! one. Batches and cells that two runs share are put together by whoever comes last, and at the end.
 
 mod buckets;
+mod compress;
 mod content;
 mod figures;
 mod finish;
@@ -66,15 +67,30 @@ fn write_tasks(
         run.budget.check_task(task.points, task_points, bytes_per_point(run.job.schema.stride))?;
     }
     let (file, path) = staged.create(FILE)?;
+    // what is compressed is written raw first, elsewhere
+    let raw = match settings.zstd_level {
+        None => None,
+        Some(_) => Some(tempfile::tempfile_in(run.temp_dir).map_err(|e| temp_file(run, e))?),
+    };
     let originals = Store::new(run.temp_dir, ORIGINAL_BYTES, 1, run.gathered.store.unused_bytes());
-    let output = Output::new(&file, &path, &layout, originals);
+    let output = match &raw {
+        None => Output::new(&file, &path, &layout, originals),
+        Some(raw) => Output::new(raw, run.temp_dir, &layout, originals),
+    };
     let outcome = encode(run, &frame, &content, &output, settings.originals, &tasks, task_points)?;
     run.account(outcome.written)?;
     let edges: Vec<_> = outcome.edges.iter().map(|(_, edges)| *edges).collect();
-    let finished =
+    let mut finished =
         finish(run, &frame, &content, &output, settings.planes, settings.originals, outcome.lod_points, &edges)?;
+    if let (Some(raw), Some(level)) = (&raw, settings.zstd_level) {
+        compress::compress(run, (raw, run.temp_dir), (&file, &path), level, &mut finished)?;
+    }
     file.sync_all().map_err(|e| ConvertError::io(&path, "syncing the batches", e))?;
     Ok(report(run, settings, &frame, content, &finished, outcome))
+}
+
+fn temp_file(run: &Run<'_>, error: std::io::Error) -> ConvertError {
+    ConvertError::io(run.temp_dir, "making a temporary file", error)
 }
 
 fn report(

@@ -37,22 +37,25 @@ impl Order {
         let index_bits = usize::BITS - count.saturating_sub(1).leading_zeros();
         let room = u64::BITS - index_bits;
         self.index_mask = (1 << index_bits) - 1;
-        let codes = loaded.records.chunks_exact(loaded.stride);
-        let codes = codes.map(|r| frame.code(frame.morton(position(r))).wrapping_sub(first_code));
+        let positions = loaded.records.chunks_exact(loaded.stride).map(position);
         self.keys.clear();
+        self.keys.reserve_exact(count);
         let idle = 3 * frame.idle_bits();
         let bits;
         if frame.is_wide() {
+            let codes = positions.map(|p| frame.code(frame.morton(p)).wrapping_sub(first_code));
             let greatest = codes.clone().max().unwrap_or(0);
             let code_bits = u128::BITS - greatest.leading_zeros();
             let shift = code_bits.saturating_sub(room).max(idle);
             bits = code_bits.saturating_sub(shift);
             self.keys.extend(codes.enumerate().map(|(i, code)| ((code >> shift) as u64) << index_bits | i as u64));
         } else {
+            let first_code = first_code as u64;
             let mut seen = 0;
-            self.keys.extend(codes.map(|code| {
-                seen |= code as u64;
-                code as u64
+            self.keys.extend(positions.map(|p| {
+                let code = frame.narrow_code(p).wrapping_sub(first_code);
+                seen |= code;
+                code
             }));
             let code_bits = u64::BITS - seen.leading_zeros();
             let shift = code_bits.saturating_sub(room).max(idle);

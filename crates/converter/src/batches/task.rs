@@ -92,8 +92,10 @@ impl<'a> Worker<'a> {
         let loaded = Loaded { records: &self.records, stride: self.shop.stride, words: &self.loaded_words };
         let first_code = self.shop.frame.first_code(task.start);
         self.order.sort(&loaded, self.shop.frame, &self.shop.content.extras, first_code);
-        self.words.clear();
-        self.shown.clear();
+        for words in [&mut self.words, &mut self.shown] {
+            words.clear();
+            words.reserve_exact(task.points as usize);
+        }
         let mut levels = Levels::default();
         for piece in pieces(task.first_point, task.points) {
             self.gather(&piece);
@@ -117,6 +119,7 @@ impl<'a> Worker<'a> {
         self.records.clear();
         self.loaded_words.clear();
         os_hints::reserve(&mut self.records, points * shop.stride);
+        self.loaded_words.reserve_exact(points);
         for segment in &task.segments {
             let start = self.records.len();
             let source = shop.store.take(*segment, &mut self.records)?;

@@ -4,7 +4,9 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::batches::{Cloud, Description, Header, WriteOptions, Written, colour_word, eight_bit, write};
+use pointmill_format::batches::{
+    AlignedBytes, Batches, Cloud, Description, Header, WriteOptions, Written, colour_word, compress, eight_bit, write,
+};
 use pointmill_format::{Attribute, AttributeType, Lattice};
 
 use crate::events::Silent;
@@ -295,6 +297,28 @@ fn originals_can_be_left_out() {
     assert_eq!(without.len() as u64, report.outputs[0].bytes);
     let text = |f: &[u8], h: &Header| f[h.sections.description as usize..].to_vec();
     assert_eq!(text(&with, &a), text(&without, &b));
+}
+
+#[test]
+fn compressed_sections_are_those_of_the_plain_compressor() {
+    let scan = Scan::surface(400_000, 9_000, 0.01);
+    let bench = Bench::new(&[&scan]);
+    for originals in [true, false] {
+        let settings = BatchesSettings { originals, ..cell(1.0) };
+        let mut plan = bench.plan(settings);
+        plan.attributes = AttributeChoice::All;
+        let (plain, _) = bench.convert(&plan).unwrap();
+        let plain = Batches::open_bytes(AlignedBytes::from(plain.as_slice()), Path::new("")).unwrap();
+        let mut expected = Cursor::new(Vec::new());
+        compress(&plain, &mut expected, 3, 16).unwrap();
+        for threads in [1, 3] {
+            plan.threads = threads;
+            plan.targets = vec![Target::Batches(BatchesSettings { zstd_level: Some(3), ..settings })];
+            let (ours, report) = bench.convert(&plan).unwrap();
+            assert_same(&ours, expected.get_ref(), "compressed");
+            assert_eq!(report.output_bytes, ours.len() as u64);
+        }
+    }
 }
 
 #[test]
