@@ -190,14 +190,12 @@ impl Camera {
             .map(|i| std::array::from_fn(|a| f64::from(if i >> a & 1 == 0 { record.min[a] } else { record.max[a] })));
         let corners: Vec<[f64; 3]> = corners.map(|c| self.view(c)).collect();
         let [half_width, half_height] = self.size.map(|s| s as f64 / 2.0 / self.focal);
-        let planes: [fn([f64; 3], f64, f64) -> f64; 4] = [
-            |[x, _, z], w, _| z * w - x,
-            |[x, _, z], w, _| z * w + x,
-            |[_, y, z], _, h| z * h - y,
-            |[_, y, z], _, h| z * h + y,
-        ];
-        corners.iter().any(|c| c[2] >= self.near)
-            && planes.iter().all(|inside| corners.iter().any(|c| inside(*c, half_width, half_height) >= 0.0))
+        let beyond = |outside: &dyn Fn([f64; 3]) -> bool| corners.iter().all(|c| outside(*c));
+        !(beyond(&|[_, _, z]| z < self.near)
+            || beyond(&|[x, _, z]| x > z * half_width)
+            || beyond(&|[x, _, z]| -x > z * half_width)
+            || beyond(&|[_, y, z]| y > z * half_height)
+            || beyond(&|[_, y, z]| -y > z * half_height))
     }
 
     fn precision(&self, record: &BatchRecord, rule: Bits) -> Precision {

@@ -34,6 +34,9 @@ pub(crate) enum Conversion {
     AsStored,
     /// A class as a float: rounded to a whole number; 0 where there is none, it is not finite or beyond ±2²⁴.
     WholeClass,
+    /// The grey of an integer among values from the first to the second number:
+    /// ((v − lo) · 255 + (hi − lo) / 2) / (hi − lo), and 255 if they are the same.
+    Grey([u64; 2]),
 }
 
 /// How the records of the sources become those of the dataset.
@@ -47,6 +50,8 @@ pub(crate) struct Rules {
     pub(crate) rgb: Option<usize>,
     /// The dataset has 8 bits a channel: each 16-bit value v of the rules below becomes (v · 255 + 32767) / 65535.
     pub(crate) rgb_as_bytes: bool,
+    /// False where a dataset does not tell its integers: every position counts as 0 then.
+    pub(crate) compare_positions: bool,
     /// The dataset's lattice.
     pub(crate) lattice: Lattice,
     /// Blocks have these instead of integers on the lattice.
@@ -86,6 +91,7 @@ impl Rules {
             attributes,
             rgb,
             rgb_as_bytes: false,
+            compare_positions: true,
             lattice,
             stored: None,
             lattice_offset,
@@ -112,9 +118,19 @@ impl Rules {
     /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
     #[inline]
     pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
+        if !self.compare_positions {
+            return (0, 0);
+        }
         let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
         (steps.round() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
     }
+}
+
+/// The grey of `v` among values from `lo` to `hi`.
+pub(crate) fn grey(v: u64, [lo, hi]: [u64; 2]) -> u64 {
+    let span = hi.saturating_sub(lo);
+    let scaled = (v.min(hi).saturating_sub(lo)).saturating_mul(255).saturating_add(span / 2);
+    scaled.checked_div(span).unwrap_or(255)
 }
 
 fn constants(dropped: &Value) -> Vec<(String, Vec<f64>)> {
