@@ -17,6 +17,7 @@ mod work;
 
 use pointmill_format::batches::{Layout, Precision, f32_above, f32_below};
 
+use crate::budget::MAX_CHUNK_POINTS;
 use crate::convert::Run;
 use crate::error::ConvertError;
 use crate::gather::Store;
@@ -45,7 +46,7 @@ pub(crate) fn write(
     staged: &StagedDataset,
 ) -> Result<OutputReport, ConvertError> {
     let points = run.gathered.stats.points;
-    let most = run.budget.task_points(bytes_per_point(run.job.schema.stride));
+    let most = run.budget.task_points(bytes_per_point(run.job.schema.stride), MAX_CHUNK_POINTS);
     let share = points / (run.plan.threads.max(1) as u64 * TASKS_PER_THREAD);
     write_tasks(run, settings, staged, share.max(LEAST_TASK_POINTS).min(most))
 }
