@@ -46,7 +46,7 @@ pub(crate) fn write(
     staged: &StagedDataset,
 ) -> Result<OutputReport, ConvertError> {
     let points = run.gathered.stats.points;
-    let most = run.budget.points_of_a_task(bytes_per_point(run.job.schema.stride)).min(MOST_TASK_POINTS);
+    let most = run.budget.task_points(bytes_per_point(run.job.schema.stride), MOST_TASK_POINTS);
     let share = points / (run.plan.threads.max(1) as u64 * TASKS_PER_THREAD);
     write_tasks(run, settings, staged, share.max(LEAST_TASK_POINTS).min(most))
 }
@@ -65,7 +65,7 @@ fn write_tasks(
     let layout = Layout::new(points, &attributes, planes_at_most(&frame, settings.planes)).map_err(refused)?;
     let tasks = buckets::tasks(run, &frame, task_points)?;
     for task in &tasks {
-        run.budget.check_one_place(task.points, bytes_per_point(run.job.schema.stride))?;
+        run.budget.check_task(task.points, task_points, bytes_per_point(run.job.schema.stride))?;
     }
     let (file, path) = staged.create(FILE)?;
     // what is compressed is written raw first, elsewhere

@@ -6,6 +6,7 @@ use super::batch_records::Box32;
 use super::blocks::{Cache, Column};
 use super::bytes::u32_at;
 use super::formulas::{BATCH, decode, distance_squared, morton, power};
+use super::header::Header;
 use super::originals::Entry;
 use super::positions::{Axis, Recovered};
 use super::walk::Task;
@@ -124,6 +125,20 @@ impl Points {
         points
     }
 
+    /// The points of a batch whose lattice integers are known, in storage order, from the sources.
+    pub(crate) fn known(raw: &Raw, axes: &[Axis; 3], bits: u32, known: &[[i64; 3]]) -> Self {
+        let fits = |i: usize, a: usize| axes[a].top(known[i][a]) == raw.q(i, a as u32) >> (30 - bits);
+        let foreign = |i: &usize| (0..3).any(|a| !fits(*i, a));
+        let count = (0..known.len()).filter(foreign).count() as u64;
+        Self {
+            x: [0, 1, 2].map(|a| known.iter().map(|x| x[a]).collect()),
+            r: [0, 1, 2].map(|a| known.iter().map(|x| axes[a].relative(x[a])).collect()),
+            ambiguous: vec![false; known.len()],
+            ambiguous_axis: [false; 3],
+            foreign: (0..known.len()).find(foreign).map(|first| (count, first)),
+        }
+    }
+
     /// Lattice integers of point `i`.
     pub(crate) fn lattice(&self, i: usize) -> [i64; 3] {
         [self.x[0][i], self.x[1][i], self.x[2][i]]
@@ -141,6 +156,11 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
+    /// The grid of a file.
+    pub(crate) fn new(header: &Header) -> Self {
+        Self { cell: header.cell, exponent: header.exponent(), bits: header.morton_bits() }
+    }
+
     /// The Morton code of a position relative to the origin.
     #[inline]
     pub(crate) fn code(&self, r: [f64; 3]) -> u128 {

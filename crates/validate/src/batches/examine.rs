@@ -4,7 +4,7 @@ use super::batch::{Grid, Points, Raw};
 use super::boxes;
 use super::description::{Colour, Description};
 use super::figures::Errors;
-use super::formulas::power;
+use super::formulas::{BATCH, power};
 use super::order::Key;
 use super::positions::Axis;
 use super::walk::Task;
@@ -48,10 +48,10 @@ pub(crate) struct Seen {
 
 /// Examines a batch.
 pub(crate) fn examine(task: &Task<'_>, raw: &Raw) -> (Seen, Points) {
-    let grid = Grid { cell: task.header.cell, exponent: task.header.exponent(), bits: task.header.morton_bits() };
+    let grid = Grid::new(task.header);
     let bits = task.header.bits();
     let axes = axes(task, raw);
-    let points = Points::new(raw, &axes, bits);
+    let points = points_of(task, raw, &axes);
     plane_words(task, raw);
     quantisation(task, raw, &points);
     boxes::check(raw, &points, bits, task.findings);
@@ -92,6 +92,15 @@ pub(crate) fn examine(task: &Task<'_>, raw: &Raw) -> (Seen, Points) {
     (seen, points)
 }
 
+/// The points of a batch: from the sources, or from its planes.
+pub(crate) fn points_of(task: &Task<'_>, raw: &Raw, axes: &[Axis; 3]) -> Points {
+    let first = (BATCH * raw.number) as usize;
+    match task.known.and_then(|known| known.get(first..first + raw.len())) {
+        Some(known) => Points::known(raw, axes, task.header.bits(), known),
+        None => Points::new(raw, axes, task.header.bits()),
+    }
+}
+
 /// How q becomes positions in this batch.
 pub(crate) fn axes(task: &Task<'_>, raw: &Raw) -> [Axis; 3] {
     let (lattice, header) = (&task.description.lattice, task.header);
@@ -121,7 +130,8 @@ fn quantisation(task: &Task<'_>, raw: &Raw, points: &Points) {
     task.findings.checked(Check::Quantisation, raw.len() as u64);
     if let Some((count, first)) = points.foreign {
         let q = [0, 1, 2].map(|axis| format!("{:#010x}", raw.q(first, axis)));
-        let expected = format!("what a lattice point encodes to; the nearest is {:?}", points.lattice(first));
+        let whose = if task.known.is_some() { "the source's point" } else { "a lattice point; the nearest is" };
+        let expected = format!("the code of {whose} {:?}", points.lattice(first));
         points_finding(task, raw, Check::Quantisation, "q", count, first, [expected, q.join(" ")]);
     }
 }
@@ -221,7 +231,7 @@ fn order(task: &Task<'_>, raw: &Raw, points: &Points, codes: &[u128], key: &dyn 
 }
 
 /// Errors of all points by planes and axis; none may be above half a cell and the rounding of §5.
-fn errors(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[super::positions::Axis; 3]) -> Errors {
+fn errors(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[Axis; 3]) -> Errors {
     let mut errors = Errors::default();
     if points.ambiguous.contains(&true) {
         return errors;

@@ -3,8 +3,9 @@
 //! # How positions are known
 //! A file holds cells, not points. Where the planes tell the lattice integers X apart (a cell is finer than a step, or
 //! holds one lattice point alone), everything of the page is recomputed from X and compared exactly: q, boxes, order,
-//! candidates, error figures. Where they do not, because planes were left out or the step is very fine, what is certain
-//! is checked all the same (boxes and order to within a cell), and the report says what was not.
+//! candidates, error figures. Where they do not, because planes were left out or the step is very fine, X comes from the
+//! sources, if they are given and fit into memory ([`known`]). Else what is certain is checked all the same (boxes and
+//! order to within a cell), and the report says what was not.
 //!
 //! # Tolerances
 //! * rms of errors: 10⁻⁹, relative. Everything else about known positions: none.
@@ -23,6 +24,7 @@ mod examine;
 mod figures;
 mod formulas;
 mod header;
+mod known;
 mod levels;
 mod order;
 mod originals;
@@ -45,6 +47,7 @@ use batch_records::Box32;
 use bytes::Bytes;
 use description::{Colour, Description};
 use header::Header;
+use known::Unknown;
 use positions::Axis;
 use records::Records;
 use walk::{Task, Walked, walk};
@@ -72,11 +75,22 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         true => originals::read(&bytes, &header, sections.originals, &findings)?,
         false => None,
     };
-    let positions = lattice_is_told(&header, &description, &boxes, &findings);
-    let against = match options.against.as_slice() {
+    let told = lattice_is_told(&header, &description, &boxes, &findings);
+    let mut against = match options.against.as_slice() {
         [] => None,
-        paths => Some(Against::open(paths, &options.open, records::rules(&header, &description, positions))?),
+        paths => Some(Against::open(paths, &options.open, records::rules(&header, &description))?),
     };
+    let mut known = None;
+    let mut unknown = None;
+    if let (false, Some(against)) = (told, &mut against) {
+        match known::positions(&header, &description.lattice, against, options.memory_bytes, progress)? {
+            Ok(positions) => known = Some(positions),
+            Err(why) => {
+                against.sums.ignore_positions();
+                unknown = Some(why);
+            }
+        }
+    }
     let columns = batch::columns(&sections);
     blocks::require_memory(&bytes, &header, &columns)?;
     let task = Task {
@@ -86,6 +100,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         boxes: &boxes,
         columns: &columns,
         originals: originals.as_ref(),
+        known: known.as_deref(),
         findings: &findings,
         sums: against.as_ref().map(|a| &a.sums),
         progress,
@@ -94,7 +109,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
     let walked = walk(&task)?;
     conclude(&task, &walked);
     let summary = match &against {
-        Some(against) => compare(&task, against, &walked, positions, options)?,
+        Some(against) => compare(&task, against, &walked, unknown.as_ref(), options)?,
         None => {
             findings.skip(Check::Against, "no sources were given");
             None
@@ -193,7 +208,7 @@ fn compare(
     task: &Task<'_>,
     against: &Against,
     walked: &Walked,
-    positions: bool,
+    unknown: Option<&Unknown>,
     options: &Options,
 ) -> Result<Option<AgainstSummary>, ReadError> {
     let findings = task.findings;
@@ -205,14 +220,14 @@ fn compare(
         Context { records: &Records { task }, findings, progress: task.progress, memory_bytes: options.memory_bytes };
     let summary = against.compare(&context)?;
     let mut parts = Vec::new();
-    if !positions {
-        parts.push("positions, which the planes do not tell exactly");
+    if let Some(unknown) = unknown {
+        parts.push(format!("positions, {}", unknown.why()));
     }
     if task.header.averaged() && task.originals.is_none() {
-        parts.push("colours, whose originals are absent");
+        parts.push("colours, whose originals are absent".to_owned());
     }
     if task.description.colour == Colour::Intensity && task.description.intensity_range.is_none() {
-        parts.push("greys, whose range is not told");
+        parts.push("greys, whose range is not told".to_owned());
     }
     if !parts.is_empty() {
         findings.note(Check::Against, format!("counts and attributes, without {}", parts.join(" and ")));

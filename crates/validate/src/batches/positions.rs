@@ -67,7 +67,7 @@ impl Axis {
 
     /// The top bits of q of X.
     #[inline]
-    fn top(&self, x: i64) -> u32 {
+    pub(crate) fn top(&self, x: i64) -> u32 {
         encode(self.relative(x), self.m, self.s) >> (30 - self.bits)
     }
 

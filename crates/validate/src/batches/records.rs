@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::batch::{Points, Raw};
 use super::blocks::{Cache, Reported};
 use super::description::{Colour, Description};
-use super::examine::axes;
+use super::examine::{axes, points_of};
 use super::header::Header;
 use super::walk::{Task, slot_of, window_batches};
 use crate::against::block::{BLOCK_POINTS, Block};
@@ -16,7 +16,7 @@ use crate::finding::Findings;
 use crate::place::Place;
 
 /// What is compared: extra attributes, then what colours come from, if they are known.
-pub(crate) fn rules(header: &Header, description: &Description, positions: bool) -> Rules {
+pub(crate) fn rules(header: &Header, description: &Description) -> Rules {
     let mut attributes: Vec<Attribute> = description.attributes.iter().map(|e| e.attribute.clone()).collect();
     let known = !header.averaged() || header.originals();
     let colour = match description.colour {
@@ -32,7 +32,6 @@ pub(crate) fn rules(header: &Header, description: &Description, positions: bool)
     rules.rgb_as_bytes = true;
     // not an extra attribute of that name
     rules.rgb = colour.as_ref().filter(|(a, _)| a.elements == 3).map(|_| rules.attributes.len() - 1);
-    rules.compare_positions = positions;
     if let (Some((_, conversion)), Some(last)) = (colour, rules.conversions.last_mut()) {
         *last = conversion;
     }
@@ -58,7 +57,7 @@ impl against::Records for Records<'_> {
             cache.prepare(task.bytes, task.header, task.columns, &numbers, &reported)?;
             slots.par_iter().try_for_each_init(Block::default, |block, &(number, slot)| {
                 let Some(raw) = Raw::read(task, &cache, number, slot)? else { return Ok(()) };
-                let points = Points::new(&raw, &axes(task, &raw), task.header.bits());
+                let points = points_of(task, &raw, &axes(task, &raw));
                 let colours = original_colours(&raw);
                 let place = Place::Batch(number as u32);
                 fill(&raw, &points, &colours, rules, block, &mut |block| work(block, place));

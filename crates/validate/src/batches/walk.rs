@@ -35,6 +35,8 @@ pub(crate) struct Task<'a> {
     pub(crate) columns: &'a [&'a Column],
     /// If they can be used.
     pub(crate) originals: Option<&'a Originals>,
+    /// Lattice integers of all points in Morton order, from the sources, where the planes do not tell them.
+    pub(crate) known: Option<&'a [[i64; 3]]>,
     pub(crate) findings: &'a Findings,
     pub(crate) sums: Option<&'a Sums>,
     pub(crate) progress: &'a ProgressFn<'a>,

@@ -2,7 +2,7 @@
 
 use pointmill_validate::{Check, Outcome};
 
-use super::cloud::{Cloud, assert_only, check_with, terrain};
+use super::cloud::{Cloud, assert_only, broken, check_with, terrain};
 
 /// The points as a PLY file.
 fn ply(cloud: &Cloud, with_colour: bool) -> Vec<u8> {
@@ -87,12 +87,39 @@ fn a_missing_a_moved_and_a_recoloured_point_are_named() {
 }
 
 #[test]
-fn what_coarse_planes_do_not_tell_is_not_compared_and_said() {
+fn what_coarse_planes_do_not_tell_comes_from_the_sources() {
     let cloud = Cloud { planes: 1, ..terrain() };
     let outcome = compare(&cloud, &cloud);
     assert!(outcome.ok, "{:#?}", outcome.problems);
-    assert!(outcome.check(Check::Against).unwrap().skipped.as_ref().unwrap().contains("positions"));
+    for check in &outcome.checks {
+        assert_eq!(check.skipped.is_some(), check.name == Check::Blocks, "{check}");
+    }
+
+    let mut source = cloud.clone();
+    source.points[11].x[0] += 200;
+    assert!(broken(&compare(&cloud, &source)).contains(&Check::Quantisation));
     let mut source = cloud.clone();
     source.points[12].class ^= 1;
-    assert!(!compare(&cloud, &source).check(Check::Against).unwrap().ok);
+    assert!(broken(&compare(&cloud, &source)).contains(&Check::Against));
+
+    let mut parts = cloud.parts();
+    let at = (0..parts.points).find(|at| parts.level(*at) == 1).unwrap();
+    parts.colours[at] ^= 4;
+    let outcome = check_with(&parts.bytes().0, &[("source.ply", ply(&cloud, true))]);
+    assert_only_errors(&outcome, Check::Colours);
+}
+
+#[test]
+fn positions_that_cannot_be_had_are_not_compared_and_it_is_said() {
+    let cloud = Cloud { planes: 1, ..terrain() };
+    let mut source = cloud.clone();
+    source.points.pop();
+    let outcome = compare(&cloud, &source);
+    let against = outcome.check(Check::Against).unwrap();
+    assert!(!against.ok && against.skipped.as_ref().unwrap().contains("another number of points"), "{against}");
+}
+
+/// All errors are of one check; warnings are not looked at.
+fn assert_only_errors(outcome: &Outcome, check: Check) {
+    assert_eq!(broken(outcome), [check], "{:#?}", outcome.problems);
 }
