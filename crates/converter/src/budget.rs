@@ -11,10 +11,7 @@ const FIXED_BYTES: u64 = 40 << 20;
 const THREAD_BYTES: u64 = 28 << 20;
 
 /// Larger chunks gain nothing: they leave the caches and the threads uneven.
-const MAX_CHUNK_POINTS: u64 = 400_000;
-
-/// Tasks of this size keep all threads busy to the end, and few cells are cut above them.
-const MAX_TASK_POINTS: u64 = 2_000_000;
+pub(crate) const MAX_CHUNK_POINTS: u64 = 400_000;
 
 /// Chunks that may be finished before the oldest unfinished one, per thread.
 const AHEAD_PER_THREAD: usize = 2;
@@ -32,7 +29,8 @@ pub(crate) struct Budget {
     fixed_bytes: u64,
     bytes_per_chunk_point: u64,
     ceiling: u64,
-    max_task_points: u64,
+    /// For tests.
+    asked_task_points: Option<u64>,
 }
 
 impl Budget {
@@ -57,25 +55,16 @@ impl Budget {
         let free = usable - fixed_bytes;
         let chunk_points =
             (free / 2 / threads / bytes_per_chunk_point).clamp(least_chunk, MAX_CHUNK_POINTS.max(least_chunk));
-        let max_task_points = plan.task_points.unwrap_or(MAX_TASK_POINTS).max(1);
         let store_bytes = free - threads * chunk_points * bytes_per_chunk_point;
-        Ok(Self { store_bytes, chunk_points, window, fixed_bytes, bytes_per_chunk_point, ceiling, max_task_points })
-    }
-
-    /// Points that a thread may hold at once, at `bytes_per_point` each: its share of the memory, whatever an octree's
-    /// chunk would take.
-    pub(crate) fn points_of_a_task(&self, bytes_per_point: u64) -> u64 {
-        (self.chunk_points * self.bytes_per_chunk_point / bytes_per_point).min(self.max_task_points)
-    }
-
-    /// Refuses points of one place, which cannot be divided, if they do not fit.
-    pub(crate) fn check_one_place(&self, points: u64, bytes_per_point: u64) -> Result<(), ConvertError> {
-        let needed = self.fixed_bytes + points.saturating_mul(bytes_per_point);
-        if points > self.points_of_a_task(bytes_per_point) && needed > self.ceiling {
-            let why = format!("{points} points share one place and must be put in order together");
-            return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why });
-        }
-        Ok(())
+        Ok(Self {
+            store_bytes,
+            chunk_points,
+            window,
+            fixed_bytes,
+            bytes_per_chunk_point,
+            ceiling,
+            asked_task_points: plan.task_points,
+        })
     }
 
     /// Refuses a chunk that cannot be divided and does not fit.
@@ -88,9 +77,10 @@ impl Budget {
         Ok(())
     }
 
-    /// Points of a task with so many bytes a point: what chunks may use, for them.
-    pub(crate) fn task_points(&self, bytes_per_point: u64) -> u64 {
-        (self.chunk_points * self.bytes_per_chunk_point / bytes_per_point).min(MAX_CHUNK_POINTS)
+    /// Points of a task with so many bytes a point: what chunks may use, for them, and at most `at_most`.
+    pub(crate) fn task_points(&self, bytes_per_point: u64, at_most: u64) -> u64 {
+        let at_most = self.asked_task_points.unwrap_or(at_most).max(1);
+        (self.chunk_points * self.bytes_per_chunk_point / bytes_per_point).min(at_most)
     }
 
     /// Refuses a task that is larger than others because it cannot be divided, and does not fit.

@@ -133,10 +133,12 @@ impl Content {
         }
     }
 
-    /// Range of the intensities that grey stands for.
-    pub(super) fn intensity_range(&self) -> Option<[f64; 2]> {
+    /// Range of the integers that grey stands for.
+    pub(super) fn intensity_range(&self) -> Option<[u64; 2]> {
         match self.colour {
-            Colour::Intensity { least, greatest, .. } => Some([least, greatest]),
+            Colour::Intensity { ty, least, greatest, .. } if ty != AttributeType::Float32 => {
+                Some([least as u64, greatest as u64])
+            }
             _ => None,
         }
     }

@@ -33,10 +33,11 @@ use task::{Outcome, Worker, Workshop, bytes_per_point};
 /// The file of the dataset.
 const FILE: &str = "points.qbatch";
 
-/// Tasks a thread, so that threads end together. Fewer points than these make a task of their own only if there are no
-/// more: what is shared between tasks costs more than it brings.
+/// Tasks a thread, so that threads end together; their sizes. Small ones share too much with each other, large ones leave
+/// the caches.
 const TASKS_PER_THREAD: u64 = 6;
-const LEAST_TASK_POINTS: u64 = if cfg!(test) { 100 } else { 50_000 };
+const MOST_TASK_POINTS: u64 = 800_000;
+const LEAST_TASK_POINTS: u64 = 50_000;
 
 /// Builds and writes the dataset.
 pub(crate) fn write(
@@ -45,7 +46,7 @@ pub(crate) fn write(
     staged: &StagedDataset,
 ) -> Result<OutputReport, ConvertError> {
     let points = run.gathered.stats.points;
-    let most = run.budget.task_points(bytes_per_point(run.job.schema.stride));
+    let most = run.budget.task_points(bytes_per_point(run.job.schema.stride), MOST_TASK_POINTS);
     let share = points / (run.plan.threads.max(1) as u64 * TASKS_PER_THREAD);
     write_tasks(run, settings, staged, share.max(LEAST_TASK_POINTS).min(most))
 }

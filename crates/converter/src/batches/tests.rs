@@ -5,7 +5,8 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use pointmill_format::batches::{
-    AlignedBytes, Batches, Cloud, Description, Header, WriteOptions, Written, colour_word, compress, eight_bit, write,
+    AlignedBytes, Batches, Cloud, ColourSource, Description, Header, WriteOptions, Written, colour_word, compress,
+    eight_bit, write,
 };
 use pointmill_format::{Attribute, AttributeType, Lattice};
 
@@ -155,22 +156,24 @@ fn cell(side: f64) -> BatchesSettings {
     BatchesSettings { lod_cell: Some(side), ..BatchesSettings::default() }
 }
 
-/// Converts with several numbers of threads, and so sizes of tasks, and compares with the plain writer.
+/// Converts with several numbers of threads and sizes of tasks, and compares with the plain writer.
 fn check(what: &str, scan: &Scan, settings: BatchesSettings) {
     let bench = Bench::new(&[scan]);
-    for (threads, extras) in [(1, false), (2, true), (3, true), (64, true)] {
+    let points = scan.positions.len() as u64;
+    for (threads, task_points, extras) in [(1, points, false), (2, points / 3, true), (3, 1_000, true), (4, 130, true)]
+    {
         let mut plan = bench.plan(settings);
         plan.threads = threads;
-        plan.memory_bytes = 8 << 30;
+        plan.task_points = Some(task_points);
         if extras {
             plan.attributes = AttributeChoice::List(vec!["intensity".into(), "rgb".into(), "classification".into()]);
         }
         let (ours, report) = bench.convert(&plan).unwrap();
         let (expected, written) = scan.reference(&ours, extras);
-        assert_same(&ours, &expected, &format!("{what}, {threads} threads"));
+        assert_same(&ours, &expected, &format!("{what}, {threads} threads, tasks of {task_points} points"));
         let details = &report.outputs[0].details;
         assert_eq!(details["lod_points"], serde_json::json!(written.lod_points), "{what}");
-        assert_eq!((report.outputs[0].points, report.outputs[0].bytes), (scan.positions.len() as u64, written.bytes));
+        assert_eq!((report.outputs[0].points, report.outputs[0].bytes), (points, written.bytes));
         assert_eq!(report.checksum_in, report.checksum_out);
     }
 }
@@ -261,7 +264,9 @@ fn neither_memory_nor_the_order_of_inputs_shows() {
         part.values = scan.values.iter().skip(k).step_by(3).rev().copied().collect();
     }
     let bench = Bench::new(&[&parts[2], &parts[0], &parts[1]]);
-    let (joined, _) = bench.convert(&bench.plan(cell(1.0))).unwrap();
+    let mut plan = bench.plan(cell(1.0));
+    plan.task_points = Some(9_999);
+    let (joined, _) = bench.convert(&plan).unwrap();
     assert_same(&joined, &expected, "three files");
 }
 
@@ -281,6 +286,32 @@ fn colours_of_eight_bits_keep_their_values_also_beside_others() {
     let (widened, report) = ours(&wide);
     assert!(report.warnings.iter().any(|w| w.contains("16 bits")), "{:?}", report.warnings);
     assert_same(&narrow, &widened, "the same colours");
+}
+
+#[test]
+fn without_colour_grey_shows_the_intensity_and_its_range_is_told() {
+    let bench = Bench::new(&[]);
+    let points: Vec<String> = (0..300).map(|i| format!("{} {} 0 {}", i % 20, i / 20, 1000 + i)).collect();
+    let (path, head) = (bench.dir.path().join("a.xyz"), "x y z intensity");
+    fs::write(&path, format!("{head}\n{}\n", points.join("\n"))).unwrap();
+    let mut plan = bench.plan(cell(100.0));
+    plan.inputs = vec![path.clone()];
+    let (ours, report) = bench.convert(&plan).unwrap();
+    let ours = Batches::open_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
+    let description = ours.description();
+    assert_eq!(description.colour, ColourSource::Intensity);
+    assert_eq!(description.extra["intensityRange"], serde_json::json!([1000, 1299]));
+    assert!(report.warnings.iter().any(|w| w.contains("grey shows the intensity, 1000 to 1299")));
+    assert_eq!(report.attributes, ["position"]);
+    let words = ours.colour().unwrap();
+    let of_lod_3: Vec<u32> = words.iter().filter(|w| **w >> 24 == 3).map(|w| w & 0xff).collect();
+    assert!(words.iter().all(|w| w & 0xff == w >> 8 & 0xff));
+    assert!(of_lod_3.len() > 250 && of_lod_3.iter().max() >= Some(&254), "{of_lod_3:?}");
+
+    fs::write(&path, "0 0 0\n1 1 1\n").unwrap();
+    let (ours, _) = bench.convert(&plan).unwrap();
+    let ours = Batches::open_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
+    assert!(ours.colour().unwrap().iter().all(|w| w & 0xff_ffff == 0xff_ffff));
 }
 
 #[test]

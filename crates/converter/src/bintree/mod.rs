@@ -36,6 +36,9 @@ use crate::plan::BintreeSettings;
 use crate::report::{OutputReport, TreeReport};
 use crate::write::dataset::StagedDataset;
 
+/// Tasks of this size keep all threads busy to the end, and few cells are cut above them.
+const MAX_TASK_POINTS: u64 = 2_000_000;
+
 /// Builds and writes the dataset.
 pub(crate) fn write(
     run: &Run<'_>,
@@ -44,9 +47,10 @@ pub(crate) fn write(
 ) -> Result<OutputReport, ConvertError> {
     let columns = Columns::choose(run)?;
     let bytes_per_point = Builder::bytes_per_point(run.job.schema.stride);
-    let upper = upper::split(run, settings, run.budget.points_of_a_task(bytes_per_point))?;
+    let task_points = run.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
+    let upper = upper::split(run, settings, task_points)?;
     for task in &upper.tasks {
-        run.budget.check_one_place(task.points(), bytes_per_point)?;
+        run.budget.check_task(task.points(), task_points, bytes_per_point)?;
     }
     let leaves = Leaves::new(settings.layout, columns.record.stride(), staged)?;
     let built = build(run, settings, &columns, &upper, &leaves)?;
