@@ -276,6 +276,23 @@ fn buffers_that_are_not_aligned_are_refused_with_advice() {
 }
 
 #[test]
+fn iterating_undoes_the_swap_and_storage_order_does_not() {
+    let cloud = Points::random(18, 6 * 10_240 + 1, [9_000; 3], false, MILLIMETRES);
+    let (bytes, _) = cloud.write(&WriteOptions { precision: Some(Precision::Thirty), ..cloud.options(1.0) });
+    let batches = open(&bytes).unwrap();
+    let grid = batches.header().grid;
+    let mut points: Vec<_> = batches.points_in_morton_order(Precision::Thirty).map(Result::unwrap).collect();
+    let code = |world: [f64; 3]| {
+        let lattice_point = cloud.lattice.world(std::array::from_fn(|a| cloud.lattice.quantize(a, world[a])));
+        grid.morton_code(grid.cells(grid.relative(lattice_point)))
+    };
+    assert!(points.is_sorted_by_key(|p| code(p.world)));
+    points.sort_by_key(|p| p.index);
+    assert!(points.iter().enumerate().all(|(i, p)| p.index as usize == i), "every index once");
+    assert!(!points.is_sorted_by_key(|p| code(p.world)));
+}
+
+#[test]
 fn grids_of_the_reader_and_of_the_writer_are_one() {
     let cloud = Points::random(17, 100, [9_000; 3], false, MILLIMETRES);
     let (bytes, written) = cloud.write(&cloud.options(0.3));
