@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use pointmill_format::{
-    MAX_BATCH_POINTS, PointBatch, Positions, ReadError, Scan, ScanKind, Scratch, Wanted, with_column,
+    MAX_BATCH_POINTS, PointBatch, Positions, ReadError, Scan, ScanInfo, ScanKind, Scratch, Wanted, with_column,
 };
 
 /// Points that are decoded of one input: a few bytes may honestly stand for many points.
@@ -21,15 +21,23 @@ pub type Open = fn(&Path) -> Result<Box<dyn Scan>, ReadError>;
 /// pieces' points come or an error does, the positions do not depend on which columns are wanted, and an error is one
 /// line.
 pub fn read(bytes: &[u8], open: Open) {
+    read_some(bytes, open, |info| Wanted::all(info));
+}
+
+/// [`read`], where `wanted` chooses the columns.
+///
+/// # Panics
+/// As [`read`].
+pub fn read_some(bytes: &[u8], open: Open, wanted: fn(&ScanInfo) -> Wanted) {
     let path = write(bytes);
     let _ = ScanKind::of(&bytes[..bytes.len().min(4096)]);
     match open(path) {
-        Ok(scan) => check(&*scan),
+        Ok(scan) => check(&*scan, &wanted(scan.info())),
         Err(error) => check_error(&error),
     }
 }
 
-fn check(scan: &dyn Scan) {
+fn check(scan: &dyn Scan, wanted: &Wanted) {
     let info = scan.info();
     let (mut next, mut total) = (0, 0);
     for piece in scan.pieces() {
@@ -44,7 +52,7 @@ fn check(scan: &dyn Scan) {
             break;
         }
         total += piece.points;
-        let all = decode(scan, i, &Wanted::all(info), &mut scratch);
+        let all = decode(scan, i, wanted, &mut scratch);
         let positions = decode(scan, i, &Wanted::positions(info), &mut scratch);
         if let (Ok(all), Ok(positions)) = (&all, &positions) {
             assert_eq!(all, positions, "positions depend on what else is wanted");

@@ -3,6 +3,7 @@
 mod arguments;
 mod bad_input;
 mod bad_output;
+mod batches;
 mod cut_short;
 mod hostile;
 mod inputs;

@@ -55,11 +55,11 @@ fn las(points: &[Point]) -> Vec<u8> {
     put(96, &227u32.to_le_bytes());
     put(104, &[2, 26, 0]);
     put(107, &(points.len() as u32).to_le_bytes());
-    for axis in 0..3 {
+    for (axis, zero) in offset.iter().enumerate() {
         let at = |p: &Point| p.mm[axis];
         let ends = [points.iter().map(at).max().unwrap(), points.iter().map(at).min().unwrap()];
         put(131 + 8 * axis, &0.001f64.to_le_bytes());
-        put(155 + 8 * axis, &(offset[axis] as f64).to_le_bytes());
+        put(155 + 8 * axis, &(*zero as f64).to_le_bytes());
         ends.iter().enumerate().for_each(|(i, v)| put(179 + 16 * axis + 8 * i, &(*v as f64 / 1000.0).to_le_bytes()));
     }
     for p in points {

@@ -88,6 +88,21 @@ impl Budget {
         Ok(())
     }
 
+    /// Points of a task with so many bytes a point: what chunks may use, for them.
+    pub(crate) fn task_points(&self, bytes_per_point: u64) -> u64 {
+        (self.chunk_points * self.bytes_per_chunk_point / bytes_per_point).min(MAX_CHUNK_POINTS)
+    }
+
+    /// Refuses a task that is larger than others because it cannot be divided, and does not fit.
+    pub(crate) fn check_task(&self, points: u64, usual_points: u64, bytes_per_point: u64) -> Result<(), ConvertError> {
+        let needed = self.fixed_bytes + points.saturating_mul(bytes_per_point);
+        if points > usual_points && needed > self.ceiling {
+            let why = format!("{points} points share one cell of the order and must be sorted together");
+            return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why });
+        }
+        Ok(())
+    }
+
     /// Highest resident set of a run over `points` points of `stride` bytes, estimated.
     pub(crate) fn estimate_peak(&self, points: u64, stride: usize) -> u64 {
         let data = points.saturating_mul(stride as u64);

@@ -129,6 +129,27 @@ impl Cube {
         }
     }
 
+    /// A box of the lattice that holds every point of a node: exact with equal scales, else a step wider.
+    pub(crate) fn bounds_of(&self, node: NodeKey) -> LatticeBounds {
+        let level = u32::from(node.level);
+        let mut bounds = LatticeBounds::EMPTY;
+        for (a, cell) in [node.x, node.y, node.z].into_iter().enumerate() {
+            let [first, end] = [cell, cell + 1].map(|c| u64::from(c) << (TREE_BITS - level));
+            let (min, max) = match self.step {
+                Step::Shift(shift) => (first >> shift, (end - 1) >> shift),
+                Step::Factor(factor) => {
+                    let step = |t: u64| ((u128::from(t) << 64) / factor[a].max(1)).min(1 << TREE_BITS) as u64;
+                    // what lies beyond the last tree coordinate counts as on it
+                    let max = if end >> TREE_BITS > 0 { u64::from(u32::MAX) } else { step(end) + 1 };
+                    (step(first).saturating_sub(1), max)
+                }
+            };
+            bounds.min[a] = self.min[a].saturating_add_unsigned(min);
+            bounds.max[a] = self.min[a].saturating_add_unsigned(max);
+        }
+        bounds
+    }
+
     /// True if lattice integers shifted by a power of two are cells of the octree (equal scales).
     pub(crate) fn is_aligned(&self) -> bool {
         matches!(self.step, Step::Shift(_))
@@ -210,6 +231,28 @@ mod tests {
         let half = f64::from(1u32 << 30);
         assert!((f64::from(t[2]) / half / 2.0 * cube.side - (bounds.max[2] - cube.min[2]) as f64 * 0.01).abs() < 1e-6);
         assert!((f64::from(t[0]) / half / 2.0 * cube.side - 0.01).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_box_of_a_node_holds_its_points() {
+        let bounds =
+            LatticeBounds { min: [-1_220_000_000, 450_000_000, 0], max: [-1_219_900_000, 450_100_000, 30_000] };
+        for scale in [[1e-7, 1e-7, 0.01], [0.01; 3], [0.3, 0.001, 7.0]] {
+            let Ok(cube) = Cube::around(&bounds, &lattice(scale)) else { continue };
+            let mut state = 1u64;
+            for _ in 0..2000 {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1442);
+                let q: [i64; 3] = std::array::from_fn(|a| {
+                    let range = bounds.max[a] - bounds.min[a] + 1;
+                    bounds.min[a] + (state >> (8 * a + 3)) as i64 % range
+                });
+                for level in [0u8, 4, 9] {
+                    let [x, y, z] = cube.tree(q).map(|t| t >> (TREE_BITS - u32::from(level)));
+                    let b = cube.bounds_of(NodeKey { level, x, y, z });
+                    assert!((0..3).all(|a| b.min[a] <= q[a] && q[a] <= b.max[a]), "{scale:?} {level} {q:?} {b:?}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What the headers say, put together: open inputs, one lattice, one schema.
 
-use pointmill_format::{Aabb, ErrorKind, Lattice, ReadError, Scan, Wanted, open_scan};
+use pointmill_format::{Aabb, ErrorKind, Lattice, ReadError, Resolution, Scan, Wanted, open_scan};
 
 use crate::axis::{AxisMap, SourceMap};
 use crate::error::ConvertError;
@@ -135,6 +135,16 @@ impl Job {
         for source in &mut self.sources {
             source.map = SourceMap::new(source.scan.info().lattice.as_ref(), &self.lattice);
         }
+    }
+
+    /// Least step of the coordinates of the sources, world units; that of the job where a source does not tell.
+    pub(crate) fn source_step(&self) -> [f64; 3] {
+        let step = |source: &Source, a: usize| match (source.scan.info().lattice, source.scan.info().resolution) {
+            (Some(lattice), _) => lattice.scale[a],
+            (None, Resolution::Step(step)) => step,
+            (None, Resolution::Single | Resolution::Double) => self.lattice.scale[a],
+        };
+        std::array::from_fn(|a| self.sources.iter().map(|s| step(s, a)).fold(f64::INFINITY, f64::min))
     }
 
     /// True if the extent of the cloud decided the step.

@@ -37,6 +37,19 @@ pub enum Check {
     Sides,
     Degenerate,
     Against,
+    Header,
+    Sections,
+    Description,
+    BatchRecords,
+    Blocks,
+    PlaneWords,
+    Quantisation,
+    BatchBoxes,
+    StorageOrder,
+    Levels,
+    Colours,
+    Originals,
+    Errors,
 }
 
 impl Check {
@@ -72,6 +85,19 @@ impl Check {
         Self::Sides,
         Self::Degenerate,
         Self::Against,
+        Self::Header,
+        Self::Sections,
+        Self::Description,
+        Self::BatchRecords,
+        Self::Blocks,
+        Self::PlaneWords,
+        Self::Quantisation,
+        Self::BatchBoxes,
+        Self::StorageOrder,
+        Self::Levels,
+        Self::Colours,
+        Self::Originals,
+        Self::Errors,
     ];
 
     /// The checks of Potree 2.0.
@@ -113,6 +139,26 @@ impl Check {
         Self::Against,
     ];
 
+    /// The checks of quantised batches.
+    pub(crate) const BATCHES: &[Self] = &[
+        Self::Header,
+        Self::Sections,
+        Self::Description,
+        Self::BatchRecords,
+        Self::Blocks,
+        Self::PlaneWords,
+        Self::Quantisation,
+        Self::BatchBoxes,
+        Self::TightBox,
+        Self::StorageOrder,
+        Self::Levels,
+        Self::Colours,
+        Self::Originals,
+        Self::Errors,
+        Self::AttributeRanges,
+        Self::Against,
+    ];
+
     /// Which of [`Self::ALL`] it is.
     pub(crate) const fn index(self) -> usize {
         self as usize
@@ -151,6 +197,19 @@ impl Check {
             Self::Sides => "sides",
             Self::Degenerate => "degenerate",
             Self::Against => "against",
+            Self::Header => "header",
+            Self::Sections => "sections",
+            Self::Description => "description",
+            Self::BatchRecords => "batch-records",
+            Self::Blocks => "blocks",
+            Self::PlaneWords => "plane-words",
+            Self::Quantisation => "quantisation",
+            Self::BatchBoxes => "batch-boxes",
+            Self::StorageOrder => "order",
+            Self::Levels => "levels",
+            Self::Colours => "colours",
+            Self::Originals => "originals",
+            Self::Errors => "errors",
         }
     }
 
@@ -189,6 +248,21 @@ impl Check {
             Self::Sides => "the low side is at the plane or below, the high side above",
             Self::Degenerate => "points of one place, and no others, are cut by number",
             Self::Against => "every point and attribute of the sources is in the dataset exactly once",
+            Self::Header => "the header is in range and agrees with itself",
+            Self::Sections => {
+                "sections are in order on multiples of 256 bytes, zeros between them, nothing behind them"
+            }
+            Self::Description => "the description is complete and agrees with header and sections",
+            Self::BatchRecords => "batches have the points, the first point and a box that their slot asks for",
+            Self::Blocks => "every compressed block is one zstd frame of exactly its batches",
+            Self::PlaneWords => "bits 30 and 31 of all plane words are 0",
+            Self::Quantisation => "every position is that of a point of the source's lattice, encoded in its box",
+            Self::BatchBoxes => "batch boxes are float32, rounded outwards, and tight on each face",
+            Self::StorageOrder => "points ascend by Morton code, X, Y, Z, colour, attributes once the swap is undone",
+            Self::Levels => "exactly the points nearest to the centres of cells of level 0, 1, 2 have that level",
+            Self::Colours => "points below level 3 show the mean of their cell, greys follow from intensities",
+            Self::Originals => "originals ascend and are those of exactly the points below level 3",
+            Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }
     }
 }

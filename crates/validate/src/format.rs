@@ -46,7 +46,7 @@ impl Format {
         match self {
             Self::Potree2 => Check::POTREE2,
             Self::Bintree => Check::BINTREE,
-            Self::Batches => &[],
+            Self::Batches => Check::BATCHES,
         }
     }
 }

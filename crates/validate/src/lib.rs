@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod against;
+mod batches;
 mod bintree;
 mod check;
 mod finding;
@@ -134,8 +135,6 @@ pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) ->
     pool.install(|| match format {
         Format::Potree2 => potree2::run(&path, options, progress),
         Format::Bintree => bintree::run(&path, options, progress),
-        Format::Batches => {
-            Err(ReadError::unsupported(&path, format!("datasets of the format {format} cannot be validated yet")))
-        }
+        Format::Batches => batches::run(&path, options, progress),
     })
 }

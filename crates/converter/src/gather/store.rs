@@ -68,6 +68,11 @@ impl Store {
         self.spilled.load(Ordering::Relaxed)
     }
 
+    /// Bytes of the memory limit that no block takes up now.
+    pub(crate) fn unused_bytes(&self) -> u64 {
+        self.memory_limit.saturating_sub(self.in_memory.load(Ordering::Relaxed))
+    }
+
     /// The index that the next block will have; it must be added with [`Self::fill`].
     pub(crate) fn open(&self, source: u32) -> Result<u32, ConvertError> {
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;

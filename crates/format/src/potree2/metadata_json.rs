@@ -48,8 +48,12 @@ fn attribute(stats: &AttributeStats) -> String {
     if let Some(histogram) = &stats.histogram {
         field("histogram", &Value::from(histogram.as_slice()));
     }
-    field("min", &numbers(&stats.min));
-    field("max", &numbers(&stats.max));
+    for (name, ends) in [("min", &stats.min), ("max", &stats.max)] {
+        // a reader that finds a range expects a number for each element
+        if !ends.is_empty() {
+            field(name, &numbers(ends));
+        }
+    }
     field("scale", &numbers(&a.scale));
     field("offset", &numbers(&a.offset));
     json.push_str("\n\t\t}");

@@ -233,6 +233,7 @@ fn what_json_cannot_say_is_never_written() {
     made.attributes[4].min = vec![f64::NEG_INFINITY];
     made.attributes[4].max = vec![f64::NAN];
     made.attributes[2].max = vec![-0.0];
+    (made.attributes[1].min, made.attributes[1].max) = (vec![], vec![]); // no range is told: found by fuzzing
     made.lattice.offset = [636_001.76, 0.1 + 0.2, 5e-324];
     made.name = "a \"quoted\" name\\\n\u{1}".into();
     made.projection = "+proj=utm +zone=10".into();

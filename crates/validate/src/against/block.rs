@@ -8,7 +8,7 @@ pub(crate) const BLOCK_POINTS: usize = 4096;
 /// Up to [`BLOCK_POINTS`] records: integer positions on the dataset's lattice, and the bits of every attribute.
 #[derive(Debug, Default)]
 pub(crate) struct Block {
-    /// x, y, z, rounded to the nearest lattice point.
+    /// x, y, z, rounded to the nearest lattice point; or what `Rules::stored` makes of them.
     pub(crate) positions: [Vec<i64>; 3],
     /// The same, rounded towards zero; filled on request.
     pub(crate) truncated: [Vec<i64>; 3],

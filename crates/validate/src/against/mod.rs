@@ -118,6 +118,11 @@ impl Sums {
         &self.rules
     }
 
+    /// Leaves positions out of the comparison, before anything was taken in.
+    pub(crate) fn ignore_positions(&mut self) {
+        self.rules.compare_positions = false;
+    }
+
     /// Takes in records, a node's or a batch's: `fill` gets a block to fill as often as it likes ([`Block::reset`]
     /// first), and hands each over to the sink.
     pub(crate) fn add(&self, fill: impl FnOnce(&mut Block, &mut Sink<'_>)) {
@@ -186,6 +191,23 @@ impl Against {
     pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, rules: Rules) -> Result<Self, ReadError> {
         let sources = Sources::open(paths, options, &rules)?;
         Ok(Self { sources, sums: Sums { rules, total: Mutex::default(), blocks: Mutex::default() } })
+    }
+
+    /// Integer positions of all points of the sources that take part, in any order; `None` if that is not `count`.
+    ///
+    /// # Errors
+    /// A source that cannot be decoded to its end.
+    pub(crate) fn positions(&self, count: u64, progress: &ProgressFn<'_>) -> Result<Option<Vec<[i64; 3]>>, ReadError> {
+        let all: Mutex<Vec<[i64; 3]>> = Mutex::default();
+        self.sources.each_block(&self.sums.rules, progress, "sources", |block, _| {
+            if let Ok(mut all) = all.lock()
+                && all.len() as u64 <= count
+            {
+                all.extend((0..block.len()).filter(|i| block.keep[*i]).map(|i| block.position(i)));
+            }
+        })?;
+        let all = all.into_inner().unwrap_or_default();
+        Ok((all.len() as u64 == count).then_some(all))
     }
 
     /// Decodes the sources and compares. The dataset's side must be complete.

@@ -180,8 +180,7 @@ impl Pass<'_> {
 
     /// World position and attributes of a record.
     fn describe(&self, row: &[u64]) -> Value {
-        let lattice = self.against.sums.rules.lattice;
-        let world = lattice.world([row[0] as i64, row[1] as i64, row[2] as i64]);
+        let world = self.against.sums.rules.world([row[0] as i64, row[1] as i64, row[2] as i64]);
         let mut map = Map::from_iter([("position".to_owned(), json!(world))]);
         let mut at = 3;
         for attribute in &self.against.sums.rules.attributes {

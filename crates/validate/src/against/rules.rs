@@ -1,5 +1,8 @@
 //! What was asked of the conversion, as the dataset's metadata records it, applied by own code.
 
+use std::fmt;
+use std::sync::Arc;
+
 use pointmill_format::{Aabb, Attribute, Lattice};
 use serde_json::Value;
 
@@ -14,6 +17,16 @@ pub(crate) enum RgbDepth {
     Sixteen,
 }
 
+/// Positions that a dataset stores so coarsely that its lattice's integers do not come back: records are compared by
+/// what has to be stored for an integer position then.
+pub(crate) trait StoredPositions: fmt::Debug + Send + Sync {
+    /// What stands for the lattice point `step`: three words, equal exactly if what is stored is.
+    fn stored(&self, step: [i64; 3]) -> [i64; 3];
+
+    /// World coordinates of what is stored.
+    fn world(&self, stored: [i64; 3]) -> [f64; 3];
+}
+
 /// How values of a source's column become those of the dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Conversion {
@@ -21,6 +34,9 @@ pub(crate) enum Conversion {
     AsStored,
     /// A class as a float: rounded to a whole number; 0 where there is none, it is not finite or beyond ±2²⁴.
     WholeClass,
+    /// The grey of an integer among values from the first to the second number:
+    /// ((v − lo) · 255 + (hi − lo) / 2) / (hi − lo), and 255 if they are the same.
+    Grey([u64; 2]),
 }
 
 /// How the records of the sources become those of the dataset.
@@ -34,8 +50,12 @@ pub(crate) struct Rules {
     pub(crate) rgb: Option<usize>,
     /// The dataset has 8 bits a channel: each 16-bit value v of the rules below becomes (v · 255 + 32767) / 65535.
     pub(crate) rgb_as_bytes: bool,
+    /// False where a dataset does not tell its integers: every position counts as 0 then.
+    pub(crate) compare_positions: bool,
     /// The dataset's lattice.
     pub(crate) lattice: Lattice,
+    /// Blocks have these instead of integers on the lattice.
+    pub(crate) stored: Option<Arc<dyn StoredPositions>>,
     /// World coordinate of the job lattice's integer 0.
     lattice_offset: [f64; 3],
     /// The job lattice's coordinate of the dataset's integer 0.
@@ -71,7 +91,9 @@ impl Rules {
             attributes,
             rgb,
             rgb_as_bytes: false,
+            compare_positions: true,
             lattice,
+            stored: None,
             lattice_offset,
             shift,
             rgb_depth: match own["rgbDepth"].as_str() {
@@ -88,12 +110,27 @@ impl Rules {
         }
     }
 
+    /// World coordinates of a record of a block.
+    pub(crate) fn world(&self, position: [i64; 3]) -> [f64; 3] {
+        self.stored.as_ref().map_or_else(|| self.lattice.world(position), |stored| stored.world(position))
+    }
+
     /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
     #[inline]
     pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
+        if !self.compare_positions {
+            return (0, 0);
+        }
         let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
         (steps.round() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
     }
+}
+
+/// The grey of `v` among values from `lo` to `hi`.
+pub(crate) fn grey(v: u64, [lo, hi]: [u64; 2]) -> u64 {
+    let span = hi.saturating_sub(lo);
+    let scaled = (v.min(hi).saturating_sub(lo)).saturating_mul(255).saturating_add(span / 2);
+    scaled.checked_div(span).unwrap_or(255)
 }
 
 fn constants(dropped: &Value) -> Vec<(String, Vec<f64>)> {

@@ -11,8 +11,8 @@ use pointmill_format::{
 use rayon::prelude::*;
 
 use super::block::{BLOCK_POINTS, Block, append_words};
-use super::rules::Conversion::{AsStored, WholeClass};
-use super::rules::Rules;
+use super::rules::Conversion::{AsStored, Grey, WholeClass};
+use super::rules::{Rules, grey};
 use crate::{Progress, ProgressFn};
 
 /// A scan, and where its columns go.
@@ -146,12 +146,20 @@ impl Source {
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
+        if let Some(stored) = &rules.stored {
+            for i in 0..points {
+                let words = stored.stored(block.position(i));
+                words.into_iter().enumerate().for_each(|(axis, word)| block.positions[axis][i] = word);
+            }
+        }
         for (i, attribute) in rules.attributes.iter().enumerate() {
             let column = self.columns[i].map(|(c, elements)| (&batch.columns[c], elements));
             let words = &mut block.words[i];
             append_words(column, start, points, attribute, words);
-            if rules.conversions[i] == WholeClass {
-                words.iter_mut().for_each(|w| *w = whole_class(*w));
+            match rules.conversions[i] {
+                AsStored => {}
+                WholeClass => words.iter_mut().for_each(|w| *w = whole_class(*w)),
+                Grey(range) => words.iter_mut().for_each(|w| *w = grey(*w, range)),
             }
         }
         if rules.every > 1 {

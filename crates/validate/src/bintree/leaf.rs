@@ -89,6 +89,11 @@ impl Points {
         self.offsets.iter().flatten().all(|d| d.is_finite())
     }
 
+    /// Of a point from the center.
+    pub(super) fn offset(&self, i: usize) -> [f32; 3] {
+        self.offsets.each_ref().map(|d| d[i])
+    }
+
     fn step(&self, i: usize) -> [i64; 3] {
         self.steps.each_ref().map(|s| s[i])
     }

@@ -20,6 +20,7 @@ mod lenient;
 mod precision;
 mod quality;
 mod records;
+mod routes;
 mod scan;
 mod splits;
 mod summary;
@@ -38,6 +39,7 @@ use crate::finding::{Finding, Findings};
 use crate::{Format, Options, Outcome, ProgressFn};
 use lenient::Lenient;
 use records::Records;
+use routes::Routes;
 use scan::{Scan, Scanned};
 use tree::Tree;
 
@@ -59,7 +61,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let readable = files::check(folder, &tree, &findings)?;
     let against = match options.against.as_slice() {
         [] => None,
-        paths => Some(Against::open(paths, &options.open, records::rules(dataset.header()))?),
+        paths => Some(Against::open(paths, &options.open, records::rules(&tree))?),
     };
     let sums = against.as_ref().map(|a| &a.sums);
     let scan = Scan { tree: &tree, readable: &readable, lattice_known, sums, findings: &findings, progress };
@@ -73,7 +75,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let records = Records { tree: &tree, readable: &readable };
     let memory_bytes = options.memory_bytes;
     let context = Context { records: &records, findings: &findings, progress, memory_bytes };
-    let against = compare(against.as_ref(), &unknown, &context)?;
+    let against = compare(against.as_ref(), &tree, &unknown, &context)?;
 
     let header = dataset.header();
     let (checks, problems) = findings.finish();
@@ -127,9 +129,11 @@ impl Unknown {
     }
 }
 
-/// The comparison with the sources, which needs all integers.
+/// The comparison with the sources: by integers on the lattice, or, where they are not certain, by the offsets that have
+/// to be stored for them.
 fn compare(
     against: Option<&Against>,
+    tree: &Tree<'_>,
     unknown: &Unknown,
     context: &Context<'_>,
 ) -> Result<Option<AgainstSummary>, ReadError> {
@@ -137,7 +141,16 @@ fn compare(
         context.findings.skip(Check::Against, "no sources were given");
         return Ok(None);
     };
-    if let Some(why) = unknown.integers() {
+    let rules = against.sums.rules();
+    let why_not = match rules.stored {
+        _ if unknown.lattice => unknown.integers(),
+        // no box told that these leaves are too long, or offsets are no numbers
+        None => unknown.integers(),
+        Some(_) if rules.drop_duplicates => unknown.integers(),
+        Some(_) if !Routes::are_certain(tree) => Some("the lattice is too fine for doubles".into()),
+        Some(_) => None,
+    };
+    if let Some(why) = why_not {
         context.findings.skip(Check::Against, why);
         return Ok(None);
     }

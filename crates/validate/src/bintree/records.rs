@@ -1,11 +1,14 @@
 //! Records of leaves as the comparison with the sources wants them.
 
-use pointmill_format::bintree::{Header, NodeKind};
+use std::sync::Arc;
+
+use pointmill_format::bintree::NodeKind;
 use pointmill_format::{Attribute, AttributeType, ErrorKind, ReadError};
 use rayon::prelude::*;
 use serde_json::Value;
 
 use super::leaf::Points;
+use super::routes::{self, Routes};
 use super::tree::Tree;
 use crate::against::block::{BLOCK_POINTS, Block};
 use crate::against::rules::Conversion;
@@ -14,7 +17,8 @@ use crate::place::Place;
 
 /// What is compared: class, and every column behind the core. Colours of 8 bits are compared as such; beside `rgb` they
 /// were checked against it, point by point.
-pub(super) fn rules(header: &Header) -> Rules {
+pub(super) fn rules(tree: &Tree<'_>) -> Rules {
+    let header = tree.header();
     let extras = || header.record.extras().iter().map(|e| &e.attribute);
     let only_bytes = extras().all(|a| a.name != "rgb");
     let mut attributes = vec![Attribute::new("classification", AttributeType::Float32, 1)];
@@ -29,6 +33,9 @@ pub(super) fn rules(header: &Header) -> Rules {
     let mut rules = Rules::new(attributes, header.lattice, &own);
     rules.conversions[0] = Conversion::WholeClass;
     rules.rgb_as_bytes = only_bytes && rules.rgb.is_some();
+    if !tree.is_certain() {
+        rules.stored = Some(Arc::new(Routes::new(tree)));
+    }
     rules
 }
 
@@ -37,30 +44,43 @@ fn is_rgba(attribute: &Attribute) -> bool {
 }
 
 /// Where in a record the words of the compared attributes stand.
-pub(super) struct Filler {
+pub(super) struct Filler<'a> {
+    tree: &'a Tree<'a>,
+    /// Positions are compared as they are stored.
+    as_stored: bool,
     stride: usize,
     /// For each attribute of the rules: byte, bytes of an element, elements.
     columns: Vec<(usize, usize, usize)>,
 }
 
-impl Filler {
-    pub(super) fn new(header: &Header, rules: &Rules) -> Self {
+impl<'a> Filler<'a> {
+    pub(super) fn new(tree: &'a Tree<'a>, rules: &Rules) -> Self {
+        let header = tree.header();
         let place = |attribute: &Attribute| {
             let name = if rules.rgb_as_bytes && attribute.name == "rgb" { "rgba" } else { attribute.name.as_str() };
             let stored = header.record.columns().find(|c| c.attribute.name == name);
             stored.map_or((0, 0, 0), |c| (c.offset, c.attribute.ty.size(), attribute.elements))
         };
-        Self { stride: header.record.stride(), columns: rules.attributes.iter().map(place).collect() }
+        let columns = rules.attributes.iter().map(place).collect();
+        Self { tree, as_stored: rules.stored.is_some(), stride: header.record.stride(), columns }
     }
 
     /// Hands over a leaf's records in blocks.
-    pub(super) fn fill(&self, points: &Points, block: &mut Block, sink: &mut Sink<'_>) {
+    pub(super) fn fill(&self, leaf: u32, points: &Points, block: &mut Block, sink: &mut Sink<'_>) {
         for start in (0..points.len()).step_by(BLOCK_POINTS) {
             let end = points.len().min(start + BLOCK_POINTS);
             block.reset(self.columns.len());
             block.keep.resize(end - start, true);
-            for (to, from) in block.positions.iter_mut().zip(&points.steps) {
-                to.extend_from_slice(&from[start..end]);
+            if self.as_stored {
+                let node = Routes::node_of_leaf(self.tree, leaf) as usize;
+                for i in start..end {
+                    let words = routes::words(node, points.offset(i));
+                    block.positions.iter_mut().zip(words).for_each(|(to, word)| to.push(word));
+                }
+            } else {
+                for (to, from) in block.positions.iter_mut().zip(&points.steps) {
+                    to.extend_from_slice(&from[start..end]);
+                }
             }
             let bytes = points.bytes.get(start * self.stride..end * self.stride).unwrap_or_default();
             for (words, (at, size, elements)) in block.words.iter_mut().zip(&self.columns) {
@@ -87,7 +107,7 @@ pub(super) struct Records<'a> {
 impl against::Records for Records<'_> {
     fn each_block(&self, rules: &Rules, work: &(dyn Fn(&mut Block, Place) + Sync)) -> Result<(), ReadError> {
         let header = self.tree.header();
-        let filler = Filler::new(header, rules);
+        let filler = Filler::new(self.tree, rules);
         let nodes = 0..self.tree.nodes().len() as u32;
         let readable = nodes.into_par_iter().filter(|index| self.readable[*index as usize]);
         readable.try_for_each_init(<(Points, Block)>::default, |(points, block), index| {
@@ -100,7 +120,7 @@ impl against::Records for Records<'_> {
             }
             points.decode(header.record.stride(), center, &header.lattice);
             let place = self.tree.place(index);
-            filler.fill(points, block, &mut |block| work(block, place));
+            filler.fill(index, points, block, &mut |block| work(block, place));
             Ok(())
         })
     }

@@ -96,7 +96,7 @@ impl Scan<'_> {
         leaf.check_box(points);
         leaf.check_values(points);
         leaf.check_padding(points);
-        if matches!(tree.parent(index).map(|p| p.kind), Some(NodeKind::Degenerate { .. }))
+        if matches!(tree.parent(index).map(|p| p.1.kind), Some(NodeKind::Degenerate { .. }))
             && let Ok(mut ends) = ends.lock()
         {
             ends.insert(index, points.ends(stride));
@@ -109,8 +109,8 @@ impl Scan<'_> {
             leaf.check_order(points, summary.min);
         }
         if let Some(sums) = self.sums {
-            let filler = Filler::new(header, sums.rules());
-            sums.add(|block, sink| filler.fill(points, block, sink));
+            let filler = Filler::new(tree, sums.rules());
+            sums.add(|block, sink| filler.fill(index, points, block, sink));
         }
         Ok(Some((summary, exactness)))
     }

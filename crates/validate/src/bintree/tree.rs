@@ -1,8 +1,9 @@
 //! The tree with what the index leaves unsaid, and the checks that need no point.
 
 use pointmill_format::Aabb;
-use pointmill_format::bintree::{Bintree, Header, Node};
+use pointmill_format::bintree::{Bintree, Header, Node, NodeKind};
 
+use super::precision;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::place::{BinaryNode, Place};
@@ -52,9 +53,33 @@ impl<'a> Tree<'a> {
         Some([(low, self.nodes().get(low as usize)?), (high, self.nodes().get(high as usize)?)])
     }
 
-    /// The node above; none above the root.
-    pub(super) fn parent(&self, index: u32) -> Option<&'a Node> {
-        if index == 0 { None } else { self.nodes().get(self.parents[index as usize] as usize) }
+    /// The node above with its index; none above the root.
+    pub(super) fn parent(&self, index: u32) -> Option<(u32, &'a Node)> {
+        let parent = if index == 0 { return None } else { self.parents[index as usize] };
+        Some((parent, self.nodes().get(parent as usize)?))
+    }
+
+    /// The center of the first leaf at or below a node.
+    pub(super) fn first_center(&self, index: u32) -> [f64; 3] {
+        let centers = self.nodes()[index as usize..].iter().filter_map(|node| match node.kind {
+            NodeKind::Leaf { center, .. } => Some(center),
+            _ => None,
+        });
+        centers.take(1).next().unwrap_or_default()
+    }
+
+    /// True if, by the boxes of the index, single precision brings all integers back.
+    pub(super) fn is_certain(&self) -> bool {
+        let lattice = self.header().lattice;
+        self.nodes().iter().all(|node| {
+            let NodeKind::Leaf { center, .. } = node.kind else { return true };
+            (0..3).all(|a| {
+                let [min, max] = [node.bounds.min[a], node.bounds.max[a]];
+                let half_extent = (max - center[a]).abs().max((min - center[a]).abs());
+                let magnitude = min.abs().max(max.abs()).max(lattice.offset[a].abs());
+                precision::bound(half_extent, magnitude) < lattice.scale[a] / 2.0
+            })
+        })
     }
 
     /// 0 for the root.

@@ -319,16 +319,37 @@ fn below_depth_64_planes_are_medians() {
     assert!(outcome.problems.iter().all(|p| p.check == Check::Split), "{:#?}", outcome.problems);
 }
 
+/// A leaf of 37 km.
+fn coarse() -> Cloud {
+    let points = (0..10).map(|i| Point { intensity: i as u16, ..Point::at([i * 4_100_001, i * 3, i]) }).collect();
+    Cloud { points, ..Cloud::default() }
+}
+
 #[test]
 fn where_single_precision_is_too_coarse_it_is_said() {
-    let points: Vec<Point> = (0..10).map(|i| Point::at([i * 4_100_001, i * 3, i])).collect();
-    let cloud = Cloud { points: points.clone(), ..Cloud::default() };
-    let outcome = cloud.build().validate_against(&cloud, &points);
+    let outcome = coarse().build().validate();
     assert_only(&outcome, &[]);
     assert_eq!(outcome.leaves.as_ref().unwrap().uncertain, 1);
-    for check in [Check::Positions, Check::LeafOrder, Check::Split, Check::Against] {
+    for check in [Check::Positions, Check::LeafOrder] {
         let why = outcome.check(check).unwrap().skipped.as_ref().unwrap();
         assert!(why.contains("too coarse"), "{why}");
     }
     assert_eq!(outcome.check(Check::LeafBoxes).unwrap().checked, 1);
+}
+
+#[test]
+fn where_single_precision_is_too_coarse_sources_are_compared_with_what_has_to_be_stored() {
+    let cloud = Cloud { capacity: 4, ..coarse() };
+    let mut cloud = Cloud { scale: [0.000_1; 3], ..cloud };
+    cloud.points.iter_mut().for_each(|p| p.step[0] *= 10);
+    cloud.points.extend((0..5).map(|i| Point { intensity: i, ..Point::at([123, 20_000_000, 5]) }));
+    let mut points = cloud.points.clone();
+    let outcome = cloud.build().validate_against(&cloud, &points);
+    assert_only(&outcome, &[]);
+    assert!(outcome.leaves.as_ref().unwrap().uncertain > 1);
+    assert_eq!(outcome.check(Check::Against).unwrap().checked, 15);
+    points[3].step[1] += 20;
+    points[12].intensity += 9;
+    let outcome = cloud.build().validate_against(&cloud, &points);
+    assert_only(&outcome, &[(Check::Against, 3)]);
 }

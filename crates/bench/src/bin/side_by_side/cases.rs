@@ -24,6 +24,10 @@ pub(crate) enum Job {
     Memory,
     /// The sizes of --growth
     Growth,
+    /// Binary tree and batches, each alone and beside an octree, compared with the job poisson
+    Formats,
+    /// Binary trees by mean, median and midpoint
+    Splits,
 }
 
 /// Who runs.
@@ -116,6 +120,19 @@ pub(crate) fn list(args: &Args) -> Vec<Case> {
                 // In bytes: every spelling of a size takes those.
                 let options = format!("--sampling poisson --memory {}", args.memory);
                 add(Program::Pointmill, "poisson, memory ceiling", &options, n);
+            }
+            Job::Formats => {
+                add(Program::Pointmill, "poisson", "--sampling poisson", n);
+                for format in ["bintree", "batches"] {
+                    add(Program::Pointmill, format, &format!("--to {format}"), n);
+                    let both = format!("--sampling poisson --to potree2 --to {format}");
+                    add(Program::Pointmill, &format!("poisson and {format}"), &both, n);
+                }
+            }
+            Job::Splits => {
+                for split in ["mean", "median", "midpoint"] {
+                    add(Program::Pointmill, &format!("bintree, {split}"), &format!("--to bintree --split {split}"), n);
+                }
             }
             Job::Growth => {
                 for points in &args.growth {

@@ -108,6 +108,14 @@ fn ratios(args: &Args, outcomes: &[Outcome]) -> Vec<Ratio> {
     let (ours, theirs) = (find("pointmill poisson BROTLI"), find("PotreeConverter poisson BROTLI"));
     at_most("CPU: BROTLI / PotreeConverter BROTLI", ours.map(cpu), theirs.map(cpu), 1.0 / 3.0);
     at_most("bytes: BROTLI / PotreeConverter BROTLI", ours.map(bytes), theirs.map(bytes), 1.0);
+    for (format, target) in [("bintree", 1.2), ("batches", 1.0)] {
+        let alone = find(&format!("pointmill {format}"));
+        let both = find(&format!("pointmill poisson and {format}"));
+        at_most(&format!("CPU: {format} / poisson"), alone.map(cpu), poisson.map(cpu), target);
+        at_most(&format!("wall: {format} / poisson"), alone.map(wall), poisson.map(wall), target);
+        let second = both.zip(poisson).map(|(both, poisson)| wall(both) - wall(poisson));
+        at_most(&format!("wall: {format} as the second output / alone"), second, alone.map(wall), 0.6);
+    }
     // A ceiling that the job stays below anyway proves nothing.
     let ceiling = args.memory as f64;
     let capped = find("pointmill poisson, memory ceiling").filter(|_| poisson.is_some_and(|p| peak(p) > ceiling));
