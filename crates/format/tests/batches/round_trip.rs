@@ -1,12 +1,10 @@
 //! What is written is read back: every point once, within the promised error, whatever the cloud is like.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::Cursor;
 
 use pointmill_format::Lattice;
 use pointmill_format::batches::{
-    AlignedBytes, BatchPoints, BatchRecord, Batches, BlockScratch, Grid, LOD_LEVELS, Part, Precision, WriteOptions,
-    lod_of, rgb_of,
+    AlignedBytes, BatchPoints, BatchRecord, Batches, Grid, LOD_LEVELS, Precision, WriteOptions, lod_of, rgb_of,
 };
 
 use crate::util::{Points, open};
@@ -226,7 +224,8 @@ fn attributes_follow_their_points() {
 #[cfg(feature = "zstd")]
 #[test]
 fn compressed_sections_hold_the_same() {
-    use pointmill_format::batches::compress;
+    use pointmill_format::batches::{BlockScratch, Part, compress};
+    use std::io::Cursor;
     let cloud = Points::random(14, 7 * 10_240 + 5, [3_000, 3_000, 200], true, MILLIMETRES);
     let (bytes, _) = cloud.write(&cloud.options(1.0));
     let raw = open(&bytes).unwrap();
