@@ -1,12 +1,10 @@
 //! What is written is read back: every point once, within the promised error, whatever the cloud is like.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::Cursor;
 
 use pointmill_format::Lattice;
 use pointmill_format::batches::{
-    AlignedBytes, BatchPoints, BatchRecord, Batches, BlockScratch, Grid, LOD_LEVELS, Part, Precision, WriteOptions,
-    lod_of, rgb_of,
+    AlignedBytes, BatchPoints, BatchRecord, Batches, Grid, LOD_LEVELS, Precision, WriteOptions, lod_of, rgb_of,
 };
 
 use crate::util::{Points, open};
@@ -226,7 +224,8 @@ fn attributes_follow_their_points() {
 #[cfg(feature = "zstd")]
 #[test]
 fn compressed_sections_hold_the_same() {
-    use pointmill_format::batches::compress;
+    use pointmill_format::batches::{BlockScratch, Part, compress};
+    use std::io::Cursor;
     let cloud = Points::random(14, 7 * 10_240 + 5, [3_000, 3_000, 200], true, MILLIMETRES);
     let (bytes, _) = cloud.write(&cloud.options(1.0));
     let raw = open(&bytes).unwrap();
@@ -273,6 +272,23 @@ fn buffers_that_are_not_aligned_are_refused_with_advice() {
     let shifted = AlignedBytes::from([&[0][..], &bytes].concat().as_slice());
     let error = Batches::open_bytes(&shifted.as_ref()[1..], "a".as_ref()).unwrap_err().to_string();
     assert!(error.contains("AlignedBytes"), "{error}");
+}
+
+#[test]
+fn iterating_undoes_the_swap_and_storage_order_does_not() {
+    let cloud = Points::random(18, 6 * 10_240 + 1, [9_000; 3], false, MILLIMETRES);
+    let (bytes, _) = cloud.write(&WriteOptions { precision: Some(Precision::Thirty), ..cloud.options(1.0) });
+    let batches = open(&bytes).unwrap();
+    let grid = batches.header().grid;
+    let mut points: Vec<_> = batches.points_in_morton_order(Precision::Thirty).map(Result::unwrap).collect();
+    let code = |world: [f64; 3]| {
+        let lattice_point = cloud.lattice.world(std::array::from_fn(|a| cloud.lattice.quantize(a, world[a])));
+        grid.morton_code(grid.cells(grid.relative(lattice_point)))
+    };
+    assert!(points.is_sorted_by_key(|p| code(p.world)));
+    points.sort_by_key(|p| p.index);
+    assert!(points.iter().enumerate().all(|(i, p)| p.index as usize == i), "every index once");
+    assert!(!points.is_sorted_by_key(|p| code(p.world)));
 }
 
 #[test]
