@@ -273,7 +273,7 @@ pub(crate) struct TalkArgs {
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ValidateArgs {
-    /// Folder of a Potree 2.0 dataset
+    /// Folder of a dataset of any format, or a .qbatch file; its content tells which
     pub(crate) dataset: PathBuf,
     /// Proves that every point of these scans is in the dataset exactly once: files, folders or globs
     #[arg(long, value_name = "INPUT", num_args = 1..)]

@@ -36,7 +36,7 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
 /// What was made.
 fn output_line(output: &OutputReport, plan: &Plan) -> String {
     let parts = match output.details.get("batches").and_then(Value::as_u64) {
-        Some(batches) => plural_es(batches, "batch"),
+        Some(n) => batches(n),
         None => {
             let tree = &output.tree;
             format!("{}, {}", plural(tree.nodes, "node"), plural(u64::from(tree.depth) + 1, "level"))
@@ -48,8 +48,9 @@ fn output_line(output: &OutputReport, plan: &Plan) -> String {
     format!("{}: {} in {parts}, {}", place.display(), plural(output.points, "point"), bytes(output.bytes))
 }
 
-fn plural_es(n: u64, noun: &str) -> String {
-    if n == 1 { format!("1 {noun}") } else { format!("{} {noun}es", count(n)) }
+/// "1 batch", "7 batches".
+pub(crate) fn batches(n: u64) -> String {
+    if n == 1 { "1 batch".to_owned() } else { format!("{} batches", count(n)) }
 }
 
 /// Attributes that are not in an output, those of one reason together.

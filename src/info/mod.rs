@@ -1,5 +1,7 @@
 //! `pointmill info`: what scans and datasets are.
 
+mod batches;
+mod bintree;
 mod potree2;
 mod scan;
 
@@ -29,11 +31,32 @@ struct DatasetKind {
 }
 
 /// The kinds that are told of; each has a file here.
-const DATASET_KINDS: [DatasetKind; 1] = [DatasetKind { marker: "metadata.json", tell: potree2::tell }];
+const DATASET_KINDS: [DatasetKind; 3] = [
+    DatasetKind { marker: "metadata.json", tell: potree2::tell },
+    DatasetKind { marker: "index.json", tell: bintree::tell },
+    DatasetKind { marker: "points.qbatch", tell: batches::tell },
+];
+
+/// Folders that a conversion to several formats makes in its output.
+const OUTPUT_FOLDERS: [&str; 3] = ["potree2", "bintree", "batches"];
 
 impl DatasetKind {
+    /// The datasets at `path`: the one that it is, or those that one conversion has put into it.
+    fn find_all(path: &Path) -> Vec<(&'static Self, PathBuf)> {
+        match Self::find(path) {
+            Some(one) => vec![one],
+            None if path.join("report.json").is_file() => {
+                OUTPUT_FOLDERS.iter().filter_map(|folder| Self::find(&path.join(folder))).collect()
+            }
+            None => Vec::new(),
+        }
+    }
+
     /// The kind of the dataset that `path` is (its folder, or the file it is known by), and that file.
     fn find(path: &Path) -> Option<(&'static Self, PathBuf)> {
+        if path.is_file() && path.extension().is_some_and(|e| e == "qbatch") {
+            return DATASET_KINDS.last().map(|kind| (kind, path.to_path_buf()));
+        }
         DATASET_KINDS.iter().find_map(|kind| {
             let inside = path.join(kind.marker);
             let is_marker = || path.is_file() && path.file_name().is_some_and(|name| name == kind.marker);
@@ -48,8 +71,11 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let options = args.reading.options()?;
     let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };
     for path in &args.paths {
-        if let Some((kind, file)) = DatasetKind::find(path) {
-            out.show((kind.tell)(&file))?;
+        let datasets = DatasetKind::find_all(path);
+        for (kind, file) in &datasets {
+            out.show((kind.tell)(file))?;
+        }
+        if !datasets.is_empty() {
             continue;
         }
         match inputs::expand(std::slice::from_ref(path), &options) {

@@ -84,3 +84,13 @@ fn compressed_files_are_smaller_and_originals_can_be_left_out() {
     dir.run(["convert", "scans", "-o", "no", "--to", "batches", "--lod-cell", "1e-9"]).failed_with(2, &["--lod-cell"]);
     assert!(!dir.path("no").exists());
 }
+
+#[test]
+fn what_is_converted_validates_against_its_scans_whatever_planes_and_packing() {
+    let dir = two_scans(30_000);
+    for options in [&["scans"][..], &["scans", "--compress", "zstd"], &["scans", "--planes", "10"]] {
+        bytes(&dir, options);
+        dir.succeed(["validate", "out", "--against", "scans", "-q"]);
+        dir.succeed(["validate", "out/points.qbatch", "-q"]);
+    }
+}

@@ -5,6 +5,7 @@ mod bad_input;
 mod bad_output;
 mod batches;
 mod cut_short;
+mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;

@@ -7,6 +7,7 @@ const MAX_BATCHES_PER_BLOCK: u32 = 256;
 
 /// One block, decompressed. Reuse one for sections that are read batch by batch: batches of the same block cost nothing.
 #[derive(Debug, Clone, Default)]
+#[cfg_attr(not(feature = "zstd"), allow(dead_code))] // part of signatures, used with the feature alone
 pub struct BlockScratch {
     /// What `bytes` holds.
     block: Option<(Part, u32)>,

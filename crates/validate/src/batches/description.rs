@@ -96,13 +96,14 @@ pub(crate) fn read(bytes: &Bytes, header: &Header, findings: &Findings) -> Resul
         }
     };
     let errors = errors(json.get("errors"), header, findings);
-    let intensity_range = json.get("intensityRange").and_then(|range| {
-        let pair: Option<[u64; 2]> =
-            range.as_array().and_then(|r| r.iter().map(Value::as_u64).collect::<Option<Vec<_>>>()?.try_into().ok());
-        if pair.is_none_or(|[lo, hi]| lo > hi) {
-            fault(findings, "intensityRange", "[least, greatest]", range.clone());
+    let intensity_range = json.get("intensityRange").and_then(|value| {
+        let range = numbers(Some(value)).and_then(|v| <[f64; 2]>::try_from(v).ok());
+        let whole = |v: &f64| v.fract() == 0.0 && (0.0..=65_535.0).contains(v);
+        let range = range.filter(|range| range.iter().all(whole) && range[0] <= range[1]);
+        if range.is_none() {
+            fault(findings, "intensityRange", "[least, greatest], whole numbers of 16 bits", value.clone());
         }
-        pair.filter(|[lo, hi]| lo <= hi)
+        range.map(|range| range.map(|v| v as u64))
     });
     let (Some(lattice), Some(attributes)) = (lattice, attributes) else { return Ok(None) };
     Ok(Some(Description { lattice, attributes, colour, intensity_range, errors, json: json.into() }))

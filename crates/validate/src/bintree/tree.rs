@@ -95,11 +95,12 @@ impl<'a> Tree<'a> {
     pub(super) fn place(&self, index: u32) -> Place {
         let (mut at, mut path, mut step) = (index, 0, 0);
         while at != 0 && step < BinaryNode::MAX_STEPS {
-            let parent = self.parents[at as usize];
+            let Some(&parent) = self.parents.get(at as usize) else { break };
             path |= u64::from(at != parent + 1) << step;
             (at, step) = (parent, step + 1);
         }
-        Place::Binary(BinaryNode { index, depth: self.depths[index as usize], path })
+        let depth = self.depths.get(index as usize).copied().unwrap_or_default();
+        Place::Binary(BinaryNode { index, depth, path })
     }
 
     /// No leaf above the capacity, no inner node at or below it.

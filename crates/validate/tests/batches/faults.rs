@@ -122,6 +122,7 @@ fn a_description_that_is_incomplete_or_disagrees() {
         ("/errors/10/rms/1", json!(-1.0)),
         ("/sourceStep", json!([1, 2])),
         ("/intensityRange", json!([2, 1])),
+        ("/intensityRange", json!([0.25, 1])),
     ] {
         assert_eq!(broken(&change(path, value.clone())), [Check::Description], "{path} {value}");
     }

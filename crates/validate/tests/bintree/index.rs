@@ -151,3 +151,32 @@ fn files_that_belong_to_no_leaf() {
         assert_eq!(outcome.problems[0].subject, orphan);
     }
 }
+
+/// Whatever the bytes say: an outcome or an error, and time and memory within bounds.
+#[test]
+fn no_changed_byte_makes_the_validator_panic() {
+    let mut state = 99u64;
+    let mut next = move |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    let points = Cloud::default().points.split_off(690);
+    let cloud = Cloud { points, packed: true, ..Cloud::default() };
+    let folder = tempfile::tempdir().unwrap();
+    cloud.build().write(folder.path());
+    let mut faults = 0;
+    for file in ["index.json", "leaves.bin"] {
+        let path = folder.path().join(file);
+        let good = std::fs::read(&path).unwrap();
+        for _ in 0..400 {
+            let mut bytes = good.clone();
+            let at = next(bytes.len());
+            bytes[at] = if file == "index.json" { b"0123456789-e.,:[]{}\"nt"[next(22)] } else { next(256) as u8 };
+            std::fs::write(&path, &bytes).unwrap();
+            faults += usize::from(!check(folder.path()).ok);
+        }
+        std::fs::write(&path, &good).unwrap();
+    }
+    // colours, intensities and times of single points are known to the sources alone
+    assert!(faults > 400, "{faults}");
+}
