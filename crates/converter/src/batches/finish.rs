@@ -11,11 +11,13 @@ use serde_json::json;
 
 use super::content::Content;
 use super::frame::{Frame, refused};
-use super::lod::{Edges, LEVELS, join, shown_word};
+use super::lod::{LEVELS, join, shown_word};
 use super::output::{ORIGINAL_BYTES, Output, State};
+use super::task::Outcome;
 use crate::convert::Run;
 use crate::describe::name_of;
 use crate::error::ConvertError;
+use crate::plan::BatchesSettings;
 
 /// Bytes of originals that are written at once.
 const WRITE_BYTES: usize = 4 << 20;
@@ -47,22 +49,21 @@ pub(super) struct Finished {
 /// Writes all that can only be known when every task is done.
 pub(super) fn finish(
     run: &Run<'_>,
+    settings: &BatchesSettings,
     frame: &Frame,
     content: &Content,
     output: &Output<'_>,
-    planes: Option<u8>,
-    keeps_originals: bool,
-    mut lod_points: [u64; LEVELS + 1],
-    edges: &[[Option<Edges>; LEVELS]],
+    outcome: &Outcome,
 ) -> Result<Finished, ConvertError> {
     let state = output.take_state()?;
-    let patches = patches(output.layout, edges, &mut lod_points);
+    let mut lod_points = outcome.lod_points;
+    let patches = patches(output.layout, outcome, &mut lod_points);
     for (index, patch) in &patches {
         output.put_values(output.layout.colour, 4, *index, &patch.shown.to_le_bytes())?;
     }
     let records: Vec<BatchRecord> = state.records.iter().flatten().copied().collect();
     let mut layout = output.layout.clone();
-    if planes.is_none() {
+    if settings.planes.is_none() {
         let needed = Precision::for_steps(&records, frame.lattice.scale);
         if needed < layout.precision() {
             layout = layout.with_precision(needed);
@@ -71,32 +72,28 @@ pub(super) fn finish(
         }
     }
     output.write(&record_bytes(&records), layout.records.offset)?;
-    let count = if keeps_originals { put_originals(output, &layout, &state, &patches)? } else { 0 };
+    let count = if settings.originals { put_originals(output, &layout, &state, &patches)? } else { 0 };
     let mut errors = ErrorSums::default();
     state.errors.iter().for_each(|e| errors.merge(e));
     let mut description = describe(run, frame, content);
     description.errors = errors.figures();
     let mut end = layout.finish(&frame.grid, &frame.tight, count, description).map_err(refused)?;
-    if !keeps_originals {
+    if !settings.originals {
         leave_out_originals(&layout, &mut end);
     }
     output.write(&end.description_bytes, end.description_offset)?;
     output.write(&end.header_bytes, 0)?;
     let bytes = end.description_offset + end.header.description_bytes;
-    let originals_bytes = if keeps_originals { Layout::originals_bytes(count) } else { 0 };
+    let originals_bytes = if settings.originals { Layout::originals_bytes(count) } else { 0 };
     Ok(Finished { precision: layout.precision(), records, errors, lod_points, layout, originals_bytes, end, bytes })
 }
 
 /// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.
-fn patches(
-    layout: &Layout,
-    edges: &[[Option<Edges>; LEVELS]],
-    lod_points: &mut [u64; LEVELS + 1],
-) -> BTreeMap<u32, Patch> {
+fn patches(layout: &Layout, outcome: &Outcome, lod_points: &mut [u64; LEVELS + 1]) -> BTreeMap<u32, Patch> {
     let mut patches: BTreeMap<u32, Patch> = BTreeMap::new();
     // coarser levels come later and win
     for level in (0..LEVELS).rev() {
-        join(edges.iter().filter_map(|e| e[level]), |cell| {
+        join(outcome.edges.iter().filter_map(|(_, edges)| edges[level]), |cell| {
             let shown = shown_word(&cell, level);
             let size = u64::from(BATCH_POINTS);
             let index = layout.slot((cell.candidate / size) as u32).1 + (cell.candidate % size) as u32;

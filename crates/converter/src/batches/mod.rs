@@ -48,17 +48,7 @@ pub(crate) fn write(
     let points = run.gathered.stats.points;
     let most = run.budget.task_points(bytes_per_point(run.job.schema.stride), MOST_TASK_POINTS);
     let share = points / (run.plan.threads.max(1) as u64 * TASKS_PER_THREAD);
-    write_tasks(run, settings, staged, share.max(LEAST_TASK_POINTS).min(most))
-}
-
-/// [`write`] with tasks of at most so many points.
-fn write_tasks(
-    run: &Run<'_>,
-    settings: &BatchesSettings,
-    staged: &StagedDataset,
-    task_points: u64,
-) -> Result<OutputReport, ConvertError> {
-    let points = run.gathered.stats.points;
+    let task_points = share.max(LEAST_TASK_POINTS).min(most);
     let content = Content::choose(run);
     let frame = Frame::new(run, settings.lod_cell)?;
     let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();
@@ -80,9 +70,7 @@ fn write_tasks(
     };
     let outcome = encode(run, &frame, &content, &output, settings.originals, &tasks, task_points)?;
     run.account(outcome.written)?;
-    let edges: Vec<_> = outcome.edges.iter().map(|(_, edges)| *edges).collect();
-    let mut finished =
-        finish(run, &frame, &content, &output, settings.planes, settings.originals, outcome.lod_points, &edges)?;
+    let mut finished = finish(run, settings, &frame, &content, &output, &outcome)?;
     if let (Some(raw), Some(level)) = (&raw, settings.zstd_level) {
         compress::compress(run, (raw, run.temp_dir), (&file, &path), level, &mut finished)?;
     }
