@@ -75,7 +75,7 @@ pub(crate) fn write(
         compress::compress(run, (raw, run.temp_dir), (&file, &path), level, &mut finished)?;
     }
     file.sync_all().map_err(|e| ConvertError::io(&path, "syncing the batches", e))?;
-    Ok(report(run, settings, &frame, content, &finished, outcome))
+    Ok(report(run, settings, &frame, content, &finished, &outcome))
 }
 
 fn temp_file(run: &Run<'_>, error: std::io::Error) -> ConvertError {
@@ -88,7 +88,7 @@ fn report(
     frame: &Frame,
     content: Content,
     finished: &Finished,
-    outcome: Outcome,
+    outcome: &Outcome,
 ) -> OutputReport {
     OutputReport {
         points: run.gathered.stats.points,

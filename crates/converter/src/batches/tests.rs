@@ -31,7 +31,7 @@ struct Numbers(u64);
 impl Numbers {
     fn below(&mut self, end: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) * end >> 31
+        ((self.0 >> 33) * end) >> 31
     }
 }
 
@@ -191,7 +191,7 @@ fn surfaces_give_the_bytes_of_the_plain_writer_with_cells_of_any_size() {
 fn positions_that_repeat_are_ordered_by_all_they_have() {
     let mut n = Numbers(5);
     let places = Scan::surface(200, 1_000, 0.01);
-    let mut scan = Scan { positions: vec![], values: vec![], ..places.clone() };
+    let mut scan = Scan { positions: vec![], values: vec![], ..places };
     for _ in 0..25_000 {
         scan.push(places.positions[n.below(200) as usize], &mut n);
     }
@@ -239,7 +239,7 @@ fn planes_are_left_out_when_asked_or_not_needed() {
         assert_eq!(report.outputs[0].details["planes"], bits);
     }
     // most batches are small, some are not: found out at the end
-    let mut clusters = scan.clone().map(|p| p.map(|v| v / 4));
+    let mut clusters = scan.map(|p| p.map(|v| v / 4));
     clusters.positions.iter_mut().step_by(2).for_each(|p| p[0] += 100_000);
     check("clusters", &clusters, cell(1.0));
 }
