@@ -37,5 +37,20 @@ fn main() -> io::Result<()> {
         let lengths = [metadata.len() as u32, hierarchy.len() as u32].map(u32::to_le_bytes).concat();
         fs::write(corpus.join(name), [lengths, metadata, hierarchy, octree].concat())?;
     }
+    let corpus = fuzz.join("corpus/bintree");
+    fs::create_dir_all(&corpus)?;
+    for (name, index) in [("packed", "packed"), ("nested", "nested")] {
+        let index = fs::read(fixtures.join("bintree").join(index).join("index.json"))?;
+        let leaves = fs::read(fixtures.join("bintree/packed/leaves.bin"))?;
+        fs::write(corpus.join(name), [(index.len() as u32).to_le_bytes().to_vec(), index, leaves].concat())?;
+    }
+    let corpus = fuzz.join("corpus/batches");
+    fs::create_dir_all(&corpus)?;
+    for entry in fs::read_dir(fixtures.join("batches"))? {
+        let path = entry?.path();
+        if let Some(name) = path.file_name().filter(|_| path.extension().is_some_and(|e| e == "qbatch")) {
+            fs::copy(&path, corpus.join(name))?;
+        }
+    }
     Ok(())
 }

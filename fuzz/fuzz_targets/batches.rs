@@ -1,0 +1,15 @@
+//! A file of quantised batches in memory: opened, and read to its end.
+
+#![no_main]
+
+use std::path::Path;
+
+use pointmill_format::batches::{AlignedBytes, Batches};
+use pointmill_fuzz::check_error;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    let opened = Batches::open_bytes(AlignedBytes::from(bytes), Path::new("points.qbatch"));
+    if let Err(error) = opened.and_then(|batches| batches.read_everything()) {
+        check_error(&error);
+    }
+});
