@@ -82,7 +82,7 @@ fn columns_can_be_named_typed_and_left_out() {
     let e = with("1 2 3\n", &["x", "y"], None).unwrap_err();
     assert!(e.to_string().contains("2 columns are named (x, y) but the row has 3"), "{e}");
     let e = with("1 2 3\n", &["x", "y", "z:byte"], None).unwrap_err();
-    assert!(e.to_string().contains("the type \"byte\" is not known; types are"), "{e}");
+    assert!(e.to_string().contains("the type \"byte\" of column z is not known; types are"), "{e}");
     let e = with("1 2 3\n", &["x", "a", "z"], None).unwrap_err();
     assert!(e.to_string().contains("there is no y"), "{e}");
 }
