@@ -11,6 +11,8 @@ pub enum Scene {
     /// A street from four scanner positions 18 m apart: density falls with 1/r², scan lines in column order, local
     /// metres on a 0.001 m lattice.
     Terrestrial,
+    /// A knobbly ball of 20 cm, points all over it in no order, local metres on a lattice of 10 µm.
+    Object,
 }
 
 /// One point, world coordinates in metres.
@@ -29,6 +31,7 @@ impl Scene {
         match self {
             Self::Aerial => "aerial",
             Self::Terrestrial => "terrestrial",
+            Self::Object => "object",
         }
     }
 
@@ -36,7 +39,7 @@ impl Scene {
     pub const fn offset(self) -> [f64; 3] {
         match self {
             Self::Aerial => [476_000.0, 4_428_000.0, 400.0],
-            Self::Terrestrial => [0.0; 3],
+            Self::Terrestrial | Self::Object => [0.0; 3],
         }
     }
 
@@ -45,6 +48,7 @@ impl Scene {
         match self {
             Self::Aerial => 0.01,
             Self::Terrestrial => 0.001,
+            Self::Object => 0.000_01,
         }
     }
 
@@ -53,6 +57,7 @@ impl Scene {
         match self {
             Self::Aerial => aerial(index as f64, total as f64, random),
             Self::Terrestrial => terrestrial(index, total, random),
+            Self::Object => object(random),
         }
     }
 }
@@ -120,6 +125,16 @@ fn terrestrial(index: u64, total: u64, random: &mut Random) -> ScenePoint {
     let position: [f64; 3] = std::array::from_fn(|a| origin[a] + range * ray[a]);
     let class = if position[2] < 0.1 { 2 } else { 6 };
     ScenePoint { position, rgb: colour(position[2] * 8.0 - 30.0, random.normal()), class, returns: 1 }
+}
+
+fn object(random: &mut Random) -> ScenePoint {
+    let (azimuth, z) = (random.unit() * TAU, 2.0 * random.unit() - 1.0);
+    let (around, polar) = ((1.0 - z * z).sqrt(), z.acos());
+    let knobs =
+        0.2 * (5.0 * azimuth).sin() * (3.0 * polar).sin() + 0.03 * (31.0 * azimuth).cos() * (29.0 * polar).sin();
+    let radius = 0.08 * (1.0 + knobs) + 0.000_02 * random.normal();
+    let position = [around * azimuth.cos(), around * azimuth.sin(), z].map(|v| v * radius);
+    ScenePoint { position, rgb: colour(knobs * 250.0 + 15.0, random.normal()), class: 0, returns: 1 }
 }
 
 /// SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014), and normal deviates of it.
