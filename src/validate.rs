@@ -1,6 +1,6 @@
 //! `pointmill validate`: does a dataset keep the promises of its format?
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use pointmill_format::{ErrorKind, ReadError};
 use pointmill_validate::{Format, Options, Outcome, locate};
@@ -12,8 +12,40 @@ use crate::progress::Progress;
 use crate::quantities::plural;
 use crate::text;
 
+/// A folder with the outputs of one conversion to several formats is validated one after the other; all are told of,
+/// and the first failure gives the exit code.
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
-    require_dataset(&args.dataset)?;
+    let datasets = several(&args.dataset);
+    if datasets.is_empty() {
+        require_dataset(&args.dataset)?;
+        return one(&args.dataset, args);
+    }
+    if args.json {
+        let names = datasets.iter().map(|d| d.display().to_string()).collect::<Vec<_>>().join(", ");
+        let line = format!("{}: holds several datasets; with --json name one: {names}", args.dataset.display());
+        return Err(Failure::Usage(line));
+    }
+    let mut first = None;
+    for dataset in &datasets {
+        match require_dataset(dataset).and_then(|()| one(dataset, args)) {
+            Err(failure) if first.is_some() => failure.tell(),
+            Err(failure) => first = Some(failure),
+            Ok(()) => {}
+        }
+    }
+    first.map_or(Ok(()), Err)
+}
+
+/// The datasets that one conversion has put into `folder`; none if it is a dataset itself, or no such folder.
+fn several(folder: &Path) -> Vec<PathBuf> {
+    if !folder.join("report.json").is_file() || locate(folder).is_ok() {
+        return Vec::new();
+    }
+    let inside = Format::ALL.iter().map(|format| folder.join(format.name()));
+    inside.filter(|dataset| locate(dataset).is_ok()).collect()
+}
+
+fn one(dataset: &Path, args: &ValidateArgs) -> Result<(), Failure> {
     let mut options = Options { neighbourhoods: !args.fast, open: args.reading.options()?, ..Options::default() };
     if !args.against.is_empty() {
         let found = inputs::expand(&args.against, &options.open)?;
@@ -26,17 +58,17 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
         options.threads = usize::from(threads.get());
     }
     let progress = Progress::new(&args.talk, None);
-    let result = pointmill_validate::validate(&args.dataset, &options, &|p| progress.at(p.phase, p.done, p.total));
+    let result = pointmill_validate::validate(dataset, &options, &|p| progress.at(p.phase, p.done, p.total));
     progress.end();
-    let outcome = result.map_err(|e| failure(e, args))?;
+    let outcome = result.map_err(|e| failure(e, dataset))?;
     if args.json {
         emit(&to_json(&outcome)?)?;
     } else if args.talk.quiet {
         emit(&text::problems(&outcome))?;
     } else {
-        emit(&text::outcome(&args.dataset, &outcome, args.talk.verbose))?;
+        emit(&text::outcome(dataset, &outcome, args.talk.verbose))?;
     }
-    verdict(&args.dataset, &outcome)
+    verdict(dataset, &outcome)
 }
 
 fn verdict(dataset: &Path, outcome: &Outcome) -> Result<(), Failure> {
@@ -66,8 +98,8 @@ fn require_dataset(dataset: &Path) -> Result<(), Failure> {
 }
 
 /// What is broken in the dataset itself is what a validation looks for, however it comes to light.
-fn failure(error: ReadError, args: &ValidateArgs) -> Failure {
-    let in_dataset = error.path.starts_with(&args.dataset);
+fn failure(error: ReadError, dataset: &Path) -> Failure {
+    let in_dataset = error.path.starts_with(dataset);
     match Failure::from(error) {
         Failure::Input(line) if in_dataset => Failure::Faults(line),
         other => other,

@@ -11,5 +11,6 @@ mod inputs;
 mod interrupted;
 mod same_points;
 mod sameness;
+mod several;
 mod support;
 mod telling;

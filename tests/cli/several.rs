@@ -1,0 +1,44 @@
+//! Several formats from one read.
+
+use crate::support::{Dir, Las};
+
+#[test]
+fn each_format_has_its_folder_and_one_command_validates_and_tells_of_all() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(3_000, 1).bytes());
+    let formats = ["--to", "potree2", "--to", "bintree", "--to", "batches"];
+    dir.succeed(["convert", "a.las", "-o", "out"].into_iter().chain(formats));
+    for file in ["potree2/metadata.json", "bintree/index.json", "batches/points.qbatch", "report.json"] {
+        assert!(dir.path("out").join(file).is_file(), "{file}");
+    }
+    let told = dir.succeed(["validate", "out", "--against", "a.las"]).stdout();
+    for format in ["potree2", "bintree", "batches"] {
+        assert!(told.contains(&format!("out/{format}")), "{told}");
+    }
+    let told = dir.succeed(["info", "out"]).stdout();
+    assert!(told.contains("Potree 2.0") && told.contains("mean-split") && told.contains("quantised batches"), "{told}");
+    dir.run(["validate", "out", "--json"]).failed_with(2, &["several", "out/bintree"]);
+
+    // A fault in one of them is found, and the others are told of all the same.
+    std::fs::remove_file(dir.path("out").join("bintree/n.bin")).unwrap();
+    let ended = dir.run(["validate", "out"]);
+    assert!(ended.stdout().contains("out/batches"));
+    ended.failed_with(7, &["out/bintree"]);
+    // What a conversion to several formats made may be replaced, by one of another kind too.
+    dir.succeed(["convert", "a.las", "-o", "out", "--overwrite", "--to", "bintree"]);
+    dir.succeed(["validate", "out", "--against", "a.las"]);
+    dir.succeed(["convert", "a.las", "-o", "out", "--overwrite", "--to", "batches"]);
+    dir.succeed(["convert", "a.las", "-o", "out", "--overwrite"]);
+}
+
+#[test]
+fn options_of_a_format_that_is_not_made_and_formats_named_twice_are_mistakes() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(10, 1).bytes());
+    dir.run(["convert", "a.las", "-o", "out", "--capacity", "10"]).failed_with(2, &["--capacity", "bintree"]);
+    dir.run(["convert", "a.las", "-o", "out", "--planes", "20"]).failed_with(2, &["--planes", "batches"]);
+    let twice = ["convert", "a.las", "-o", "out", "--to", "bintree", "--to", "bintree"];
+    dir.run(twice).failed_with(2, &["--to", "twice"]);
+    dir.run(["convert", "a.las", "-o", "out", "--to", "bintree", "--duplicates", "drop"])
+        .failed_with(4, &["--duplicates drop", "potree2"]);
+}
