@@ -92,7 +92,9 @@ fn coordinates_line(report: &Report) -> String {
         return format!("coordinates are unchanged, step {step}");
     }
     // 0.07 read as a double and 7 steps of 0.01 differ in the last bits
-    if change.max.iter().zip(&report.grid.scale).all(|(max, step)| *max <= step * 1e-6) {
+    let farthest =
+        report.inputs.iter().filter_map(|i| i.bounds_measured).flatten().fold(0.0f64, |far, v| far.max(v.abs()));
+    if change.max.iter().zip(&report.grid.scale).all(|(max, step)| *max <= (step * 1e-6).min(farthest * 1e-15)) {
         return format!("coordinates are unchanged but for the rounding of doubles, step {step}");
     }
     format!(

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use pointmill_format::ReadError;
+use pointmill_format::{Aabb, ReadError};
 
 use crate::budget::Budget;
 use crate::checksum::Checksum;
@@ -12,14 +12,14 @@ use crate::error::ConvertError;
 use crate::events::{Events, Phase};
 use crate::gather::{Gathered, Outcome, Stats, gather, outliers};
 use crate::grid::{Cube, LatticeBounds};
-use crate::job::Job;
+use crate::job::{Job, far_out, too_far};
 use crate::plan::{Plan, Target};
 use crate::report::{PhaseReport, Report};
 use crate::write::dataset::StagedFolder;
 use crate::{batches, bintree, octree};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
-const MAX_PASSES: usize = 3;
+const MAX_PASSES: usize = 4;
 
 /// What every output is made from.
 #[derive(Clone, Copy)]
@@ -186,7 +186,26 @@ fn read(
     for _ in 0..MAX_PASSES {
         clock.phase(Phase::Read, job.points_declared);
         match gather(plan, job, hint, temp_dir, budget.store_bytes, pool, events)? {
-            Outcome::Complete(gathered) => return Ok(gathered),
+            Outcome::Complete(gathered) => {
+                let before = job.lattice.scale[0];
+                let bounds = &gathered.stats.bounds;
+                let (min, max) = (job.lattice.world(bounds.min), job.lattice.world(bounds.max));
+                if far_out(&Aabb { min, max }) {
+                    return Err(too_far(min, max));
+                }
+                if !job.refine(plan, &gathered.stats) {
+                    return Ok(gathered);
+                }
+                let line = format!(
+                    "the bounds that the headers declare made the coordinate step {} times too coarse; reading again",
+                    (before / job.lattice.scale[0]).round()
+                );
+                events.warning(&line);
+                job.warnings.push(line);
+                let quantize = |world: [f64; 3]| [0, 1, 2].map(|a| job.lattice.quantize(a, world[a]));
+                let measured = gathered.stats.sources.iter().fold(Aabb::EMPTY, |all, s| all.union(&s.bounds));
+                hint = Some(LatticeBounds { min: quantize(measured.min), max: quantize(measured.max) });
+            }
             Outcome::Empty(stats) => return Err(nothing_to_convert(job, &stats)),
             Outcome::Retry(bounds) => {
                 let line = "the points lie elsewhere than the headers made expect, or further apart than the coordinate \

@@ -5,6 +5,7 @@ use pointmill_format::{Aabb, ErrorKind, Lattice, ReadError, Resolution, Scan, Wa
 use crate::axis::{AxisMap, SourceMap};
 use crate::error::ConvertError;
 use crate::events::Events;
+use crate::gather::Stats;
 use crate::lattice::{self, Choice, Extent, Steps};
 use crate::needs;
 use crate::plan::{OnFault, Plan};
@@ -33,6 +34,7 @@ pub(crate) struct Job {
     pub(crate) lattice_reason: String,
     /// How it may become coarser.
     steps: Steps,
+    is_coarsened: bool,
     /// What the headers claim (or a sample shows), cut by the filter; a hint.
     pub(crate) bounds_hint: Option<Aabb>,
     pub(crate) points_declared: u64,
@@ -97,6 +99,10 @@ impl Job {
         let hint = hint.filter(|h| !h.is_empty());
         let Choice { lattice, reason, steps } =
             lattice::choose(plan.scale, &infos, &extents, plan.filter.bounds.as_ref());
+        if !lattice.is_valid() {
+            let bounds = hint.unwrap_or(Aabb::EMPTY);
+            return Err(too_far(bounds.min, bounds.max));
+        }
         let points_declared = scans.iter().flat_map(|s| s.pieces()).map(|p| p.points).sum();
         let mut job = Self {
             sources: Vec::new(),
@@ -105,6 +111,7 @@ impl Job {
             lattice,
             lattice_reason: reason,
             steps,
+            is_coarsened: false,
             bounds_hint: hint,
             points_declared,
             points_missing,
@@ -125,6 +132,30 @@ impl Job {
         Ok(job)
     }
 
+    /// Chooses the lattice anew if what was declared of float scans made it far coarser than the points need: what headers
+    /// say may cost a second read, not precision. True if it did.
+    pub(crate) fn refine(&mut self, plan: &Plan, stats: &Stats) -> bool {
+        let infos: Vec<_> = self.sources.iter().map(|s| s.scan.info()).collect();
+        if self.is_coarsened || infos.iter().all(|i| i.lattice.is_some()) {
+            return false;
+        }
+        let measured = stats.sources.iter().map(|s| s.bounds).map(|bounds| Extent { bounds, is_sampled: false });
+        let extents: Vec<_> = measured.map(|e| (!e.bounds.is_empty()).then_some(e)).collect();
+        let choice = lattice::choose(plan.scale, &infos, &extents, plan.filter.bounds.as_ref());
+        if choice.lattice.scale[0] * WORTH_READING_AGAIN > self.lattice.scale[0] {
+            return false;
+        }
+        (self.lattice, self.lattice_reason, self.steps) = (choice.lattice, choice.reason, choice.steps);
+        self.map_sources();
+        true
+    }
+
+    fn map_sources(&mut self) {
+        for source in &mut self.sources {
+            source.map = SourceMap::new(source.scan.info().lattice.as_ref(), &self.lattice);
+        }
+    }
+
     /// Moves the job to a coarser lattice, when its integers turned out too small for the extent.
     pub(crate) fn coarsen(&mut self, bits: u32) {
         let before = self.lattice.scale[0];
@@ -132,9 +163,8 @@ impl Job {
         let factor = (self.lattice.scale[0] / before).round();
         self.lattice_reason =
             format!("{}; made {factor} times coarser, or 31 bits could not hold the extent", self.lattice_reason);
-        for source in &mut self.sources {
-            source.map = SourceMap::new(source.scan.info().lattice.as_ref(), &self.lattice);
-        }
+        self.is_coarsened = true;
+        self.map_sources();
     }
 
     /// Least step of the coordinates of the sources, world units; that of the job where a source does not tell.
@@ -156,6 +186,25 @@ impl Job {
     pub(crate) fn is_lossless(&self) -> bool {
         self.sources.iter().all(|s| s.map.axes.iter().all(AxisMap::is_exact))
     }
+}
+
+/// A step that could be so many times finer, had the headers told the truth, is worth a second read.
+const WORTH_READING_AGAIN: f64 = 100.0;
+
+/// No renderer's single precision holds coordinates beyond this, and no scanner gives them.
+const FARTHEST: f64 = 1e30;
+
+/// True for bounds that cannot be coordinates.
+pub(crate) fn far_out(bounds: &Aabb) -> bool {
+    bounds.min.iter().chain(&bounds.max).any(|v| v.abs() > FARTHEST)
+}
+
+/// The error for them.
+pub(crate) fn too_far(min: [f64; 3], max: [f64; 3]) -> ConvertError {
+    ConvertError::Input(format!(
+        "points lie as far out as {min:?} to {max:?}, which no coordinates do; leave them out with --bounds, or mend the \
+         input"
+    ))
 }
 
 /// Points that the header declares and the file does not hold; an error if the policy says so.

@@ -2,6 +2,7 @@
 
 use pointmill_format::{Aabb, Lattice, PointBatch, Positions, Resolution, Scan, ScanInfo, Scratch, Wanted};
 
+use crate::job::far_out;
 use crate::plan::ScaleChoice;
 
 /// Bits that the extent of a cloud may take up on a lattice that is chosen here: one less than the integers have, since
@@ -10,6 +11,9 @@ const EXTENT_BITS: i32 = 30;
 
 /// The step where nothing at all is known of the coordinates, world units.
 const USUAL_STEP: f64 = 0.001;
+
+/// The least step, world units: below it single precision of renderers ends.
+const LEAST_STEP: f64 = 1e-30;
 
 /// Points looked at in each of three places of a scan that declares no bounds.
 const SAMPLE_POINTS: usize = 131_072;
@@ -45,7 +49,7 @@ impl Extent {
     /// Declared bounds, else those of a sample of the points; `None` if there is no point.
     pub(crate) fn of(scan: &dyn Scan) -> Option<Self> {
         let info = scan.info();
-        if let Some(bounds) = info.bounds_declared {
+        if let Some(bounds) = info.bounds_declared.filter(|b| info.lattice.is_some() || !far_out(b)) {
             return Some(Self { bounds, is_sampled: false });
         }
         let bounds = if info.lattice.is_none() { sample(scan) } else { Aabb::EMPTY };
@@ -166,6 +170,7 @@ impl Need {
         let extent = if is_sampled { 2.0 * extent } else { extent };
         // Doubles themselves have 53 bits; a step is some of their own steps, or the lattice would be uneven.
         let room = (extent / 2f64.powi(EXTENT_BITS)).max(farthest * 2f64.powi(-50));
+        let room = if farthest > 0.0 { room.max(LEAST_STEP) } else { room };
         let resolution = if resolution.is_finite() { resolution } else { 0.0 };
         Self { room, resolution, is_single, farthest }
     }

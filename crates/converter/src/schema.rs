@@ -131,6 +131,10 @@ fn place(all: &mut Vec<Attribute>, attribute: &Attribute) -> usize {
             && a.offset == attribute.offset
     };
     let mut name = attribute.name.clone();
+    // The name of the colour is taken, for three `u16`.
+    if name == "rgb" && !(attribute.ty == AttributeType::UInt16 && attribute.elements == 3) {
+        name = "rgb (2)".to_owned();
+    }
     for suffix in 2.. {
         match all.iter().position(|a| a.name == name) {
             Some(i) if same(&all[i]) => return i,

@@ -158,7 +158,9 @@ pub(super) fn refused(error: WriteError) -> ConvertError {
     match error {
         WriteError::Cell(_) => ConvertError::Usage(format!("--lod-cell: {error}")),
         WriteError::CellTooSmall { .. } => ConvertError::Usage(format!("--lod-cell: {error}, or auto")),
-        WriteError::TooManyPoints(_) | WriteError::Extent(..) => ConvertError::Unsupported(error.to_string()),
+        WriteError::TooManyPoints(_) | WriteError::Extent(..) | WriteError::Input(_) => {
+            ConvertError::Unsupported(format!("batches: {error}"))
+        }
         other => ConvertError::Internal(format!("batches: {other}")),
     }
 }

@@ -1,6 +1,8 @@
 //! From stored records to the records of a leaf: which columns there are, and how they are made.
 
-use pointmill_format::bintree::RecordLayout;
+use std::cmp::Ordering;
+
+use pointmill_format::bintree::{RecordLayout, class_value};
 use pointmill_format::{Attribute, AttributeType};
 
 use crate::convert::Run;
@@ -15,7 +17,6 @@ use crate::schema::Schema;
 pub(super) struct Columns {
     pub(super) record: RecordLayout,
     pub(super) dropped: Vec<DroppedAttribute>,
-    pub(super) warnings: Vec<String>,
     class: Option<(usize, AttributeType)>,
     moves: Vec<Move>,
     has_class: bool,
@@ -62,8 +63,7 @@ impl Columns {
         let mut dropped = needs::dropped(schema, &run.job.unread, kept, why);
         mark_constants(run, &mut dropped);
         let class = class.map(|i| (schema.offsets[i], schema.attributes[i].ty));
-        let warnings = Vec::new();
-        Ok(Self { record, dropped, warnings, class, moves, has_class: class.is_some() })
+        Ok(Self { record, dropped, class, moves, has_class: class.is_some() })
     }
 
     /// Names of what is kept, for the report.
@@ -91,7 +91,7 @@ impl Columns {
                 Move::Copy { from, to, len } => rest[to..to + len].copy_from_slice(&record[from..from + len]),
                 Move::Rgba { from, to } => {
                     for (byte, v) in rest[to..to + 3].iter_mut().zip(record[from..from + 6].as_chunks::<2>().0) {
-                        *byte = ((u32::from(u16::from_le_bytes(*v)) * 255 + 32767) / 65535) as u8;
+                        *byte = eight_bit(*v);
                     }
                     rest[to + 3] = 255;
                 }
@@ -99,13 +99,27 @@ impl Columns {
         }
     }
 
-    /// The bytes of an output record from the class on, by which points of one place are put in order.
-    pub(super) fn tail(&self, record: &[u8]) -> Vec<u8> {
-        let mut tail = pointmill_format::bintree::class_value(self.class(record)).to_le_bytes().to_vec();
-        tail.resize(4 + self.record.stride() - pointmill_format::bintree::CORE_BYTES, 0);
-        self.fill(record, &mut tail[4..]);
-        tail
+    /// Compares the bytes that two stored records have in the output from the class on, by which points of one place are
+    /// put in order.
+    pub(super) fn compare(&self, a: &[u8], b: &[u8]) -> Ordering {
+        let class = |record| class_value(self.class(record)).to_le_bytes();
+        let rgba = |record: &[u8], from: usize| {
+            let mut bytes = [0; 3];
+            let channels = record[from..from + 6].as_chunks::<2>().0;
+            bytes.iter_mut().zip(channels).for_each(|(byte, v)| *byte = eight_bit(*v));
+            bytes
+        };
+        let columns = self.moves.iter().map(|step| match *step {
+            Move::Copy { from, len, .. } => a[from..from + len].cmp(&b[from..from + len]),
+            Move::Rgba { from, .. } => rgba(a, from).cmp(&rgba(b, from)),
+        });
+        columns.fold(class(a).cmp(&class(b)), Ordering::then)
     }
+}
+
+/// A channel of 16 bits in 8, to the nearest.
+fn eight_bit(v: [u8; 2]) -> u8 {
+    ((u32::from(u16::from_le_bytes(v)) * 255 + 32767) / 65535) as u8
 }
 
 enum Extra {

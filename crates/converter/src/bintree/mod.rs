@@ -21,7 +21,7 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use pointmill_format::bintree::{Header, INDEX_FILE, IndexWriter, Node, NodeKind};
+use pointmill_format::bintree::{Header, INDEX_FILE, IndexWriter, Layout, Node, NodeKind};
 use pointmill_format::{Aabb, Lattice};
 
 use self::files::Leaves;
@@ -39,6 +39,9 @@ use crate::write::dataset::StagedDataset;
 /// Tasks of this size keep all threads busy to the end, and few cells are cut above them.
 const MAX_TASK_POINTS: u64 = 2_000_000;
 
+/// So many files are slow to write, to copy and to list.
+const MANY_FILES: usize = 20_000;
+
 /// Builds and writes the dataset.
 pub(crate) fn write(
     run: &Run<'_>,
@@ -46,7 +49,7 @@ pub(crate) fn write(
     staged: &StagedDataset,
 ) -> Result<OutputReport, ConvertError> {
     let columns = Columns::choose(run)?;
-    let bytes_per_point = Builder::bytes_per_point(run.job.schema.stride);
+    let bytes_per_point = Builder::bytes_per_point(run.job.schema.stride, &columns.record, settings.capacity);
     let task_points = run.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
     let upper = upper::split(run, settings, task_points)?;
     for task in &upper.tasks {
@@ -62,6 +65,11 @@ pub(crate) fn write(
     let nodes = assemble(&upper, built);
     let index_bytes = write_index(run, settings, &columns, &nodes, staged)?;
     let told = describe(&nodes);
+    let mut warnings = Vec::new();
+    let leaves = nodes.iter().filter(|n| n.is_leaf()).count();
+    if settings.layout == Layout::Files && leaves > MANY_FILES {
+        warnings.push(format!("{leaves} files, one a leaf: --layout packed puts them into one"));
+    }
     Ok(OutputReport {
         points: nodes.first().map_or(0, |root| root.count),
         attributes: columns.names(),
@@ -70,7 +78,7 @@ pub(crate) fn write(
         checksum: accounts.unaltered().to_string(),
         tree: told.0,
         details: told.1,
-        warnings: columns.warnings,
+        warnings,
         ..OutputReport::default()
     })
 }

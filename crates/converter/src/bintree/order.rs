@@ -1,5 +1,7 @@
 //! The order of points in a leaf: Morton order relative to the leaf's least integers.
 
+use std::cmp::Ordering;
+
 use crate::build::sort::radix_sort;
 use crate::morton;
 
@@ -12,15 +14,15 @@ pub(super) struct OrderScratch {
     swap: Vec<u64>,
 }
 
-/// Indices of `items` in Morton order, all bits of the coordinates; points of one place by `tail`, the bytes of their
-/// records behind the position.
+/// Indices of `items` in Morton order, all bits of the coordinates; points of one place by `tails`, which compares the
+/// bytes of their records behind the position.
 pub(super) fn order(
     items: &[Item],
     min: [i32; 3],
     max: [i32; 3],
     scratch: &mut OrderScratch,
     out: &mut Vec<u32>,
-    tail: impl Fn(&Item) -> Vec<u8>,
+    tails: impl Fn(&Item, &Item) -> Ordering,
 ) {
     let index_bits = usize::BITS - items.len().saturating_sub(1).leading_zeros();
     let extent = (0..3).map(|a| max[a].abs_diff(min[a])).max().unwrap_or(0);
@@ -46,10 +48,10 @@ pub(super) fn order(
             end += 1;
         }
         if end - start > 1 {
-            let mut run: Vec<([u32; 3], Vec<u8>, u32)> =
-                out[start..end].iter().map(|&i| (relative(&items[i as usize]), tail(&items[i as usize]), i)).collect();
-            run.sort_by(|a, b| morton::compare(a.0, b.0).then_with(|| a.1.cmp(&b.1)));
-            out[start..end].iter_mut().zip(run).for_each(|(to, (.., i))| *to = i);
+            out[start..end].sort_unstable_by(|a, b| {
+                let (a, b) = (&items[*a as usize], &items[*b as usize]);
+                morton::compare(relative(a), relative(b)).then_with(|| tails(a, b))
+            });
         }
         start = end;
     }
@@ -62,8 +64,8 @@ mod tests {
     fn sorted(items: &[Item]) -> Vec<u32> {
         let ends = |f: fn(i32, i32) -> i32| [0, 1, 2].map(|a| items.iter().map(|i| i.q[a]).reduce(f).unwrap());
         let mut out = Vec::new();
-        let tail = |i: &Item| vec![(i.record % 5) as u8];
-        order(items, ends(i32::min), ends(i32::max), &mut OrderScratch::default(), &mut out, tail);
+        let tails = |a: &Item, b: &Item| (a.record % 5).cmp(&(b.record % 5));
+        order(items, ends(i32::min), ends(i32::max), &mut OrderScratch::default(), &mut out, tails);
         out
     }
 
@@ -88,7 +90,7 @@ mod tests {
                 let [a, b] = [pair[0], pair[1]].map(|i| &items[i as usize]);
                 let at = |i: &Item| -> [u32; 3] { std::array::from_fn(|k| i.q[k].abs_diff(min[k])) };
                 let order = morton::compare(at(a), at(b)).then((a.record % 5).cmp(&(b.record % 5)));
-                assert_ne!(order, std::cmp::Ordering::Greater);
+                assert_ne!(order, Ordering::Greater);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, leaf_center};
+use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, RecordLayout, leaf_center};
 use pointmill_format::{Aabb, Lattice};
 
 use super::files::Leaves;
@@ -19,6 +19,9 @@ use crate::grid::LatticeBounds;
 use crate::os_hints;
 use crate::plan::BintreeSettings;
 use crate::records::position;
+
+/// Leaves above this are counted in the memory of a task.
+const LARGE_LEAF: u32 = 100_000;
 
 /// A point: the integers of its record, and which record that is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -72,9 +75,11 @@ struct Extent {
 }
 
 impl<'a> Builder<'a> {
-    /// Memory for a point while its subtree is built: record, two items, and (small beside these) its leaf's order.
-    pub(super) fn bytes_per_point(stride: usize) -> u64 {
-        stride as u64 + 2 * size_of::<Item>() as u64 + 2
+    /// Memory for a point while its subtree is built: record and two items. A leaf's keys, order and bytes count if
+    /// leaves may be as large as tasks.
+    pub(super) fn bytes_per_point(stride: usize, record: &RecordLayout, capacity: u32) -> u64 {
+        let leaf = if capacity > LARGE_LEAF { 20 + record.stride() as u64 } else { 2 };
+        stride as u64 + 2 * size_of::<Item>() as u64 + leaf
     }
 
     pub(super) fn new(
@@ -174,7 +179,7 @@ impl<'a> Builder<'a> {
                     let split = q as f64 * lattice.scale[axis] + lattice.offset[axis];
                     return Ok(inner(NodeKind::Inner { axis: axis as u8, split, high: 0 }));
                 }
-                self.put_in_order(&range, &extent);
+                self.put_in_order(&range);
                 count.div_ceil(capacity)
             }
             What::Cut { leaves } => leaves,
@@ -222,14 +227,13 @@ impl<'a> Builder<'a> {
         if value < max { value } else { below_max().unwrap_or(value) }
     }
 
-    fn put_in_order(&mut self, range: &Range<usize>, extent: &Extent) {
+    /// Points of one place.
+    fn put_in_order(&mut self, range: &Range<usize>) {
         let stride = self.run.job.schema.stride;
         let (columns, records) = (self.columns, &self.records);
-        let tail = |item: &Item| columns.tail(&records[item.record as usize * stride..][..stride]);
-        let items = &mut self.items[range.clone()];
-        order(items, extent.min, extent.max, &mut self.scratch, &mut self.order, tail);
-        let ordered: Vec<Item> = self.order.iter().map(|i| items[*i as usize]).collect();
-        items.copy_from_slice(&ordered);
+        let record = |item: &Item| &records[item.record as usize * stride..][..stride];
+        // In place: there may be as many as a task has points.
+        self.items[range.clone()].sort_unstable_by(|a, b| columns.compare(record(a), record(b)));
     }
 
     /// Encodes and writes a leaf.
@@ -247,7 +251,9 @@ impl<'a> Builder<'a> {
         let record = |item: &Item| &records[item.record as usize * stride..][..stride];
         let items = &self.items[range.clone()];
         if must_order {
-            order(items, extent.min, extent.max, &mut self.scratch, &mut self.order, |i| columns.tail(record(i)));
+            order(items, extent.min, extent.max, &mut self.scratch, &mut self.order, |a, b| {
+                columns.compare(record(a), record(b))
+            });
         } else {
             self.order.clear();
             self.order.extend(0..items.len() as u32);

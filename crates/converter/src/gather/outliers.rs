@@ -32,7 +32,7 @@ impl Outliers {
         let gain = if held_back { "the coordinate step could be finer and" } else { "" };
         let corner = |c: [f64; 3], to: fn(f64) -> f64| c.map(|v| to(v).to_string()).join(",");
         format!(
-            "{} {lie} far from all others and {make} the extent {} times larger; without {them} {gain} the tree would have \
+            "{} {lie} far from all others and {make} the extent at least {} times larger; without {them} {gain} the tree would have \
              fewer levels: --bounds {}..{} leaves {them} out",
             self.points,
             self.factor.floor(),

@@ -21,6 +21,9 @@ use crate::write::payload::PayloadWriter;
 
 pub(crate) use metadata::choose_attributes;
 
+/// Elements of an attribute that readers of the format accept.
+const MAX_ELEMENTS: usize = 16;
+
 /// Levels a hierarchy chunk, as the reference converter has it.
 const HIERARCHY_STEP: u32 = 4;
 
@@ -29,6 +32,14 @@ pub(crate) fn write(run: &Run<'_>, staged: &StagedDataset) -> Result<OutputRepor
     let Run { plan, job, gathered, facts, budget, .. } = *run;
     let choice = choose_attributes(&plan.attributes, job, &facts.ranges);
     let frame = RecordFrame { stride: job.schema.stride, cube: gathered.cube, base: gathered.base };
+    let wide = choice.kept.iter().map(|&i| &job.schema.attributes[i]).find(|a| a.elements > MAX_ELEMENTS);
+    if let Some(attribute) = wide {
+        return Err(ConvertError::Unsupported(format!(
+            "potree2: \"{}\" has {} elements a point, viewers read up to {MAX_ELEMENTS}; name the attributes to keep with \
+             --attributes",
+            attribute.name, attribute.elements
+        )));
+    }
     let layout = OutputLayout::new(&job.schema, &choice.kept, &frame);
     let chunks = chunks::plan(gathered, &frame, budget.chunk_points)?;
     for chunk in &chunks {

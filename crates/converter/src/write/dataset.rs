@@ -1,7 +1,7 @@
 //! A dataset is made beside its final name, synced and renamed: finished or not there.
 
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
@@ -120,15 +120,64 @@ impl StagedDataset {
     }
 }
 
-/// Files by one of which a folder is known as a dataset.
-const DATASET_FILES: [&str; 3] = ["metadata.json", "index.json", "points.qbatch"];
+/// What the first file of a dataset must hold near its start, and the names of all files that one may have.
+const DATASETS: [(&str, &str, &[&str]); 3] = [
+    ("metadata.json", "\"hierarchy\"", &["hierarchy.bin", "octree.bin", "log.txt"]),
+    ("index.json", "\"pointmill-bintree\"", &["leaves.bin"]),
+    ("points.qbatch", "QBATCHES", &[]),
+];
 
-/// True for a folder that holds a dataset, or several in folders of their names.
-fn is_dataset(folder: &Path) -> bool {
-    let holds_one = |folder: &Path| DATASET_FILES.iter().any(|f| folder.join(f).is_file());
-    holds_one(folder)
-        || folder.join("report.json").is_file()
-            && ["potree2", "bintree", "batches"].iter().any(|name| holds_one(&folder.join(name)))
+/// Folders of the datasets that one conversion makes.
+const FOLDERS: [&str; 3] = ["potree2", "bintree", "batches"];
+
+/// Bytes in which a dataset makes itself known.
+const KNOWN_BYTES: u64 = 64 << 10;
+
+/// `Ok(None)`: the folder is a dataset, or several in folders of their names, and nothing else. `Ok(Some(path))`: it is,
+/// but holds something that is none of it.
+///
+/// # Errors
+/// It is no dataset.
+fn foreign_file(folder: &Path) -> Result<Option<PathBuf>, ()> {
+    let kind = DATASETS.iter().find(|(file, mark, _)| starts_with_mark(&folder.join(file), mark));
+    let inside: Vec<&str> = match kind {
+        Some(_) => Vec::new(),
+        None if folder.join("report.json").is_file() => {
+            FOLDERS.into_iter().filter(|name| foreign_file(&folder.join(name)).is_ok()).collect()
+        }
+        None => Vec::new(),
+    };
+    if kind.is_none() && inside.is_empty() {
+        return Err(());
+    }
+    let is_leaf = |name: &str| {
+        let path = name.strip_prefix('n').and_then(|n| n.strip_suffix(".bin"));
+        path.is_some_and(|p| p.bytes().all(|b| matches!(b, b'0' | b'1')))
+    };
+    let is_ours = |name: &str| {
+        name == "report.json"
+            || inside.contains(&name)
+            || kind.is_some_and(|(file, _, others)| {
+                name == *file || others.contains(&name) || *file == "index.json" && is_leaf(name)
+            })
+    };
+    for entry in fs::read_dir(folder).map_err(|_| ())?.flatten() {
+        if !entry.file_name().to_str().is_some_and(is_ours) {
+            return Ok(Some(entry.path()));
+        }
+    }
+    for name in inside {
+        if let Ok(Some(path)) = foreign_file(&folder.join(name)) {
+            return Ok(Some(path));
+        }
+    }
+    Ok(None)
+}
+
+fn starts_with_mark(file: &Path, mark: &str) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(file).and_then(|f| f.take(KNOWN_BYTES).read_to_end(&mut start));
+    read.is_ok() && start.windows(mark.len()).any(|w| w == mark.as_bytes())
 }
 
 /// An output may be replaced if it is a dataset or an empty folder; anything else is not ours to delete.
@@ -141,13 +190,19 @@ fn check_output(output: &Path, overwrite: bool) -> Result<(), ConvertError> {
     if !overwrite {
         return Err(ConvertError::OutputExists(output.to_path_buf()));
     }
-    if !meta.is_dir() || !is_dataset(output) {
-        return Err(ConvertError::Usage(format!(
-            "{}: exists and is not a dataset, so --overwrite does not replace it; choose another output",
-            output.display()
-        )));
+    let found = if meta.is_dir() { foreign_file(output) } else { Err(()) };
+    let output = output.display();
+    match found {
+        Ok(None) => Ok(()),
+        Ok(Some(foreign)) => Err(ConvertError::Usage(format!(
+            "{output}: {} in it is no part of a dataset, so --overwrite does not replace it; move it away, or choose another \
+             output",
+            foreign.display()
+        ))),
+        Err(()) => Err(ConvertError::Usage(format!(
+            "{output}: exists and is not a dataset, so --overwrite does not replace it; choose another output"
+        ))),
     }
-    Ok(())
 }
 
 fn parent_of(output: &Path) -> PathBuf {
@@ -206,11 +261,15 @@ mod tests {
         assert!(matches!(StagedFolder::new(&out, false), Err(ConvertError::OutputExists(_))));
         assert!(matches!(StagedFolder::new(&out, true), Err(ConvertError::Usage(_))));
         fs::write(out.join("metadata.json"), "{}").unwrap();
+        assert!(matches!(StagedFolder::new(&out, true), Err(ConvertError::Usage(_))), "metadata of something else");
+        fs::write(out.join("metadata.json"), "{\"hierarchy\": {}}").unwrap();
+        let refused = StagedFolder::new(&out, true).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(refused.contains("letter.txt"), "{refused}");
+        fs::remove_file(out.join("letter.txt")).unwrap();
         let staged = StagedFolder::new(&out, true).unwrap();
         staged.write("metadata.json", b"new").unwrap();
         staged.finish().unwrap();
         assert_eq!(fs::read(out.join("metadata.json")).unwrap(), b"new");
-        assert!(!out.join("letter.txt").exists());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 }
