@@ -57,7 +57,7 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     }
     warnings.extend(notes.lines());
     let bounds_declared = bounds(&drafts);
-    let resolution = resolution(&drafts);
+    let resolution = resolution(&source, &drafts);
     let parts = document.clouds.iter().map(part).collect();
     let (mut scans, mut cuts) = (Vec::new(), Vec::new());
     for (i, (draft, fills)) in drafts.into_iter().zip(fills).enumerate() {
@@ -205,8 +205,14 @@ fn pieces(cuts: &[Cut]) -> Vec<Piece> {
 }
 
 /// The finest step of all scans, if each stores its coordinates in steps.
-fn resolution(drafts: &[Draft<'_>]) -> Resolution {
-    let steps = drafts.iter().map(|draft| draft.roles.positions.step(&draft.fields, draft.cloud));
+fn resolution(source: &Source, drafts: &[Draft<'_>]) -> Resolution {
+    let steps = drafts.iter().map(|draft| {
+        let farthest = |field: usize| {
+            let (min, max) = sample(source, draft, &[field]);
+            if min <= max { min.abs().max(max.abs()) } else { 0.0 }
+        };
+        draft.roles.positions.step(&draft.fields, farthest)
+    });
     match steps.collect::<Option<Vec<_>>>().and_then(|steps| steps.into_iter().reduce(f64::min)) {
         Some(step) if step.is_finite() && step > 0.0 => Resolution::Step(step),
         _ => Resolution::Double,

@@ -142,22 +142,19 @@ impl Roles {
 
 impl PositionFields {
     /// The step of the coordinates as they are stored, before the pose; `None` if it is finer than can be told.
-    pub(super) fn step(&self, fields: &[Field], cloud: &PointCloud) -> Option<f64> {
-        let axes = self.cartesian?.into_iter().flatten().map(|i| &fields[i]).enumerate();
-        let local = cloud.cartesian_bounds.as_ref();
-        let ranges = local.map(|b| [(b.x_min, b.x_max), (b.y_min, b.y_max), (b.z_min, b.z_max)]);
-        let farthest = |axis: usize| {
-            let (min, max) = ranges?[axis];
-            Some(min?.abs().max(max?.abs())).filter(|f| *f > 0.0 && *f < 1e30)
-        };
-        let step = |(axis, field): (usize, &Field)| match field.encoding {
+    /// `farthest`: the largest value of a field, of a sample: what the file declares may be wrong by orders of magnitude.
+    pub(super) fn step(&self, fields: &[Field], farthest: impl Fn(usize) -> f64) -> Option<f64> {
+        let step = |i: usize| match fields[i].encoding {
             Encoding::Scaled { scale, .. } => Some(scale.abs()),
             Encoding::Integer { .. } => Some(1.0),
             // 24 bits of the largest coordinate
-            Encoding::Single => farthest(axis).map(|f| 2f64.powi(f.log2().floor() as i32 - 23)),
+            Encoding::Single => {
+                let far = Some(farthest(i)).filter(|f| *f > 0.0 && *f < 1e30)?;
+                Some(2f64.powi(far.log2().floor() as i32 - 23))
+            }
             Encoding::Double | Encoding::Text => None,
         };
-        axes.map(step).collect::<Option<Vec<_>>>()?.into_iter().reduce(f64::min)
+        self.cartesian?.into_iter().flatten().map(step).collect::<Option<Vec<_>>>()?.into_iter().reduce(f64::min)
     }
 
     /// Marks the fields that positions need.
