@@ -24,7 +24,7 @@
 //! What renderers compute is here as plain functions, the same ones that the writer uses: [`swap_slot`], [`weight`],
 //! [`BatchRecord::quantize`] and [`BatchRecord::decoder`], [`Precision::for_error`], [`keeps`].
 //!
-//! To write: [`write`] does all of it for a cloud in memory, and is the reference for others. A writer that works in
+//! To write: [`write()`] does all of it for a cloud in memory, and is the reference for others. A writer that works in
 //! parallel or out of core asks [`Layout`] where everything will lie, encodes batches with [`encode_batch`] in any
 //! order on any thread, writes them at their places, and ends with [`Layout::finish`].
 //!

@@ -31,7 +31,7 @@ pub struct WriteOptions {
     pub cell: f64,
     /// The planes to write; `None`: those that the lattice needs ([`Precision::for_steps`]).
     pub precision: Option<Precision>,
-    /// What is told of the cloud; [`write`] fills in attributes and errors.
+    /// What is told of the cloud; [`write()`] fills in attributes and errors.
     pub description: Description,
 }
 
