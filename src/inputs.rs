@@ -15,7 +15,7 @@ use pointmill_format::{ErrorKind, OpenOptions, ScanKind, supported_scans};
 
 use crate::args::InputArgs;
 use crate::exit::Failure;
-use crate::quantities::plural;
+use crate::human::quantities::plural;
 
 /// The scans to read, and what the user should know about the search for them.
 #[derive(Debug, Default)]

@@ -2,25 +2,19 @@
 
 mod batches;
 mod bintree;
+mod description;
+mod measure;
 mod potree2;
 mod scan;
 
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{Aabb, Attribute};
-use serde_json::{Value, json};
+use description::Told;
+use serde_json::Value;
 
 use crate::args::InfoArgs;
 use crate::exit::{Failure, emit, tell};
 use crate::inputs;
-
-/// What there is to say about a scan or a dataset.
-struct Told {
-    text: String,
-    json: Value,
-    /// What kept the rest from being told; the other two hold what could be.
-    fault: Option<Failure>,
-}
 
 /// A kind of dataset.
 struct DatasetKind {
@@ -124,19 +118,4 @@ impl Output {
             Some(_) => failure.tell(),
         }
     }
-}
-
-fn attribute_json(attribute: &Attribute) -> Value {
-    json!({
-        "name": attribute.name,
-        "type": attribute.ty.potree_name(),
-        "elements": attribute.elements,
-        "scale": attribute.scale,
-        "offset": attribute.offset,
-        "no_data": attribute.no_data,
-    })
-}
-
-fn corners(bounds: &Aabb) -> Value {
-    json!({ "min": bounds.min, "max": bounds.max })
 }

@@ -5,11 +5,11 @@ use std::path::Path;
 use pointmill_format::{OpenOptions, Resolution, Scan, ScanInfo, ScanPart};
 use serde_json::{Map, Value, json};
 
-use super::{Told, attribute_json, corners};
+use super::description::{Told, attribute_json, corners};
+use super::measure::{Measured, measure};
 use crate::exit::Failure;
-use crate::measure::{Measured, measure};
-use crate::quantities::{bytes, count, number, numbers, plural};
-use crate::text::{self, Table, attribute_line};
+use crate::human::quantities::{bytes, count, number, numbers, plural};
+use crate::human::text::{self, Table, attribute_line};
 
 /// Scans of a file that are named one by one for people; JSON names all.
 const MAX_PARTS: usize = 30;

@@ -6,10 +6,10 @@ use pointmill_format::ReadError;
 use pointmill_format::potree2::{Dataset, Metadata, Node};
 use serde_json::{Value, json};
 
-use super::{Told, attribute_json, corners};
+use super::description::{Told, attribute_json, corners};
 use crate::exit::Failure;
-use crate::quantities::{bytes, count, number, numbers, plural};
-use crate::text::{self, Table, attribute_line, or_none};
+use crate::human::quantities::{bytes, count, number, numbers, plural};
+use crate::human::text::{self, Table, attribute_line, or_none};
 
 /// Tells of the dataset that `metadata` (its `metadata.json`) belongs to.
 pub(super) fn tell(metadata: &Path) -> Result<Told, Failure> {

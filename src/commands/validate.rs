@@ -7,10 +7,10 @@ use pointmill_validate::{Format, Options, Outcome, locate};
 
 use crate::args::ValidateArgs;
 use crate::exit::{Failure, emit, tell, to_json};
+use crate::human::progress::Progress;
+use crate::human::quantities::plural;
+use crate::human::validation;
 use crate::inputs;
-use crate::progress::Progress;
-use crate::quantities::plural;
-use crate::text;
 
 /// A folder with the outputs of one conversion to several formats is validated one after the other; all are told of,
 /// and the first failure gives the exit code.
@@ -64,9 +64,9 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(), Failure> {
     if args.json {
         emit(&to_json(&outcome)?)?;
     } else if args.talk.quiet {
-        emit(&text::problems(&outcome))?;
+        emit(&validation::problems(&outcome))?;
     } else {
-        emit(&text::outcome(dataset, &outcome, args.talk.verbose))?;
+        emit(&validation::outcome(dataset, &outcome, args.talk.verbose))?;
     }
     verdict(dataset, &outcome)
 }

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, Report, RgbDepth,
-    Sampling, ScaleChoice, Target,
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, RgbDepth, Sampling,
+    ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
@@ -14,10 +14,10 @@ use crate::args::{
     SamplingArg, SplitArg, TargetArg,
 };
 use crate::exit::{Failure, emit, tell, to_json};
+use crate::human::conversion;
+use crate::human::progress::Progress;
 use crate::inputs::Inputs;
 use crate::interrupt::stop_flag;
-use crate::progress::Progress;
-use crate::text;
 
 /// Brotli's knee for node payloads: above it the time grows several times over for a few per cent.
 const BROTLI_QUALITY: u8 = 5;
@@ -31,7 +31,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let plan = plan(args, targets, inputs)?;
     if args.dry_run {
         let estimate = pointmill_converter::estimate(&plan)?;
-        return emit(&if args.json { to_json(&estimate)? } else { text::estimate(&estimate, &plan) });
+        return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
     }
     protect_inputs(&plan)?;
     if let Some(file) = &args.report {
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         emit(&to_json(&report)?)?;
     }
     if for_people {
-        text::report(&report, &plan, args.talk.verbose).iter().for_each(|line| tell(line));
+        conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| tell(line));
     }
     Ok(())
 }
@@ -216,10 +216,4 @@ fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
         )));
     }
     Ok(())
-}
-
-/// What a report says besides figures: true if every point read is in the dataset or accounted for.
-pub(crate) fn points_left_out(report: &Report) -> u64 {
-    let p = &report.points;
-    p.outside_bounds + p.other_class + p.thinned + p.duplicates_dropped + p.invalid + p.unreadable
 }

@@ -6,10 +6,10 @@ use pointmill_format::bintree::{Bintree, Header};
 use pointmill_format::{Aabb, Attribute};
 use serde_json::{Value, json};
 
-use super::{Told, attribute_json, corners};
+use super::description::{Told, attribute_json, corners};
 use crate::exit::Failure;
-use crate::quantities::{bytes, count, number, numbers, plural};
-use crate::text::{self, Table, attribute_line, or_none};
+use crate::human::quantities::{bytes, count, number, numbers, plural};
+use crate::human::text::{self, Table, attribute_line, or_none};
 
 /// Tells of the dataset that `index` (its `index.json`) belongs to.
 pub(super) fn tell(index: &Path) -> Result<Told, Failure> {

@@ -9,9 +9,9 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use pointmill_converter::{Events, Phase};
 use serde_json::json;
 
+use super::quantities::{count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::tell;
-use crate::quantities::{count, rate, seconds};
 
 /// No program needs JSON lines more often, and a line a batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);

@@ -6,10 +6,10 @@ use pointmill_format::Attribute;
 use pointmill_format::batches::{BatchRecord, Batches};
 use serde_json::{Value, json};
 
-use super::{Told, attribute_json, corners};
+use super::description::{Told, attribute_json, corners};
 use crate::exit::Failure;
-use crate::quantities::{bytes, count, number, numbers, plural};
-use crate::text::{self, Table, attribute_line, or_none};
+use crate::human::quantities::{bytes, count, number, numbers, plural};
+use crate::human::text::{self, Table, attribute_line, or_none};
 
 /// Tells of the file `points.qbatch`, however it is called.
 pub(super) fn tell(file: &Path) -> Result<Told, Failure> {
