@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use pointmill_format::{ErrorKind, ReadError};
-use pointmill_validate::{Format, Options, Outcome, locate};
+use pointmill_validate::{Options, Outcome, locate};
 
 use crate::args::ValidateArgs;
+use crate::datasets;
 use crate::exit::{Failure, emit, tell, to_json};
 use crate::human::progress::Progress;
 use crate::human::quantities::plural;
@@ -38,11 +39,10 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
 
 /// The datasets that one conversion has put into `folder`; none if it is a dataset itself, or no such folder.
 fn several(folder: &Path) -> Vec<PathBuf> {
-    if !folder.join("report.json").is_file() || locate(folder).is_ok() {
+    if locate(folder).is_ok() {
         return Vec::new();
     }
-    let inside = Format::ALL.iter().map(|format| folder.join(format.name()));
-    inside.filter(|dataset| locate(dataset).is_ok()).collect()
+    datasets::inside(folder).into_iter().map(|dataset| folder.join(dataset.kind.name())).collect()
 }
 
 fn one(dataset: &Path, args: &ValidateArgs) -> Result<(), Failure> {
@@ -90,8 +90,7 @@ fn require_dataset(dataset: &Path) -> Result<(), Failure> {
         ErrorKind::Io(_) => Failure::from(error),
         _ => Failure::Usage(error.to_string()),
     })?;
-    let needed: &[&str] = if located.format == Format::Potree2 { &["hierarchy.bin", "octree.bin"] } else { &[] };
-    match needed.iter().find(|name| !located.path.join(name).exists()) {
+    match located.kind.required_files().iter().find(|name| !located.path.join(name).exists()) {
         Some(name) => Err(Failure::Faults(format!("{path}: {name} is missing; convert or copy the dataset again"))),
         None => Ok(()),
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pointmill_validate::{Format, LeafQuality, LevelQuality, Outcome};
+use pointmill_validate::{DatasetKind, LeafQuality, LevelQuality, Outcome};
 
 use super::quantities::{count, plural};
 use super::text::printable;
@@ -12,8 +12,8 @@ use super::text::printable;
 pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> String {
     let mut out = printable(&dataset.to_string_lossy());
     let nodes = match (outcome.format, outcome.nodes) {
-        (Format::Batches, 1) => "1 batch".to_owned(),
-        (Format::Batches, n) => format!("{} batches", count(n)),
+        (DatasetKind::Batches, 1) => "1 batch".to_owned(),
+        (DatasetKind::Batches, n) => format!("{} batches", count(n)),
         (_, n) => plural(n, "node"),
     };
     let points = plural(outcome.points, "point");

@@ -16,6 +16,7 @@
 
 mod aabb;
 mod attributes;
+mod dataset_kind;
 mod error;
 mod kind;
 mod lattice;
@@ -47,6 +48,7 @@ pub mod text;
 
 pub use aabb::Aabb;
 pub use attributes::{Attribute, AttributeType};
+pub use dataset_kind::{DatasetKind, Located, UnknownDatasetKind, locate};
 pub use error::{ErrorKind, ReadError};
 pub use kind::{OpenOptions, ScanKind, open_scan, supported_scans};
 pub use lattice::Lattice;

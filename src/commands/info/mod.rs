@@ -7,57 +7,31 @@ mod measure;
 mod potree2;
 mod scan;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use description::Told;
+use pointmill_format::{DatasetKind, Located, locate};
 use serde_json::Value;
 
 use crate::args::InfoArgs;
+use crate::datasets;
 use crate::exit::{Failure, emit, tell};
 use crate::inputs;
 
-/// A kind of dataset.
-struct DatasetKind {
-    /// The file in its folder that it is known by.
-    marker: &'static str,
-    /// Given that file.
-    tell: fn(&Path) -> Result<Told, Failure>,
+/// Tells of a dataset; each kind has a file here.
+fn tell_dataset(dataset: &Located) -> Result<Told, Failure> {
+    let marker = dataset.marker_path();
+    match dataset.kind {
+        DatasetKind::Potree2 => potree2::tell(&marker),
+        DatasetKind::Bintree => bintree::tell(&marker),
+        DatasetKind::Batches => batches::tell(&marker),
+        other => Err(Failure::Usage(format!("{}: info does not read datasets of kind {other}", marker.display()))),
+    }
 }
 
-/// The kinds that are told of; each has a file here.
-const DATASET_KINDS: [DatasetKind; 3] = [
-    DatasetKind { marker: "metadata.json", tell: potree2::tell },
-    DatasetKind { marker: "index.json", tell: bintree::tell },
-    DatasetKind { marker: "points.qbatch", tell: batches::tell },
-];
-
-/// Folders that a conversion to several formats makes in its output.
-const OUTPUT_FOLDERS: [&str; 3] = ["potree2", "bintree", "batches"];
-
-impl DatasetKind {
-    /// The datasets at `path`: the one that it is, or those that one conversion has put into it.
-    fn find_all(path: &Path) -> Vec<(&'static Self, PathBuf)> {
-        match Self::find(path) {
-            Some(one) => vec![one],
-            None if path.join("report.json").is_file() => {
-                OUTPUT_FOLDERS.iter().filter_map(|folder| Self::find(&path.join(folder))).collect()
-            }
-            None => Vec::new(),
-        }
-    }
-
-    /// The kind of the dataset that `path` is (its folder, or the file it is known by), and that file.
-    fn find(path: &Path) -> Option<(&'static Self, PathBuf)> {
-        if path.is_file() && path.extension().is_some_and(|e| e == "qbatch") {
-            return DATASET_KINDS.last().map(|kind| (kind, path.to_path_buf()));
-        }
-        DATASET_KINDS.iter().find_map(|kind| {
-            let inside = path.join(kind.marker);
-            let is_marker = || path.is_file() && path.file_name().is_some_and(|name| name == kind.marker);
-            let file = if inside.is_file() { inside } else { is_marker().then(|| path.to_path_buf())? };
-            Some((kind, file))
-        })
-    }
+/// The datasets at `path`: the one that it is, or those that one conversion has put into it.
+fn datasets(path: &Path) -> Vec<Located> {
+    locate(path).map_or_else(|_| datasets::inside(path), |one| vec![one])
 }
 
 /// Every path is told of; the exit code is that of the first that could not be.
@@ -65,9 +39,9 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let options = args.reading.options()?;
     let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };
     for path in &args.paths {
-        let datasets = DatasetKind::find_all(path);
-        for (kind, file) in &datasets {
-            out.show((kind.tell)(file))?;
+        let datasets = datasets(path);
+        for dataset in &datasets {
+            out.show(tell_dataset(dataset))?;
         }
         if !datasets.is_empty() {
             continue;
