@@ -10,7 +10,7 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use pointmill_format::text::TextKind;
+use pointmill_format::scan::text::TextKind;
 use pointmill_format::{ErrorKind, OpenOptions, ScanKind, supported_scans};
 
 use crate::args::InputArgs;

@@ -46,7 +46,8 @@ impl ReadingArgs {
     /// For the readers; columns that cannot be are told before any file is opened.
     pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
         if let Some(columns) = &self.columns {
-            pointmill_format::text::check_columns(columns).map_err(|e| Failure::Usage(format!("--columns: {e}")))?;
+            pointmill_format::scan::text::check_columns(columns)
+                .map_err(|e| Failure::Usage(format!("--columns: {e}")))?;
         }
         let Self { columns, separator, row_column } = self;
         Ok(OpenOptions { columns: columns.clone(), separator: *separator, keep_row_column: *row_column })

@@ -1,5 +1,7 @@
 //! The job lattice: the sources' own where they have one, else one that fits their coordinates.
 
+use std::ops::ControlFlow;
+
 use pointmill_format::{Aabb, Lattice, PointBatch, Positions, Resolution, Scan, ScanInfo, Scratch, Wanted};
 
 use crate::job::far_out;
@@ -72,7 +74,7 @@ fn sample(scan: &dyn Scan) -> Aabb {
                 points.filter(finite).for_each(|p| bounds.grow(p));
             }
             seen += batch.len();
-            seen < SAMPLE_POINTS
+            if seen < SAMPLE_POINTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
         let _ = scan.decode(place, &wanted, &mut scratch, &mut sink);
     }

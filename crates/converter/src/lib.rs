@@ -26,7 +26,6 @@ mod describe;
 mod error;
 mod estimate;
 mod events;
-mod file_at;
 mod gather;
 mod grid;
 mod job;

@@ -1,5 +1,6 @@
 //! What decoding every point tells: the true count, bounds, and range of each attribute.
 
+use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -83,7 +84,7 @@ pub(crate) fn measure(scan: &dyn Scan) -> (Measured, Option<ReadError>) {
             let wanted = Wanted::all(scan.info());
             let mut sink = |batch: &PointBatch| {
                 mine.add(batch, scan);
-                true
+                ControlFlow::Continue(())
             };
             if let Err(e) = scan.decode(piece, &wanted, &mut scratch, &mut sink) {
                 fault.get_or_insert((piece, e));

@@ -4,13 +4,13 @@ use std::fs::File;
 use std::path::Path;
 
 use pointmill_format::batches::{BATCH_POINTS, Flags, Header, SECTION_ALIGNMENT, Section};
+use pointmill_format::bytes::{read_exact_at, write_all_at};
 use zstd::bulk::Compressor;
 
 use super::finish::Finished;
 use super::work::in_parallel;
 use crate::convert::Run;
 use crate::error::ConvertError;
-use crate::file_at::{read_exact_at, write_all_at};
 
 /// Batches of a block: 640 KiB of words.
 const BATCHES_PER_BLOCK: u64 = 16;

@@ -8,10 +8,10 @@ use std::sync::{Mutex, MutexGuard};
 use pointmill_format::batches::{
     BATCH_POINTS, BatchRecord, EncodedBatch, ErrorSums, Layout, Section, batch_points, encode_batch, le_bytes,
 };
+use pointmill_format::bytes::write_all_at;
 
 use super::frame::refused;
 use crate::error::ConvertError;
-use crate::file_at::write_all_at;
 use crate::gather::{Segment, Store};
 
 /// Bytes of an entry of the originals: storage index and colour word.

@@ -7,9 +7,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use pointmill_format::bintree::{Layout, PACKED_FILE, leaf_file_name};
+use pointmill_format::bytes::write_all_at;
 
 use crate::error::ConvertError;
-use crate::file_at::write_all_at;
 use crate::write::dataset::StagedDataset;
 
 /// The leaves of a dataset; any number of threads put them.

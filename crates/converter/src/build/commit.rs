@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Condvar, Mutex, MutexGuard};
 
 use pointmill_format::NodeKey;
+use pointmill_format::bytes::write_all_at;
 use pointmill_format::potree2::NodeEntry;
 
 use super::chunk::{Accounts, BuiltChunk};
 use super::tree::{Nodes, Pending};
 use crate::checksum::Checksum;
 use crate::error::ConvertError;
-use crate::file_at::write_all_at;
 use crate::os_hints;
 use crate::sample::Sampler;
 use crate::write::payload::PayloadWriter;

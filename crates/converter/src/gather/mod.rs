@@ -11,6 +11,7 @@ mod stats;
 mod store;
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -193,12 +194,12 @@ impl Pass<'_> {
         let decoded = scan.decode(piece, &self.job.sources[source].wanted, scratch, &mut |batch| {
             if events.stop_requested() {
                 outcome = Err(ConvertError::Interrupted);
-                return false;
+                return ControlFlow::Break(());
             }
             points += batch.len() as u64;
             outcome = worker.take(source, batch);
             events.advance(batch.len() as u64);
-            outcome.is_ok()
+            if outcome.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         outcome?;
         let lost = scan.pieces()[piece].points.saturating_sub(points);

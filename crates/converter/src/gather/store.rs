@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 
+use pointmill_format::bytes::{read_exact_at, write_all_at};
+
 use crate::error::ConvertError;
-use crate::file_at::{read_exact_at, write_all_at};
 use crate::os_hints;
 
 /// Blocks grow to this size: a few large pages, and one long write when they go to disk.
