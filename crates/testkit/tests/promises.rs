@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use pointmill_format::{
     Attribute, AttributeType, Column, Crs, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo,
-    Scratch, Wanted,
+    Scratch, Sink, Wanted,
 };
 use pointmill_testkit::reader::{columns_are_independent, keeps_promises, read};
 
@@ -152,7 +152,7 @@ impl Scan for Fake {
         piece: usize,
         wanted: &Wanted,
         scratch: &mut Scratch,
-        sink: &mut dyn FnMut(&PointBatch) -> bool,
+        sink: &mut Sink<'_>,
     ) -> Result<(), ReadError> {
         let decode = self.decodes.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         let Some(piece) = self.pieces.get(piece) else {
@@ -167,14 +167,14 @@ impl Scan for Fake {
             Fault::MorePoints => end += 1,
             Fault::FewerPoints => end -= 1,
             Fault::EmptyBatch => {
-                sink(&self.batch(at, 0, wanted, decode));
+                let _ = sink(&self.batch(at, 0, wanted, decode));
             }
             _ => {}
         }
         while at < end {
             let len = batch.min(end - at);
             let skipped = u64::from(self.fault == Fault::SkippedPoint && at > piece.first_point);
-            if !sink(&self.batch(at + skipped, len - skipped, wanted, decode)) {
+            if sink(&self.batch(at + skipped, len - skipped, wanted, decode)).is_break() {
                 match self.fault {
                     Fault::StopIsIgnored => {}
                     Fault::StopIsAnError => return Err(ReadError::broken("fake", 0, "stopped").advise("go on")),

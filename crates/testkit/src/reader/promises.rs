@@ -1,6 +1,7 @@
 //! The promises of a [`Scan`], one check each.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::ops::ControlFlow;
 
 use pointmill_format::{Column, MAX_BATCH_POINTS, PointBatch, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted};
 
@@ -38,7 +39,7 @@ pub fn keeps_promises(scan: &dyn Scan, wanted: &Wanted, max_points: u64) {
             check_stop(scan, i, wanted, scratch);
         }
     }
-    let outside = scan.decode(pieces.len(), wanted, scratch, &mut |_| true);
+    let outside = scan.decode(pieces.len(), wanted, scratch, &mut |_| ControlFlow::Continue(()));
     assert!(outside.is_err(), "a piece that does not exist is decoded");
 }
 
@@ -108,7 +109,7 @@ pub(super) fn decode(
         assert!(next <= end, "more points than piece {index} has");
         check_batch(scan.info(), wanted, batch);
         each(batch);
-        true
+        ControlFlow::Continue(())
     });
     match &result {
         Ok(()) => assert_eq!(next, end, "points are missing in piece {index} without an error"),
@@ -123,7 +124,7 @@ fn check_stop(scan: &dyn Scan, index: usize, wanted: &Wanted, scratch: &mut Scra
     let mut calls = 0;
     let result = scan.decode(index, wanted, scratch, &mut |_| {
         calls += 1;
-        false
+        ControlFlow::Break(())
     });
     assert!(result.is_ok(), "a sink that stops is an error: {result:?}");
     assert_eq!(calls, 1, "a sink that stopped is called again");
