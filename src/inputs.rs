@@ -10,12 +10,12 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use pointmill_format::text::TextKind;
+use pointmill_format::scan::text::TextKind;
 use pointmill_format::{ErrorKind, OpenOptions, ScanKind, supported_scans};
 
 use crate::args::InputArgs;
 use crate::exit::Failure;
-use crate::quantities::plural;
+use crate::human::quantities::plural;
 
 /// The scans to read, and what the user should know about the search for them.
 #[derive(Debug, Default)]

@@ -4,21 +4,18 @@
 //! table of exit codes, `exit.rs` is where they come from.
 
 mod args;
-mod convert;
+mod commands;
+mod datasets;
 mod exit;
-mod info;
+mod human;
 mod inputs;
 mod interrupt;
-mod measure;
-mod progress;
-mod quantities;
-mod text;
-mod validate;
 
 use std::process::ExitCode;
 
 use args::{Args, Command};
 use clap::Parser as _;
+use commands::{convert, info, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {

@@ -6,11 +6,12 @@ use std::process::Command;
 use serde_json::Value;
 
 /// What each crate of the workspace may depend on, for whatever purpose, among the crates of the workspace.
-const ALLOWED: [(&str, &[&str]); 4] = [
-    ("pointmill", &["pointmill-converter", "pointmill-format", "pointmill-validate"]),
-    ("pointmill-converter", &["pointmill-format"]),
-    ("pointmill-validate", &["pointmill-format"]),
-    ("pointmill-format", &[]),
+const ALLOWED: [(&str, &[&str]); 5] = [
+    ("pointmill", &["pointmill-converter", "pointmill-format", "pointmill-validate", "pointmill-testkit"]),
+    ("pointmill-converter", &["pointmill-format", "pointmill-testkit"]),
+    ("pointmill-validate", &["pointmill-format", "pointmill-testkit"]),
+    ("pointmill-format", &["pointmill-testkit"]),
+    ("pointmill-testkit", &["pointmill-format"]),
 ];
 
 fn packages() -> Vec<Value> {
@@ -32,6 +33,17 @@ fn crates_depend_in_one_direction() {
         let Some((_, allowed)) = ALLOWED.iter().find(|(n, _)| *n == name) else { continue };
         for dependency in dependencies(&package).into_iter().filter(|d| d.starts_with("pointmill")) {
             assert!(allowed.contains(&dependency), "{name} must not depend on {dependency}");
+        }
+    }
+}
+
+/// What the tests share is built for tests alone.
+#[test]
+fn the_testkit_is_a_dependency_of_tests_only() {
+    for package in packages() {
+        for dependency in package["dependencies"].as_array().unwrap() {
+            let is_testkit = dependency["name"] == "pointmill-testkit";
+            assert!(!is_testkit || dependency["kind"] == "dev", "{} depends on the testkit", package["name"]);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 #![no_main]
 
-use pointmill_format::e57::{self, E57Options};
+use pointmill_format::scan::e57::{self, E57Options};
 
 const PAGE: usize = 1024;
 

@@ -2,7 +2,8 @@
 
 #![no_main]
 
-use pointmill_format::{ScanInfo, Wanted, las};
+use pointmill_format::scan::las;
+use pointmill_format::{ScanInfo, Wanted};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| pointmill_fuzz::read_some(bytes, las::open, wanted));
 

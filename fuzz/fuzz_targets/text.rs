@@ -2,7 +2,7 @@
 
 #![no_main]
 
-use pointmill_format::text::{self, TextOptions};
+use pointmill_format::scan::text::{self, TextOptions};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let Some((choice, file)) = bytes.split_first() else { return };

@@ -1,6 +1,7 @@
 //! What every reader promises, whatever the bytes say.
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -83,7 +84,7 @@ fn decode(scan: &dyn Scan, index: usize, wanted: &Wanted, scratch: &mut Scratch)
                 axes.iter().flatten().for_each(|v| sum = mix(sum, if v.is_nan() { 1 } else { v.to_bits() }));
             }
         }
-        true
+        ControlFlow::Continue(())
     });
     if result.is_ok() {
         assert_eq!(next, end, "all points of the piece, or an error");

@@ -5,6 +5,7 @@
 //! machine only.
 
 use std::hint::black_box;
+use std::ops::ControlFlow;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pointmill_bench::las_file;
@@ -12,7 +13,8 @@ use pointmill_bench::scene::{Random, Scene};
 use pointmill_converter::Sampling;
 use pointmill_converter::bench_api::{Chunk, Sample};
 use pointmill_format::potree2::{BrotliScratch, encode_brotli};
-use pointmill_format::{Attribute, AttributeType, Scratch, Wanted, las};
+use pointmill_format::scan::las;
+use pointmill_format::{Attribute, AttributeType, Scratch, Wanted};
 
 /// Every point of a scan into columns, piece by piece.
 fn las_parse(c: &mut Criterion) {
@@ -38,7 +40,7 @@ fn las_parse(c: &mut Criterion) {
                     for piece in 0..scan.pieces().len() {
                         let mut sink = |batch: &_| {
                             seen += positions_of(black_box(batch));
-                            true
+                            ControlFlow::Continue(())
                         };
                         scan.decode(piece, &wanted, &mut scratch, &mut sink).expect("a whole scan");
                     }

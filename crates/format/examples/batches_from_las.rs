@@ -7,9 +7,11 @@
 use std::error::Error;
 use std::fs::File;
 use std::io::BufWriter;
+use std::ops::ControlFlow;
 
 use pointmill_format::batches::{Cloud, WriteOptions, colour_word, eight_bit, write};
-use pointmill_format::{Attribute, Column, Positions, Scratch, Wanted, las};
+use pointmill_format::scan::las;
+use pointmill_format::{Attribute, Column, Positions, Scratch, Wanted};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -42,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             if let Some(Column::UInt8(v)) = column(class) {
                 classes.extend_from_slice(v);
             }
-            true
+            ControlFlow::Continue(())
         })?;
     }
     // many files keep 8 bits in the 16

@@ -1,9 +1,11 @@
 //! Decodes E57 files and prints a line each: points, sums that depend on every point, million points a second of one
 //! thread. `cargo run --release --features e57 --example e57_speed -- FILE... [--positions]`
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
-use pointmill_format::{Column, Positions, ReadError, Scratch, Wanted, e57};
+use pointmill_format::scan::e57;
+use pointmill_format::{Column, Positions, ReadError, Scratch, Wanted};
 
 fn main() -> Result<(), ReadError> {
     let positions_only = std::env::args().any(|a| a == "--positions");
@@ -35,7 +37,7 @@ fn main() -> Result<(), ReadError> {
                         sum16 += v.iter().map(|v| u64::from(*v)).sum::<u64>();
                     }
                 }
-                true
+                ControlFlow::Continue(())
             });
             if let Err(e) = result {
                 eprintln!("{e}");

@@ -1,9 +1,11 @@
 //! Decodes LAS and LAZ files and prints a line each: points, sums that depend on every point, million points a second
 //! of one thread. `cargo run --release --features las --example las_speed -- FILE... [--positions]`
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
-use pointmill_format::{Positions, ReadError, Scratch, Wanted, las};
+use pointmill_format::scan::las;
+use pointmill_format::{Positions, ReadError, Scratch, Wanted};
 
 fn main() -> Result<(), ReadError> {
     let positions_only = std::env::args().any(|a| a == "--positions");
@@ -21,7 +23,7 @@ fn main() -> Result<(), ReadError> {
                         *sum += axis.iter().map(|v| i64::from(*v)).sum::<i64>();
                     }
                 }
-                true
+                ControlFlow::Continue(())
             });
             if let Err(e) = result {
                 eprintln!("{e}");

@@ -2,10 +2,12 @@
 //! a second of one thread. `cargo run --release --features ply,pcd,text --example rows_speed -- FILE... [--positions]`
 
 use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use pointmill_format::{Positions, ReadError, Scan, Scratch, Wanted, pcd, ply, text};
+use pointmill_format::scan::{pcd, ply, text};
+use pointmill_format::{Positions, ReadError, Scan, Scratch, Wanted};
 
 fn main() -> Result<(), ReadError> {
     let positions_only = std::env::args().any(|a| a == "--positions");
@@ -22,7 +24,7 @@ fn main() -> Result<(), ReadError> {
                 if let Positions::World(xyz) = &batch.positions {
                     sum += xyz.iter().flatten().sum::<f64>();
                 }
-                true
+                ControlFlow::Continue(())
             });
             if let Err(e) = result {
                 eprintln!("{e}");

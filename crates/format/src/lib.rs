@@ -4,55 +4,35 @@
 //! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written
 //!   (feature `rstar`: nearest points too).
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
-//! * `e57` (cargo feature `e57`): E57 files, all scans of one as one cloud, decoded in parallel pieces.
-//! * `las` (cargo feature `las`): LAS 1.0–1.5 and LAZ scans, decoded in parallel pieces.
-//! * `ply`, `pcd`, `text` (features of these names): PLY, PCD, and XYZ/CSV, PTS, PTX and OFF scans, likewise.
+//! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
+//!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF).
+//! * [`bytes`]: positioned reads and writes of files.
 //!
-//! [`open_scan`] opens a scan of any kind whose feature is on; the content tells which it is.
+//! [`open_scan`] opens a scan of any kind whose feature is on; the kind is detected from the content.
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
 //! found in a file are never trusted; an allocation is bounded by the size of the file that asks for it.
 #![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a module of its own
 
-mod aabb;
-mod attributes;
+mod dataset_kind;
 mod error;
-mod kind;
-mod lattice;
-mod node_key;
+mod geometry;
 mod points;
-#[cfg(any(feature = "e57", feature = "las"))]
-mod quiet;
-mod scan;
-// each reader uses its part of it: a build with few of them leaves some of it idle
-#[cfg(any(feature = "pcd", feature = "ply", feature = "text"))]
-#[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code, unused_imports))]
-mod rows;
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
-mod source;
 
 pub mod batches;
 pub mod bintree;
-#[cfg(feature = "e57")]
-pub mod e57;
-#[cfg(feature = "las")]
-pub mod las;
-#[cfg(feature = "pcd")]
-pub mod pcd;
-#[cfg(feature = "ply")]
-pub mod ply;
+pub mod bytes;
 pub mod potree2;
-#[cfg(feature = "text")]
-pub mod text;
+pub mod scan;
 
-pub use aabb::Aabb;
-pub use attributes::{Attribute, AttributeType};
+pub use dataset_kind::{DatasetKind, Located, UnknownDatasetKind, locate};
 pub use error::{ErrorKind, ReadError};
-pub use kind::{OpenOptions, ScanKind, open_scan, supported_scans};
-pub use lattice::Lattice;
-pub use node_key::NodeKey;
-pub use points::{Column, PointBatch, Positions};
-pub use scan::{Crs, MAX_BATCH_POINTS, Piece, Resolution, Scan, ScanInfo, ScanPart, Scratch, Wanted};
+pub use geometry::{Aabb, Lattice, NodeKey};
+pub use points::{Attribute, AttributeType, Column, PointBatch, Positions};
+pub use scan::{
+    Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart, Scratch, Sink, Wanted,
+    open_scan, supported_scans,
+};
 
 /// The example in the README compiles, or the tests fail.
 #[cfg(doctest)]

@@ -1,9 +1,9 @@
 //! The promises that formats make.
 
+use pointmill_format::DatasetKind;
 use serde::{Serialize, Serializer};
 
-/// A promise of a format. Each check stands for one; [`Format::checks`](crate::Format::checks) has those of a format in
-/// the order of reports.
+/// A promise of a format. Each check stands for one; [`Check::of`] has those of a format in the order of reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs)] // `promise` says it
 pub enum Check {
@@ -99,6 +99,16 @@ impl Check {
         Self::Originals,
         Self::Errors,
     ];
+
+    /// What datasets of that kind promise, in the order of reports.
+    pub const fn of(kind: DatasetKind) -> &'static [Self] {
+        match kind {
+            DatasetKind::Potree2 => Self::POTREE2,
+            DatasetKind::Bintree => Self::BINTREE,
+            DatasetKind::Batches => Self::BATCHES,
+            _ => &[],
+        }
+    }
 
     /// The checks of Potree 2.0.
     pub(crate) const POTREE2: &[Self] = &[
@@ -278,7 +288,6 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::Format;
 
     #[test]
     fn checks_are_indexed_by_their_place_in_the_list() {
@@ -287,11 +296,11 @@ mod tests {
 
     #[test]
     fn no_format_has_two_checks_of_one_name_and_every_check_serves_a_format() {
-        for format in Format::ALL {
-            let names: BTreeSet<_> = format.checks().iter().map(|c| c.name()).collect();
-            assert_eq!(names.len(), format.checks().len(), "{format}");
+        for format in DatasetKind::ALL {
+            let names: BTreeSet<_> = Check::of(format).iter().map(|c| c.name()).collect();
+            assert_eq!(names.len(), Check::of(format).len(), "{format}");
         }
-        let used = |check: &&Check| Format::ALL.iter().any(|f| f.checks().contains(check));
+        let used = |check: &&Check| DatasetKind::ALL.iter().any(|f| Check::of(*f).contains(check));
         assert_eq!(Check::ALL.iter().filter(used).count(), Check::ALL.len());
     }
 }

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::DatasetKind;
 use crate::check::Check;
-use crate::format::Format;
 use crate::place::Place;
 
 /// How bad a finding is.
@@ -162,7 +162,7 @@ struct Slot {
 /// Gathers findings from many threads; keeps the first `cap` of each check in sort order, whoever comes first.
 #[derive(Debug)]
 pub(crate) struct Findings {
-    format: Format,
+    format: DatasetKind,
     cap: usize,
     /// By [`Check::index`]; those of other formats stay empty.
     slots: Vec<Mutex<Slot>>,
@@ -171,7 +171,7 @@ pub(crate) struct Findings {
 
 impl Findings {
     /// Keeps at most `cap` findings of each check of `format`.
-    pub(crate) fn new(format: Format, cap: usize) -> Self {
+    pub(crate) fn new(format: DatasetKind, cap: usize) -> Self {
         Self {
             format,
             cap,
@@ -181,7 +181,7 @@ impl Findings {
     }
 
     /// The format whose checks these are.
-    pub(crate) fn format(&self) -> Format {
+    pub(crate) fn format(&self) -> DatasetKind {
         self.format
     }
 
@@ -247,7 +247,7 @@ impl Findings {
     pub(crate) fn finish(self) -> (Vec<CheckResult>, Vec<Finding>) {
         let mut results = Vec::new();
         let mut problems = Vec::new();
-        for check in self.format.checks() {
+        for check in Check::of(self.format) {
             let mut slot = std::mem::take(&mut *self.slot(*check));
             shorten(&mut slot.kept, self.cap);
             results.push(CheckResult {
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn a_capped_list_keeps_the_first_in_order_and_counts_all() {
-        let findings = Findings::new(Format::Potree2, 2);
+        let findings = Findings::new(DatasetKind::Potree2, 2);
         for level in (0..30).rev() {
             let key = NodeKey { level, x: 0, y: 0, z: 0 };
             findings.push(Finding::new(Check::Boxes, "position", 1, 2).at(key));

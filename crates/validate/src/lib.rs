@@ -24,7 +24,6 @@ mod batches;
 mod bintree;
 mod check;
 mod finding;
-mod format;
 mod place;
 mod potree2;
 
@@ -37,8 +36,8 @@ pub use against::AgainstSummary;
 pub use bintree::LeafQuality;
 pub use check::Check;
 pub use finding::{CheckResult, Finding, Severity};
-pub use format::{Format, Located, locate};
 pub use place::{BinaryNode, Place};
+pub use pointmill_format::{DatasetKind, Located, locate};
 pub use potree2::LevelQuality;
 
 /// What to check, and with what means.
@@ -91,14 +90,14 @@ pub struct Outcome {
     /// No check found an error.
     pub ok: bool,
     /// Which format was found.
-    pub format: Format,
+    pub format: DatasetKind,
     /// Encoding of the payloads or layout of the files, if the metadata could be read.
     pub encoding: Option<&'static str>,
     /// Points by the metadata.
     pub points: u64,
     /// Nodes that were reached from the root; batches.
     pub nodes: u64,
-    /// One entry for each of [`Format::checks`], in that order.
+    /// One entry for each of [`Check::of`], in that order.
     pub checks: Vec<CheckResult>,
     /// Findings, by check, at most [`Options::max_problems`] each; errors before warnings, coarse or early places
     /// before others.
@@ -126,15 +125,16 @@ impl Outcome {
 /// There is no dataset, the operating system cannot read it, or a source to compare with cannot be opened or decoded
 /// to its end.
 pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
-    let Located { format, path } = locate(dataset)?;
+    let Located { kind, path } = locate(dataset)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(options.threads)
         .thread_name(|i| format!("validate-{i}"))
         .build()
         .map_err(|e| ReadError::io(dataset, "starting threads", std::io::Error::other(e)))?;
-    pool.install(|| match format {
-        Format::Potree2 => potree2::run(&path, options, progress),
-        Format::Bintree => bintree::run(&path, options, progress),
-        Format::Batches => batches::run(&path, options, progress),
+    pool.install(|| match kind {
+        DatasetKind::Potree2 => potree2::run(&path, options, progress),
+        DatasetKind::Bintree => bintree::run(&path, options, progress),
+        DatasetKind::Batches => batches::run(&path, options, progress),
+        other => Err(ReadError::unsupported(&path, format!("datasets of kind {other} cannot be validated"))),
     })
 }

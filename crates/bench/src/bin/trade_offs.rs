@@ -47,18 +47,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         batches += &batch_rows(scene, &file, &dir)?;
         trees += &tree_rows(scene, &file, &dir)?;
     }
-    println!("## Batches: bytes and errors by planes, {} points a scene\n", args.points);
+    println!("## Batches: bytes and errors by planes, {} points per scene\n", args.points);
     println!(
-        "Errors of decoded positions in any axis, in units of the scene; `--planes auto` takes the planes in bold.\n"
+        "Errors of decoded positions on the worst axis, in units of the scene; `--planes auto` chooses the planes in bold.\n"
     );
     println!("| scene, step | cell of level 0 | bits | bytes/point | without originals | largest error | RMS error |");
     println!("|---|---|---|---|---|---|---|\n{batches}");
-    println!("## Binary trees: boxes and double passes by splitting rule, {} points a scene\n", args.points);
+    println!("## Binary trees: boxes and double passes by splitting rule, {} points per scene\n", args.points);
     println!(
-        "Double passes: nodes that straddle the switching distance, of all nodes, from {STEPS} places along the longest \
-         axis at 1/{HEIGHTS} of it above the middle, points of 1/{RADII} of it in radius, {LINES} lines, 60°.\n"
+        "Double passes: nodes that straddle the switching distance, of all drawn nodes, from {STEPS} camera positions along \
+         the\nlongest axis. Camera height above the middle: 1/{HEIGHTS} of that axis; radius of points: 1/{RADII}; \
+         {LINES} lines, 60°.\n"
     );
-    println!("| scene | split | leaves | points a leaf, least–most | leaf volume / root's | double passes | build s |");
+    println!(
+        "| scene | split | leaves | points per leaf, least–most | leaf volume / root's | double passes | build s |"
+    );
     println!("|---|---|---|---|---|---|---|\n{trees}");
     println!("```sh\ncargo run --release -p pointmill-bench --bin trade_offs -- --points {}\n```", args.points);
     Ok(())

@@ -1,5 +1,7 @@
 //! One pass over the sources, with a lattice and bounds that are believed until they prove wrong.
 
+use std::ops::ControlFlow;
+
 use pointmill_format::Scratch;
 
 use super::axis::SourceMap;
@@ -130,12 +132,12 @@ impl<'a> Pass<'a> {
         let decoded = scan.decode(piece, &self.context.intake.sources[source].wanted, scratch, &mut |batch| {
             outcome = self.rt.check_stop();
             if outcome.is_err() {
-                return false;
+                return ControlFlow::Break(());
             }
             points += batch.len() as u64;
             outcome = worker.take(source, batch);
             self.rt.advance(batch.len() as u64);
-            outcome.is_ok()
+            if outcome.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         outcome?;
         let lost = scan.pieces()[piece].points.saturating_sub(points);

@@ -1,5 +1,7 @@
 //! Where the points of a scan are, before they are read: declared bounds, or a sample.
 
+use std::ops::ControlFlow;
+
 use pointmill_format::{Aabb, PointBatch, Positions, Scan, Scratch, Wanted};
 
 /// Points looked at in each of three places of a scan that declares no bounds.
@@ -48,7 +50,7 @@ fn sample(scan: &dyn Scan) -> Aabb {
                 points.filter(finite).for_each(|p| bounds.grow(p));
             }
             seen += batch.len();
-            seen < SAMPLE_POINTS
+            if seen < SAMPLE_POINTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
         let _ = scan.decode(place, &wanted, &mut scratch, &mut sink);
     }

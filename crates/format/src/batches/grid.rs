@@ -1,9 +1,8 @@
 //! From world coordinates to cells, Morton coordinates and float32 boxes (`docs/formats/batches.md`, §2 and §5).
 
-use crate::Aabb;
-
 use super::WriteError;
-use super::morton::{morton21, morton32};
+use crate::Aabb;
+use crate::geometry::morton::{morton21, morton32};
 
 /// Levels of detail that have cells: 0, 1, 2. Points that are in none of them have level 3.
 pub const LOD_LEVELS: u32 = 3;

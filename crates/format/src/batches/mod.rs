@@ -43,7 +43,6 @@ mod header;
 mod layout;
 #[cfg(feature = "mmap")]
 mod map;
-mod morton;
 mod order;
 mod points;
 mod precision;
@@ -51,6 +50,7 @@ mod read;
 mod record;
 mod write;
 
+pub use crate::geometry::morton::{morton21, morton32};
 pub use aligned::AlignedBytes;
 pub use blocks::BlockScratch;
 #[cfg(feature = "zstd")]
@@ -63,7 +63,6 @@ pub use error::WriteError;
 pub use grid::{Grid, LOD_LEVELS, f32_above, f32_below};
 pub use header::{Flags, Header, Sections};
 pub use layout::{Finish, Layout, Section};
-pub use morton::{morton21, morton32};
 pub use order::{batch_count, batch_points, swap_slot};
 pub use points::{BatchPoints, Point, PointsInMortonOrder};
 pub use precision::{Precision, distance_to_box, focal_pixels, projected_diagonal};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use super::{INDEX_FILE, PACKED_FILE};
-use crate::potree2::read_exact_at;
+use crate::bytes::read_exact_at;
 
 /// Anything that can tell ranges of a dataset's files: a folder, memory, a web server, an archive.
 ///

@@ -6,6 +6,7 @@ use crate::{Attribute, AttributeType};
 
 use super::metadata::planar_size;
 use super::{brotli, morton};
+use crate::geometry::morton::morton21;
 
 /// Memory that a thread reuses from node to node.
 #[derive(Debug, Default)]
@@ -133,7 +134,7 @@ impl BrotliScratch {
                 ("rgb", _) => {
                     for (out, v) in plane.as_chunks_mut::<8>().0.iter_mut().zip(values) {
                         let channel = |c: usize| u16::from_le_bytes([v[2 * c], v[2 * c + 1]]);
-                        *out = morton::interleave(channel(0), channel(1), channel(2)).to_le_bytes();
+                        *out = morton21([0, 1, 2].map(|c| u32::from(channel(c)))).to_le_bytes();
                     }
                 }
                 // The usual sizes by name: a copy of a known length is a single instruction.

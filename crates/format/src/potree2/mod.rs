@@ -45,5 +45,4 @@ pub use hierarchy::Hierarchy;
 pub use metadata::{AttributeStats, Encoding, Metadata};
 pub use node_points::NodePoints;
 pub use record::{Node, NodeRecord, NodeType};
-pub(crate) use source::read_exact_at;
 pub use source::{ByteSource, DatasetFile, Folder, Memory};

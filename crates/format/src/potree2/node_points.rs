@@ -4,6 +4,7 @@ use crate::Column;
 
 use super::metadata::planar_size;
 use super::{Metadata, column_bytes, morton};
+use crate::geometry::morton::deinterleave16;
 
 /// The points of one node; reuse one from node to node and its memory is reused.
 #[derive(Debug, Clone, Default)]
@@ -104,6 +105,6 @@ fn fill_rgb(values: &mut Vec<u16>, plane: &[u8]) {
     let codes = plane.as_chunks::<8>().0;
     values.resize(3 * codes.len(), 0);
     for (rgb, code) in values.as_chunks_mut::<3>().0.iter_mut().zip(codes) {
-        *rgb = morton::deinterleave(u64::from_le_bytes(*code));
+        *rgb = deinterleave16(u64::from_le_bytes(*code));
     }
 }

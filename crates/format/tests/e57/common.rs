@@ -1,8 +1,9 @@
 //! Reading whole files, and fixtures with some bytes changed.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::e57::{self, E57Options};
+use pointmill_format::scan::e57::{self, E57Options};
 use pointmill_format::{Column, MAX_BATCH_POINTS, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted, with_column};
 
 /// Everything that a file gave.
@@ -62,7 +63,7 @@ pub(crate) fn read_scan(scan: &dyn Scan, wanted: &Wanted) -> Cloud {
                 assert_eq!(some.ty(), attribute.ty);
                 all.extend(doubles(some));
             }
-            true
+            ControlFlow::Continue(())
         });
         match result {
             Ok(()) => assert_eq!(next, cloud.promised),

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use pointmill_format::{AttributeType, Wanted, e57};
+use pointmill_format::scan::e57;
+use pointmill_format::{AttributeType, Wanted};
 
 use crate::common::{self, Cloud};
 

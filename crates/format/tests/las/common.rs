@@ -1,10 +1,10 @@
 //! Reading whole files, and fixtures with some bytes changed.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{
-    Column, MAX_BATCH_POINTS, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted, las, with_column,
-};
+use pointmill_format::scan::las;
+use pointmill_format::{Column, MAX_BATCH_POINTS, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted, with_column};
 
 /// Everything that a file gave.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ pub(crate) fn read_scan(scan: &dyn Scan, wanted: &Wanted) -> Cloud {
                 assert!(some.is_empty() || some.len() == batch.len() * attribute.elements);
                 append(all, some);
             }
-            true
+            ControlFlow::Continue(())
         });
         assert!(next <= cloud.promised, "no point is invented");
         match result {

@@ -1,7 +1,10 @@
 //! Honest damage: cut files, wrong counts, lost chunk tables. What is there is read, what is not is told.
 
+use std::ops::ControlFlow;
+
 use laz::{LasZipCompressor, LazVlrBuilder};
-use pointmill_format::{Scratch, Wanted, las};
+use pointmill_format::scan::las;
+use pointmill_format::{Scratch, Wanted};
 
 use crate::common::{self, fixture, points_start, put, read_bytes, u32_at};
 
@@ -208,11 +211,14 @@ fn a_sink_that_has_enough_ends_the_decode() {
         let mut calls = 0;
         let result = scan.decode(0, &Wanted::all(scan.info()), &mut Scratch::default(), &mut |_| {
             calls += 1;
-            false
+            ControlFlow::Break(())
         });
         assert!(result.is_ok());
         assert_eq!(calls, 1);
-        assert!(scan.decode(99, &Wanted::all(scan.info()), &mut Scratch::default(), &mut |_| true).is_err());
+        assert!(
+            scan.decode(99, &Wanted::all(scan.info()), &mut Scratch::default(), &mut |_| ControlFlow::Continue(()))
+                .is_err()
+        );
     }
 }
 

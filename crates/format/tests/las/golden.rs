@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use pointmill_format::{AttributeType, Wanted, las};
+use pointmill_format::scan::las;
+use pointmill_format::{AttributeType, Wanted};
 
 use crate::common::{self, Cloud, integers};
 

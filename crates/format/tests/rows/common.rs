@@ -1,10 +1,10 @@
 //! Reading whole files.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{
-    Column, MAX_BATCH_POINTS, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted, pcd, ply, text, with_column,
-};
+use pointmill_format::scan::{pcd, ply, text};
+use pointmill_format::{Column, MAX_BATCH_POINTS, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted, with_column};
 
 /// Everything that a file gave.
 #[derive(Debug)]
@@ -80,7 +80,7 @@ pub(crate) fn read_scan(scan: &dyn Scan, wanted: &Wanted) -> Cloud {
                 assert!(some.is_empty() || some.len() == batch.len() * attribute.elements);
                 all.extend(doubles(some));
             }
-            true
+            ControlFlow::Continue(())
         });
         assert!(next <= promised, "no point is invented");
         match result {

@@ -1,6 +1,8 @@
 //! Small files written in the test: one rule each.
 
-use pointmill_format::text::{self, TextOptions};
+use std::ops::ControlFlow;
+
+use pointmill_format::scan::text::{self, TextOptions};
 use pointmill_format::{ReadError, Wanted};
 
 use crate::common::{self, Cloud, read_bytes};
@@ -180,7 +182,7 @@ fn very_wide_rows_are_refused_or_come_in_small_batches() {
         common::open(&common::file((ply("ascii", &header) + "end_header\n" + &"1\n".repeat(100_000)).as_bytes()))
             .unwrap();
     let mut scratch = pointmill_format::Scratch::default();
-    let result = scan.decode(0, &Wanted::all(scan.info()), &mut scratch, &mut |_| true);
+    let result = scan.decode(0, &Wanted::all(scan.info()), &mut scratch, &mut |_| ControlFlow::Continue(()));
     assert!(result.unwrap_err().what.contains("the line has 1 numbers, 4002 are expected"));
     let batch = scratch.batch.unwrap();
     assert!(batch.columns.iter().map(|c| c.len() * 8).sum::<usize>() <= 64 << 20);

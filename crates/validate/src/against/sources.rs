@@ -1,5 +1,6 @@
 //! The scans a dataset was made from, read as blocks of records in the dataset's terms.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
@@ -102,7 +103,7 @@ impl Sources {
                 let batch_points = batch.len() as u64;
                 let done = done.fetch_add(batch_points, Relaxed) + batch_points;
                 progress(Progress { phase, done, total: self.points });
-                true
+                ControlFlow::Continue(())
             });
             if let Ok(mut idle) = idle.lock() {
                 idle.push((scratch, block));

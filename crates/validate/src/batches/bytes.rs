@@ -1,10 +1,10 @@
 //! The file: positioned reads that know its length, and little-endian words.
 
 use std::fs::File;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use pointmill_format::ReadError;
+use pointmill_format::bytes::read_exact_at;
 
 /// An open file of known length; threads share it without a cursor.
 #[derive(Debug)]
@@ -34,32 +34,6 @@ impl Bytes {
         out.resize(len, 0);
         read_exact_at(&self.file, out, offset).map_err(|e| ReadError::io(&self.path, "reading", e))
     }
-}
-
-#[cfg(unix)]
-fn read_exact_at(file: &File, buf: &mut [u8], offset: u64) -> io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, buf, offset)
-}
-
-#[cfg(windows)]
-fn read_exact_at(file: &File, mut buf: &mut [u8], mut offset: u64) -> io::Result<()> {
-    while !buf.is_empty() {
-        match std::os::windows::fs::FileExt::seek_read(file, buf, offset) {
-            Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
-            Ok(n) => {
-                buf = &mut buf[n..];
-                offset += n as u64;
-            }
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(e),
-        }
-    }
-    Ok(())
-}
-
-#[cfg(not(any(unix, windows)))]
-fn read_exact_at(_: &File, _: &mut [u8], _: u64) -> io::Result<()> {
-    Err(io::Error::new(io::ErrorKind::Unsupported, "no positioned reads here"))
 }
 
 /// The u32 at byte `at`; 0 beyond the end.

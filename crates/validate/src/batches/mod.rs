@@ -42,7 +42,7 @@ use serde_json::json;
 use crate::against::{Against, AgainstSummary, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::{Format, Options, Outcome, ProgressFn};
+use crate::{DatasetKind, Options, Outcome, ProgressFn};
 use batch_records::Box32;
 use bytes::Bytes;
 use description::{Colour, Description};
@@ -58,7 +58,7 @@ use walk::{Task, Walked, walk};
 /// As [`crate::validate`].
 pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
     let bytes = Bytes::open(path)?;
-    let findings = Findings::new(Format::Batches, options.max_problems);
+    let findings = Findings::new(DatasetKind::Batches, options.max_problems);
     let Some(header) = header::read(&bytes, &findings)? else {
         return Ok(stopped(findings, &[Check::Header], "the header cannot be used", None));
     };
@@ -249,7 +249,7 @@ fn finish(findings: Findings, header: Option<&Header>) -> Outcome {
     let (checks, problems) = findings.finish();
     Outcome {
         ok: checks.iter().all(|c| c.ok),
-        format: Format::Batches,
+        format: DatasetKind::Batches,
         encoding: header.map(|h| if h.compressed() { "zstd" } else { "raw" }),
         points: header.map_or(0, |h| h.points),
         nodes: header.map_or(0, |h| h.batches),

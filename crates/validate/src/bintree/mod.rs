@@ -36,7 +36,7 @@ pub use quality::LeafQuality;
 use crate::against::{Against, AgainstSummary, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::{Format, Options, Outcome, ProgressFn};
+use crate::{DatasetKind, Options, Outcome, ProgressFn};
 use lenient::Lenient;
 use records::Records;
 use routes::Routes;
@@ -48,7 +48,7 @@ use tree::Tree;
 /// # Errors
 /// As [`crate::validate`].
 pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
-    let findings = Findings::new(Format::Bintree, options.max_problems);
+    let findings = Findings::new(DatasetKind::Bintree, options.max_problems);
     let dataset = match Bintree::from_source(Box::new(Lenient::new(folder))) {
         Ok(dataset) => dataset,
         Err(error) if matches!(error.kind, ErrorKind::Io(_)) => return Err(error),
@@ -81,7 +81,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let (checks, problems) = findings.finish();
     Ok(Outcome {
         ok: checks.iter().all(|c| c.ok),
-        format: Format::Bintree,
+        format: DatasetKind::Bintree,
         encoding: Some(header.layout.name()),
         points: header.points,
         nodes: dataset.nodes().len() as u64,
@@ -169,7 +169,7 @@ fn unreadable_index(findings: Findings, error: ReadError) -> Outcome {
     let (checks, problems) = findings.finish();
     Outcome {
         ok: false,
-        format: Format::Bintree,
+        format: DatasetKind::Bintree,
         encoding: None,
         points: 0,
         nodes: 0,

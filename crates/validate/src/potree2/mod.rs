@@ -33,7 +33,7 @@ pub use quality::LevelQuality;
 use crate::against::{Against, Context, Rules};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::{Format, Options, Outcome, ProgressFn};
+use crate::{DatasetKind, Options, Outcome, ProgressFn};
 use checks::spacing::Sampling;
 use expect::Geometry;
 use records::Records;
@@ -46,7 +46,7 @@ use walk::{Task, Walked, walk};
 /// As [`crate::validate`].
 pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
     let source = Folder::open(folder)?;
-    let findings = Findings::new(Format::Potree2, options.max_problems);
+    let findings = Findings::new(DatasetKind::Potree2, options.max_problems);
     let dataset = match Dataset::open(folder) {
         Ok(dataset) => dataset,
         Err(error) if matches!(error.kind, ErrorKind::Io(_)) => return Err(error),
@@ -99,7 +99,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let (checks, problems) = findings.finish();
     Ok(Outcome {
         ok: checks.iter().all(|c| c.ok),
-        format: Format::Potree2,
+        format: DatasetKind::Potree2,
         encoding: Some(metadata.encoding.name()),
         points: metadata.points,
         nodes: tree.nodes.len() as u64,
@@ -132,7 +132,7 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: ReadError) -> R
     let (checks, problems) = findings.finish();
     Ok(Outcome {
         ok: false,
-        format: Format::Potree2,
+        format: DatasetKind::Potree2,
         encoding: None,
         points: 0,
         nodes: 0,

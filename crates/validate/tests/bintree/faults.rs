@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pointmill_validate::{Check, Format};
+use pointmill_validate::{Check, DatasetKind};
 use serde_json::json;
 
 use crate::support::{Cloud, Point, STRIDE, assert_only, check};
@@ -15,7 +15,7 @@ fn a_good_dataset_has_no_findings_by_any_rule_and_in_any_layout() {
         for packed in [false, true] {
             let outcome = Cloud { rule, packed, ..Cloud::default() }.build().validate();
             assert_only(&outcome, &[]);
-            assert_eq!((outcome.format, outcome.points), (Format::Bintree, 750));
+            assert_eq!((outcome.format, outcome.points), (DatasetKind::Bintree, 750));
             for check in outcome.checks.iter().filter(|c| c.name != Check::Against) {
                 assert!(check.checked > 0 && check.skipped.is_none(), "{check}");
             }

@@ -123,7 +123,7 @@ fn ratios(args: &Args, outcomes: &[Outcome]) -> Vec<Ratio> {
     at_most("wall: under the ceiling / in memory", capped.map(wall), poisson.map(wall), 1.5);
     if let (true, [small, large]) = (args.jobs.contains(&Job::Growth), &args.growth[..]) {
         let per_point = |n: &u64| find(&format!("pointmill poisson, {n} points")).map(|o| cpu(o) / *n as f64);
-        at_most(&format!("CPU a point: {large} / {small} points"), per_point(large), per_point(small), 1.25);
+        at_most(&format!("CPU per point: {large} / {small} points"), per_point(large), per_point(small), 1.25);
     }
     if let (Some(one), Some(two)) = (find("pointmill poisson, threads 1"), find("pointmill poisson, threads 2")) {
         let measured = wall(one) / wall(two);
@@ -187,7 +187,7 @@ fn version(program: Program, path: &Path) -> String {
     };
     match said.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned()).filter(|v| !v.is_empty()) {
         Some(version) => version,
-        None => format!("{} (does not tell its version)", program.name()),
+        None => format!("{} (reports no version)", program.name()),
     }
 }
 

@@ -1,0 +1,299 @@
+//! The kinds of datasets: names, files, and how each is recognised. A new format is one row here.
+
+use std::fmt;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde::{Serialize, Serializer};
+
+use crate::ReadError;
+
+/// A kind of dataset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum DatasetKind {
+    /// Potree 2.0: a folder with `metadata.json` ([`crate::potree2`]).
+    Potree2,
+    /// Mean-split binary tree: a folder with `index.json` ([`crate::bintree`]).
+    Bintree,
+    /// Quantised batches: a file `*.qbatch`, or a folder with `points.qbatch` ([`crate::batches`]).
+    Batches,
+}
+
+/// The facts about one kind; see the methods of [`DatasetKind`].
+struct Row {
+    name: &'static str,
+    title: &'static str,
+    marker: &'static str,
+    mark: &'static str,
+    required: &'static [&'static str],
+    optional: &'static [&'static str],
+    /// Names that follow a pattern.
+    owns: fn(&str) -> bool,
+    /// A dataset that is one file can have any name with this extension.
+    extension: Option<&'static str>,
+}
+
+const NO_PATTERN: fn(&str) -> bool = |_| false;
+
+const POTREE2: Row = Row {
+    name: "potree2",
+    title: "Potree 2.0",
+    marker: "metadata.json",
+    mark: "\"hierarchy\"",
+    required: &["hierarchy.bin", "octree.bin"],
+    optional: &["log.txt"], // PotreeConverter writes it
+    owns: NO_PATTERN,
+    extension: None,
+};
+
+const BINTREE: Row = Row {
+    name: "bintree",
+    title: "binary tree",
+    marker: "index.json",
+    mark: "\"pointmill-bintree\"",
+    required: &[], // which of the others are there depends on the layout
+    optional: &["leaves.bin"],
+    owns: is_leaf_file,
+    extension: None,
+};
+
+const BATCHES: Row = Row {
+    name: "batches",
+    title: "quantised batches",
+    marker: "points.qbatch",
+    mark: "QBATCHES",
+    required: &[],
+    optional: &[],
+    owns: NO_PATTERN,
+    extension: Some("qbatch"),
+};
+
+/// `n0101.bin`: a leaf of a binary tree, named after its path from the root.
+fn is_leaf_file(name: &str) -> bool {
+    let path = name.strip_prefix('n').and_then(|n| n.strip_suffix(".bin"));
+    path.is_some_and(|p| p.bytes().all(|b| matches!(b, b'0' | b'1')))
+}
+
+/// A mark is looked for in this many bytes from the start of the marker file.
+const MARK_WITHIN_BYTES: u64 = 64 << 10;
+
+impl DatasetKind {
+    /// Every kind.
+    pub const ALL: [Self; 3] = [Self::Potree2, Self::Bintree, Self::Batches];
+
+    const fn row(self) -> &'static Row {
+        match self {
+            Self::Potree2 => &POTREE2,
+            Self::Bintree => &BINTREE,
+            Self::Batches => &BATCHES,
+        }
+    }
+
+    /// The word in reports and on the command line, and the name of its folder beside other datasets: "potree2".
+    pub const fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// The name for people: "Potree 2.0".
+    pub const fn title(self) -> &'static str {
+        self.row().title
+    }
+
+    /// The file that a folder of this kind is known by: "metadata.json".
+    pub const fn marker_file(self) -> &'static str {
+        self.row().marker
+    }
+
+    /// Text within the first 64 KiB of the marker file that distinguishes it from files of the same name.
+    pub const fn mark(self) -> &'static str {
+        self.row().mark
+    }
+
+    /// The files that a dataset cannot be without, besides the marker file.
+    pub const fn required_files(self) -> &'static [&'static str] {
+        self.row().required
+    }
+
+    /// True if the dataset is one file, which may have any name with this kind's extension; false if it is a folder.
+    pub const fn is_single_file(self) -> bool {
+        self.row().extension.is_some()
+    }
+
+    /// True if a file of that name belongs to a dataset of this kind. `name`: without a folder.
+    pub fn owns(self, name: &str) -> bool {
+        let row = self.row();
+        name == row.marker || row.required.contains(&name) || row.optional.contains(&name) || (row.owns)(name)
+    }
+
+    /// The kind of the dataset at `path`, a folder or its marker file, by name and content: the marker file is there
+    /// and has its mark. `None` for anything else, and for what cannot be read.
+    ///
+    /// ```
+    /// use pointmill_format::DatasetKind;
+    ///
+    /// let fixtures = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures");
+    /// assert_eq!(DatasetKind::detect(format!("{fixtures}/las")), None);
+    /// assert_eq!(DatasetKind::detect(format!("{fixtures}/bintree/files")), Some(DatasetKind::Bintree));
+    /// ```
+    pub fn detect(path: impl AsRef<Path>) -> Option<Self> {
+        let located = find(path.as_ref())?;
+        starts_with_mark(&located.marker_path(), located.kind.mark()).then_some(located.kind)
+    }
+}
+
+impl fmt::Display for DatasetKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A word that is the name of no kind of dataset.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{word:?} is no kind of dataset; known are {}", names())]
+pub struct UnknownDatasetKind {
+    word: String,
+}
+
+fn names() -> String {
+    DatasetKind::ALL.map(DatasetKind::name).join(", ")
+}
+
+impl FromStr for DatasetKind {
+    type Err = UnknownDatasetKind;
+
+    fn from_str(name: &str) -> Result<Self, UnknownDatasetKind> {
+        Self::ALL
+            .into_iter()
+            .find(|kind| kind.name() == name)
+            .ok_or_else(|| UnknownDatasetKind { word: name.to_owned() })
+    }
+}
+
+impl Serialize for DatasetKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// A dataset that was found by the names of its files ([`locate`]).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Located {
+    /// What its files are called like.
+    pub kind: DatasetKind,
+    /// Its folder; of a kind that is one file, the file.
+    pub path: PathBuf,
+}
+
+impl Located {
+    /// The path of its marker file.
+    pub fn marker_path(&self) -> PathBuf {
+        if self.kind.is_single_file() { self.path.clone() } else { self.path.join(self.kind.marker_file()) }
+    }
+}
+
+/// Finds the dataset at `path`, a folder or its marker file, by the names of files alone: a damaged one is found too.
+///
+/// # Errors
+/// `path` leads to nothing, or to nothing that is called like a dataset.
+pub fn locate(path: impl AsRef<Path>) -> Result<Located, ReadError> {
+    let path = path.as_ref();
+    fs::metadata(path).map_err(|e| ReadError::io(path, "opening", e))?;
+    find(path).ok_or_else(|| ReadError::unsupported(path, "this is no dataset that can be validated").advise(advice()))
+}
+
+fn find(path: &Path) -> Option<Located> {
+    let mut kinds = DatasetKind::ALL.into_iter();
+    if path.is_dir() {
+        let kind = kinds.find(|kind| path.join(kind.marker_file()).is_file())?;
+        let path = if kind.is_single_file() { path.join(kind.marker_file()) } else { path.to_path_buf() };
+        return Some(Located { kind, path });
+    }
+    let is = |kind: &DatasetKind| match kind.row().extension {
+        Some(extension) => path.extension().is_some_and(|e| e == extension),
+        None => path.file_name().is_some_and(|name| name == kind.marker_file()),
+    };
+    let kind = kinds.find(is)?;
+    // "metadata.json" alone has the parent "", which is no path to open
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let path = if kind.is_single_file() { path } else { parent };
+    Some(Located { kind, path: path.to_path_buf() })
+}
+
+/// What can be given instead, of every kind.
+fn advice() -> String {
+    let folders = DatasetKind::ALL.into_iter().filter(|kind| !kind.is_single_file());
+    let folders: Vec<String> = folders.map(|kind| format!("{} ({})", kind.marker_file(), kind.title())).collect();
+    let files = DatasetKind::ALL.into_iter().filter_map(|kind| kind.row().extension);
+    let files: String = files.map(|extension| format!(", or a .{extension} file")).collect();
+    format!("give a folder with {}{files}", folders.join(" or "))
+}
+
+fn starts_with_mark(file: &Path, mark: &str) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(file).and_then(|f| f.take(MARK_WITHIN_BYTES).read_to_end(&mut start));
+    read.is_ok() && start.windows(mark.len()).any(|w| w == mark.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dataset_is_found_by_the_file_it_is_known_by_or_its_folder() {
+        let temp = tempfile::tempdir().unwrap();
+        for kind in DatasetKind::ALL {
+            let folder = temp.path().join(kind.name());
+            let file = folder.join(kind.marker_file());
+            fs::create_dir(&folder).unwrap();
+            assert!(locate(&folder).is_err());
+            fs::write(&file, "").unwrap();
+            let path = if kind == DatasetKind::Batches { file.clone() } else { folder.clone() };
+            let expected = Located { kind, path };
+            assert_eq!(expected.marker_path(), file);
+            assert_eq!(locate(&folder).unwrap(), expected);
+            assert_eq!(locate(&file).unwrap(), expected);
+            assert_eq!(DatasetKind::detect(&folder), None, "found by name, but without its mark");
+            fs::write(&file, format!("{{ {} }}", kind.mark())).unwrap();
+            assert_eq!([&folder, &file].map(DatasetKind::detect), [Some(kind); 2]);
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_dataset_is_refused_with_what_is_supported() {
+        let temp = tempfile::tempdir().unwrap();
+        let scan = temp.path().join("a.las");
+        fs::write(&scan, "LASF").unwrap();
+        for path in [temp.path(), &scan] {
+            let line = locate(path).unwrap_err().to_string();
+            let advice = "give a folder with metadata.json (Potree 2.0) or index.json (binary tree), or a .qbatch file";
+            assert!(line.ends_with(advice), "{line}");
+        }
+        assert!(locate(temp.path().join("nothing")).is_err());
+    }
+
+    #[test]
+    fn files_belong_to_one_kind_and_names_come_back() {
+        let owned = |name| DatasetKind::ALL.into_iter().filter(|kind| kind.owns(name)).collect::<Vec<_>>();
+        for (name, kind) in [
+            ("metadata.json", DatasetKind::Potree2),
+            ("octree.bin", DatasetKind::Potree2),
+            ("log.txt", DatasetKind::Potree2),
+            ("leaves.bin", DatasetKind::Bintree),
+            ("n.bin", DatasetKind::Bintree),
+            ("n0101.bin", DatasetKind::Bintree),
+            ("points.qbatch", DatasetKind::Batches),
+        ] {
+            assert_eq!(owned(name), [kind], "{name}");
+        }
+        for name in ["", "n2.bin", "n01", "letter.txt", "report.json"] {
+            assert_eq!(owned(name), [], "{name}");
+        }
+        for kind in DatasetKind::ALL {
+            assert_eq!(kind.to_string().parse(), Ok(kind));
+        }
+        assert!("Potree".parse::<DatasetKind>().unwrap_err().to_string().contains("potree2, bintree, batches"));
+    }
+}

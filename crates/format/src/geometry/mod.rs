@@ -1,0 +1,10 @@
+//! Boxes, lattices, node addresses and Morton codes.
+
+mod aabb;
+mod lattice;
+pub(crate) mod morton;
+mod node_key;
+
+pub use aabb::Aabb;
+pub use lattice::Lattice;
+pub use node_key::NodeKey;

@@ -1,0 +1,205 @@
+//! A piece to a batch.
+
+use super::fields::Field;
+use super::pose::{Pose, spherical_to_cartesian};
+use super::schema::{Fill, PositionFields, Roles, Triple};
+use super::streams::Streams;
+use super::unpack::{each, each_integer, fill};
+use super::{E57Scan, ScanPlan};
+use crate::{Column, PointBatch, Positions, ReadError, Scratch, Sink, Wanted, with_column};
+
+/// [`crate::Scan::decode`].
+pub(super) fn piece(
+    scan: &E57Scan,
+    index: usize,
+    wanted: &Wanted,
+    scratch: &mut Scratch,
+    sink: &mut Sink<'_>,
+) -> Result<(), ReadError> {
+    let (Some(piece), Some(cut)) = (scan.pieces.get(index), scan.cuts.get(index)) else {
+        let what = format!("there is no piece {index} (there are {})", scan.pieces.len());
+        return Err(ReadError::unsupported(scan.source.path(), what));
+    };
+    let plan = &scan.scans[cut.scan];
+    if let Some(fault) = &cut.lost {
+        let what = format!("{}; {} points of scan {} are lost", fault.what, cut.records, plan.index);
+        return Err(ReadError::broken(scan.source.path(), fault.byte, what).advise(fault.advice.clone()));
+    }
+    let is_wanted = |column: usize| wanted.0.get(column).copied().unwrap_or(false);
+    let mut needed = vec![false; plan.fields.len()];
+    plan.positions.mark(&mut needed);
+    for (_, fill) in plan.fills.iter().enumerate().filter(|(column, _)| is_wanted(*column)) {
+        Roles::mark(*fill, &mut needed);
+    }
+    let Scratch { raw, decoded, batch } = scratch;
+    let streams = Streams::gather(&scan.source, cut, &plan.fields, &needed, raw, decoded)?;
+    let n = cut.records as usize;
+    let values = Values { fields: &plan.fields, streams, n };
+    let batch = fitting_batch(batch, scan);
+    batch.first_point = piece.first_point;
+    if let Positions::World(xyz) = &mut batch.positions {
+        xyz.iter_mut().for_each(|axis| axis.resize(n, 0.0));
+        values.positions(&plan.positions, &plan.pose, xyz.each_mut().map(Vec::as_mut_slice));
+    }
+    for (i, (column, attribute)) in batch.columns.iter_mut().zip(&scan.info.attributes).enumerate() {
+        let len = if is_wanted(i) { n * attribute.elements } else { 0 };
+        with_column!(&mut *column, v => v.resize(len, Default::default()));
+        if len > 0 {
+            values.column(plan, plan.fills[i], column);
+        }
+    }
+    // the last batch of the piece: whether the sink wants more makes no difference
+    let _ = sink(batch);
+    Ok(())
+}
+
+/// The batch of the scratch memory, with columns of this scan's types.
+fn fitting_batch<'a>(batch: &'a mut Option<PointBatch>, scan: &E57Scan) -> &'a mut PointBatch {
+    let types = || scan.info.attributes.iter().map(|a| a.ty);
+    let fits = batch
+        .as_ref()
+        .is_some_and(|b| matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types()));
+    if !fits {
+        *batch = None;
+    }
+    batch.get_or_insert_with(|| PointBatch {
+        first_point: 0,
+        positions: Positions::World(Default::default()),
+        columns: types().map(Column::new).collect(),
+    })
+}
+
+/// The packed values of a run of records.
+pub(super) struct Values<'a> {
+    pub(super) fields: &'a [Field],
+    pub(super) streams: Streams<'a>,
+    /// Records.
+    pub(super) n: usize,
+}
+
+impl Values<'_> {
+    /// Calls `put` with the number and meant value of a field of each record.
+    #[inline(always)]
+    pub(super) fn each(&self, field: usize, put: impl FnMut(usize, f64)) {
+        each(self.fields[field].encoding, self.streams.field(field), self.n, put);
+    }
+
+    /// Calls `hit` with the number of each record whose state is not 0 ("valid").
+    fn each_invalid(&self, state: Option<usize>, mut hit: impl FnMut(usize)) {
+        if let Some(state) = state {
+            self.each(state, |i, v| {
+                if v != 0.0 {
+                    hit(i);
+                }
+            });
+        }
+    }
+
+    fn triple(&self, triple: Triple, xyz: [&mut [f64]; 3]) {
+        for (field, out) in triple.into_iter().zip(xyz) {
+            match field {
+                Some(field) => fill(self.fields[field].encoding, self.streams.field(field), out),
+                None => out.fill(0.0),
+            }
+        }
+    }
+
+    /// World coordinates; NaN where they are invalid. Where cartesian ones are, the spherical ones count.
+    fn positions(&self, fields: &PositionFields, pose: &Pose, xyz: [&mut [f64]; 3]) {
+        let [x, y, z] = xyz;
+        let spherical = |triple: Triple, [x, y, z]: [&mut [f64]; 3]| {
+            self.triple(triple, [&mut *x, &mut *y, &mut *z]);
+            spherical_to_cartesian([&mut *x, &mut *y, &mut *z]);
+            self.each_invalid(fields.spherical_invalid, |i| [x[i], y[i], z[i]] = [f64::NAN; 3]);
+        };
+        match (fields.cartesian, fields.spherical) {
+            (Some(cartesian), None) => {
+                self.triple(cartesian, [&mut *x, &mut *y, &mut *z]);
+                self.each_invalid(fields.cartesian_invalid, |i| [x[i], y[i], z[i]] = [f64::NAN; 3]);
+            }
+            (Some(cartesian), Some(triple)) => {
+                self.triple(cartesian, [&mut *x, &mut *y, &mut *z]);
+                if fields.cartesian_invalid.is_some() {
+                    let mut other: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; self.n]);
+                    spherical(triple, other.each_mut().map(Vec::as_mut_slice));
+                    let [sx, sy, sz] = &other;
+                    self.each_invalid(fields.cartesian_invalid, |i| [x[i], y[i], z[i]] = [sx[i], sy[i], sz[i]]);
+                }
+            }
+            (None, Some(triple)) => spherical(triple, [&mut *x, &mut *y, &mut *z]),
+            (None, None) => {}
+        }
+        pose.apply([x, y, z]);
+    }
+
+    fn column(&self, plan: &ScanPlan, fill: Fill, column: &mut Column) {
+        match (fill, column) {
+            (Fill::ScanIndex(index), Column::UInt16(out)) => out.fill(index),
+            (Fill::Colour { fields, scaling, invalid }, Column::UInt16(out)) => {
+                let out = out.as_chunks_mut::<3>().0;
+                for (element, (field, scaling)) in fields.into_iter().zip(scaling).enumerate() {
+                    self.each(field, |i, v| {
+                        if let Some(rgb) = out.get_mut(i) {
+                            rgb[element] = scaling.apply(v);
+                        }
+                    });
+                }
+                self.each_invalid(invalid, |i| out[i] = [0; 3]);
+            }
+            (Fill::Intensity { field, scaling, invalid }, Column::UInt16(out)) => {
+                self.each(field, |i, v| {
+                    if let Some(out) = out.get_mut(i) {
+                        *out = scaling.apply(v);
+                    }
+                });
+                self.each_invalid(invalid, |i| out[i] = 0);
+            }
+            (Fill::Normal { fields, axis }, Column::Float32(out)) => {
+                let mut normal: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; self.n]);
+                self.triple(fields.map(Some), normal.each_mut().map(Vec::as_mut_slice));
+                plan.pose.rotate(normal.each_mut().map(Vec::as_mut_slice));
+                out.iter_mut().zip(&normal[axis]).for_each(|(out, v)| *out = *v as f32);
+            }
+            (Fill::Plain { field, invalid }, column) => self.plain(field, invalid, column),
+            (_, column) => with_column!(column, v => v.fill(Default::default())),
+        }
+    }
+
+    /// A field as it is. Integers that lie outside their declared range (a fault of the file) stay within their type.
+    fn plain(&self, field: usize, invalid: Option<usize>, column: &mut Column) {
+        let (encoding, bytes) = (self.fields[field].encoding, self.streams.field(field));
+        macro_rules! integers {
+            ($out:ident, $ty:ty) => {{
+                each_integer(encoding, bytes, self.n, |i, v| {
+                    if let Some(out) = $out.get_mut(i) {
+                        // `min` and `max` of the type fit: the schema does not use uint64
+                        *out = v.clamp(<$ty>::MIN as i64, <$ty>::MAX as i64) as $ty;
+                    }
+                });
+                self.each_invalid(invalid, |i| $out[i] = 0);
+            }};
+        }
+        macro_rules! floats {
+            ($out:ident, $ty:ty) => {{
+                each(encoding, bytes, self.n, |i, v| {
+                    if let Some(out) = $out.get_mut(i) {
+                        *out = v as $ty;
+                    }
+                });
+                self.each_invalid(invalid, |i| $out[i] = <$ty>::NAN);
+            }};
+        }
+        match column {
+            Column::Int8(out) => integers!(out, i8),
+            Column::UInt8(out) => integers!(out, u8),
+            Column::Int16(out) => integers!(out, i16),
+            Column::UInt16(out) => integers!(out, u16),
+            Column::Int32(out) => integers!(out, i32),
+            Column::UInt32(out) => integers!(out, u32),
+            Column::Int64(out) => integers!(out, i64),
+            Column::UInt64(out) => out.fill(0),
+            Column::Float32(out) => floats!(out, f32),
+            Column::Float64(out) => floats!(out, f64),
+        }
+    }
+}

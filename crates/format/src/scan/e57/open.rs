@@ -1,0 +1,262 @@
+//! From the bytes around the points to a scan that can be decoded.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use ::e57::PointCloud;
+
+use super::cuts::{self, Cut};
+use super::decode::Values;
+use super::fields::Field;
+use super::notes::Notes;
+use super::packets::Section;
+use super::pages::{Pages, logical, logical_len, physical};
+use super::pose::Pose;
+use super::scaling::{self, Scaling};
+use super::schema::{Roles, ScanFields, Schema, fields};
+use super::streams::Streams;
+use super::{E57Options, E57Scan, ScanPlan, header, xml};
+use crate::scan::source::Source;
+use crate::{Aabb, Crs, Piece, ReadError, Resolution, ScanInfo, ScanPart};
+
+/// Records of a piece: a batch of its own; a multiple of 8, so that packed values start at a byte border.
+const PIECE_RECORDS: u64 = 50_000;
+/// With more columns than this a piece has fewer records, so that it needs no more memory.
+const USUAL_COLUMNS: u64 = 64;
+/// Records that a scan may have without a single bit of data (all fields constant).
+const MAX_FROM_NOTHING: u64 = 65_536;
+
+/// A scan on the way to a [`ScanPlan`].
+struct Draft<'a> {
+    index: usize,
+    cloud: &'a PointCloud,
+    fields: Vec<Field>,
+    roles: Roles,
+    pose: Pose,
+    cuts: Vec<Cut>,
+}
+
+/// [`super::open_with`].
+pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadError> {
+    let source = Source::open(path)?;
+    let mut warnings = Vec::new();
+    let xml_bytes = header::read_xml(&source, &mut warnings)?;
+    let document = xml::parse(&xml_bytes).map_err(|why| {
+        let what = format!("the XML section cannot be read: {why}");
+        ReadError::broken(path, 24, what)
+    })?;
+    tell_of_the_rest(&document, &mut warnings);
+    let mut notes = Notes::default();
+    let mut drafts = drafts(&source, &document.clouds, options, &mut notes)?;
+    cut_all(&source, &document.clouds, &mut drafts, &mut notes);
+    let scalings: Vec<_> = drafts.iter().map(|draft| scalings(&source, draft, &mut notes)).collect();
+    let views: Vec<_> = drafts.iter().zip(&scalings).map(|(draft, s)| draft.view(s)).collect();
+    let Schema { attributes, fills } = Schema::new(&views).map_err(|what| ReadError::unsupported(path, what))?;
+    if document.clouds.len() > usize::from(u16::MAX) + 1 {
+        warnings.push(format!("{} scans: from 65,535 on they share a point source id", document.clouds.len()));
+    }
+    warnings.extend(notes.lines());
+    let bounds_declared = bounds(&drafts);
+    let resolution = resolution(&source, &drafts);
+    let parts = document.clouds.iter().map(part).collect();
+    let (mut scans, mut cuts) = (Vec::new(), Vec::new());
+    for (i, (draft, fills)) in drafts.into_iter().zip(fills).enumerate() {
+        let Draft { index, fields, roles, pose, cuts: own, .. } = draft;
+        cuts.extend(own.into_iter().map(|cut| Cut { scan: i, ..cut }));
+        scans.push(ScanPlan { index, fields, positions: roles.positions, pose, fills });
+    }
+    let info = ScanInfo {
+        path: path.to_path_buf(),
+        format: format_name(document.clouds.len()),
+        points_declared: document.clouds.iter().fold(0, |sum: u64, c| sum.saturating_add(c.records)),
+        bounds_declared,
+        lattice: None,
+        resolution,
+        parts,
+        attributes,
+        crs: crs(document.coordinate_metadata.as_deref(), &mut warnings),
+        file_bytes: source.len(),
+        warnings: crate::error::as_lines(warnings),
+    };
+    Ok(E57Scan { source, info, scans, pieces: pieces(&cuts), cuts })
+}
+
+impl Draft<'_> {
+    fn view<'b>(&'b self, (colour, intensity): &(Option<[Scaling; 3]>, Option<Scaling>)) -> ScanFields<'b> {
+        let (colour, intensity) = (*colour, *intensity);
+        ScanFields { index: self.index, fields: &self.fields, roles: &self.roles, colour, intensity }
+    }
+}
+
+/// All scans that declare points.
+fn drafts<'a>(
+    source: &Source,
+    clouds: &'a [PointCloud],
+    options: E57Options,
+    notes: &mut Notes,
+) -> Result<Vec<Draft<'a>>, ReadError> {
+    let mut drafts = Vec::new();
+    for (index, cloud) in clouds.iter().enumerate().filter(|(_, cloud)| cloud.records > 0) {
+        let refuse = |what: &str| ReadError::unsupported(source.path(), format!("scan {index}: {what}"));
+        let fields = fields(cloud);
+        let roles = Roles::new(&fields, index, options, notes).map_err(refuse)?;
+        if fields.iter().all(|f| f.encoding.bits() == 0) && cloud.records > MAX_FROM_NOTHING {
+            return Err(refuse(&format!("{} points without a bit of data", cloud.records)));
+        }
+        let (pose, note) = Pose::new(cloud);
+        note.into_iter().for_each(|note| notes.add(index, note));
+        drafts.push(Draft { index, cloud, fields, roles, pose, cuts: Vec::new() });
+    }
+    Ok(drafts)
+}
+
+/// Cuts every scan into pieces.
+fn cut_all(source: &Source, clouds: &[PointCloud], drafts: &mut [Draft<'_>], notes: &mut Notes) {
+    let mut window = Vec::new();
+    // heads alone are read: a page at a time
+    let mut pages = Pages::new(source, &mut window, 1);
+    let mut starts: Vec<u64> = clouds.iter().map(|cloud| logical(cloud.file_offset)).collect();
+    starts.sort_unstable();
+    let columns: u64 = drafts.iter().map(|draft| draft.fields.len() as u64).max().unwrap_or(0);
+    let step = (PIECE_RECORDS * USUAL_COLUMNS / columns.max(USUAL_COLUMNS) / 8 * 8).max(8);
+    let file_end = logical_len(source);
+    let mut taken = HashSet::new();
+    for draft in drafts {
+        let at = logical(draft.cloud.file_offset);
+        // no byte belongs to two scans, so that a small file cannot claim many points
+        if !taken.insert(at) {
+            notes.add(draft.index, "its points are those of an earlier scan; they are read once");
+            continue;
+        }
+        let next = starts.partition_point(|start| *start <= at);
+        let limit = starts.get(next).copied().unwrap_or(file_end).min(file_end);
+        let section = Section::read(&mut pages, at, limit);
+        let found = cuts::cut(&mut pages, section, draft.index, &draft.fields, draft.cloud.records, step);
+        draft.cuts = found.cuts;
+        if found.missing > 0 {
+            let declared = draft.cloud.records;
+            let why = found.fault.map_or(String::new(), |f| format!(" ({} at byte {})", f.what, f.byte));
+            let there = declared - found.missing;
+            notes.add(draft.index, format!("{declared} points are declared, {there} are there{why}"));
+        }
+    }
+}
+
+/// What colour and intensity of a scan are scaled by.
+fn scalings(source: &Source, draft: &Draft<'_>, notes: &mut Notes) -> (Option<[Scaling; 3]>, Option<Scaling>) {
+    let Draft { cloud, fields, roles, .. } = draft;
+    let mut sampled = |what: &str, ids: &[usize]| {
+        let is_float = ids.iter().any(|i| fields[*i].range.is_none() && fields[*i].encoding.bits() >= 32);
+        let seen = sample(source, draft, ids);
+        let (low, high) = scaling::usual(seen, is_float);
+        notes.add(
+            draft.index,
+            format!("no limits are declared for its {what}; {low} to {high} are taken, by a sample of the values"),
+        );
+        (low, high)
+    };
+    let intensity = roles.intensity.map(|i| {
+        let declared = scaling::intensity(cloud.intensity_limits.as_ref(), &fields[i]);
+        Scaling::new(declared.or(fields[i].range).unwrap_or_else(|| sampled("intensity", &[i])))
+    });
+    let colour = roles.colour.map(|ids| {
+        let channels = ids.map(|i| &fields[i]);
+        let declared = scaling::colours(cloud.color_limits.as_ref(), channels);
+        let common = |range| [range; 3];
+        let or_fields = declared.or_else(|| scaling::union(&channels).map(common));
+        or_fields.unwrap_or_else(|| common(sampled("colour", &ids))).map(Scaling::new)
+    });
+    (colour, intensity)
+}
+
+/// The least and the largest finite value of some fields in the first, the middle and the last piece that can be read.
+fn sample(source: &Source, draft: &Draft<'_>, ids: &[usize]) -> (f64, f64) {
+    let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut needed = vec![false; draft.fields.len()];
+    ids.iter().for_each(|i| needed[*i] = true);
+    let n = draft.cuts.len();
+    let mut places = vec![0, n / 2, n.saturating_sub(1)];
+    places.dedup();
+    let (mut raw, mut bytes) = (Vec::new(), Vec::new());
+    for cut in places.into_iter().filter_map(|i| draft.cuts.get(i)).filter(|cut| cut.lost.is_none()) {
+        // a damaged piece tells of itself when it is decoded
+        let Ok(streams) = Streams::gather(source, cut, &draft.fields, &needed, &mut raw, &mut bytes) else { continue };
+        let values = Values { fields: &draft.fields, streams, n: cut.records as usize };
+        for i in ids {
+            values.each(*i, |_, v| {
+                if v.is_finite() {
+                    range = (range.0.min(v), range.1.max(v));
+                }
+            });
+        }
+    }
+    range
+}
+
+fn pieces(cuts: &[Cut]) -> Vec<Piece> {
+    let mut first_point = 0;
+    let piece = |cut: &Cut| {
+        let (byte_offset, end) = (physical(cut.start), physical(cut.end));
+        let piece = Piece { first_point, points: cut.records, byte_offset, byte_len: end.saturating_sub(byte_offset) };
+        first_point += cut.records;
+        piece
+    };
+    cuts.iter().map(piece).collect()
+}
+
+/// The finest step of all scans, if each stores its coordinates in steps.
+fn resolution(source: &Source, drafts: &[Draft<'_>]) -> Resolution {
+    let steps = drafts.iter().map(|draft| {
+        let farthest = |field: usize| {
+            let (min, max) = sample(source, draft, &[field]);
+            if min <= max { min.abs().max(max.abs()) } else { 0.0 }
+        };
+        draft.roles.positions.step(&draft.fields, farthest)
+    });
+    match steps.collect::<Option<Vec<_>>>().and_then(|steps| steps.into_iter().reduce(f64::min)) {
+        Some(step) if step.is_finite() && step > 0.0 => Resolution::Step(step),
+        _ => Resolution::Double,
+    }
+}
+
+/// What is told of a scan.
+fn part(cloud: &PointCloud) -> ScanPart {
+    let (rotation, translation) = Pose::new(cloud).0.parts();
+    ScanPart { name: cloud.name.clone().unwrap_or_default(), points: cloud.records, rotation, translation }
+}
+
+/// The box of all scans, if each declares one.
+fn bounds(drafts: &[Draft<'_>]) -> Option<Aabb> {
+    let boxes = drafts.iter().map(|draft| draft.pose.bounds_declared(draft.cloud)).collect::<Option<Vec<_>>>()?;
+    boxes.into_iter().reduce(|a, b| a.union(&b))
+}
+
+/// `coordinateMetadata` is to be OGC WKT; codes are found in practice, too.
+fn crs(text: Option<&str>, warnings: &mut Vec<String>) -> Crs {
+    let Some(text) = text else { return Crs::default() };
+    let code = text.to_ascii_uppercase().strip_prefix("EPSG:").and_then(|code| code.trim().parse().ok());
+    if text.contains('[') {
+        return Crs { wkt: Some(text.to_owned()), ..Crs::default() };
+    }
+    if code.is_none() {
+        let start: String = text.chars().take(60).collect();
+        warnings.push(format!("the coordinate metadata is no WKT and is not read: {start:?}"));
+    }
+    Crs { epsg: code, ..Crs::default() }
+}
+
+fn tell_of_the_rest(document: &xml::Document, warnings: &mut Vec<String>) {
+    match document.images {
+        Some(0) => {}
+        Some(1) => warnings.push("1 image is in the file; it is not read".to_owned()),
+        Some(n) => warnings.push(format!("{n} images are in the file; they are not read")),
+        None => warnings.push("images are in the file; they are not read, nor can their description be".to_owned()),
+    }
+    if document.clouds.is_empty() {
+        warnings.push("the file has no scans".to_owned());
+    }
+}
+
+fn format_name(scans: usize) -> String {
+    format!("E57 1.0, {scans} scan{}", if scans == 1 { "" } else { "s" })
+}

@@ -1,0 +1,77 @@
+//! The packed values of a piece, gathered from its packets: one run of bytes a field.
+
+use super::cuts::Cut;
+use super::fields::Field;
+use super::packets::Packet;
+use super::pages::{Pages, physical};
+use super::unpack::PADDING;
+use crate::ReadError;
+use crate::scan::source::Source;
+
+/// Pages that one read fetches: four packets of the largest size.
+const WINDOW: u64 = 256;
+
+/// The gathered bytes of each field.
+pub(super) struct Streams<'a> {
+    bytes: &'a [u8],
+    /// By field: start and length in `bytes`, without padding.
+    places: Vec<(usize, usize)>,
+}
+
+impl<'a> Streams<'a> {
+    /// The packed values of a field, with [`PADDING`]; none of a field that was not needed, or has no bits.
+    pub(super) fn field(&self, field: usize) -> &'a [u8] {
+        self.places.get(field).map_or(&[], |(start, len)| &self.bytes[*start..start + len + PADDING])
+    }
+
+    /// Reads the streams of the fields that are `needed`. `raw` and `out` are memory to use.
+    pub(super) fn gather(
+        source: &Source,
+        cut: &Cut,
+        fields: &[Field],
+        needed: &[bool],
+        raw: &mut Vec<u8>,
+        out: &'a mut Vec<u8>,
+    ) -> Result<Self, ReadError> {
+        let mut places = Vec::with_capacity(fields.len());
+        let mut size = 0;
+        for (field, needed) in fields.iter().zip(needed) {
+            let bits = if *needed { u64::from(field.encoding.bits()) } else { 0 };
+            let len = (cut.records * bits).div_ceil(8) as usize;
+            places.push((size, len));
+            size += len + PADDING;
+        }
+        if out.len() < size {
+            out.resize(size, 0);
+        }
+        let mut skip = cut.skip.to_vec();
+        let mut filled = vec![0; fields.len()];
+        let mut missing = places.iter().filter(|(_, len)| *len > 0).count();
+        let mut pages = Pages::new(source, raw, WINDOW);
+        let (mut at, mut sizes) = (cut.start, Vec::new());
+        while missing > 0 && at < cut.end {
+            let packet = Packet::read(&mut pages, at, cut.end, fields.len(), &mut sizes)
+                .map_err(|fault| ReadError::broken(source.path(), fault.byte, fault.what).advise(fault.advice))?;
+            let mut stream = at + packet.streams.unwrap_or(0);
+            for (f, size) in sizes.iter().enumerate() {
+                let (start, len) = places[f];
+                let skipped = skip[f].min(*size);
+                skip[f] -= skipped;
+                let n = ((size - skipped) as usize).min(len - filled[f]);
+                if n > 0 {
+                    let to = start + filled[f];
+                    pages.read(stream + skipped, &mut out[to..to + n])?;
+                    filled[f] += n;
+                    missing -= usize::from(filled[f] == len);
+                }
+                stream += size;
+            }
+            at += packet.len;
+        }
+        if missing > 0 {
+            let what = "packets are missing that were there when the file was opened";
+            return Err(ReadError::broken(source.path(), physical(at), what));
+        }
+        Ok(Self { bytes: out, places })
+    }
+}

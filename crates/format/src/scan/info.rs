@@ -1,0 +1,81 @@
+//! What is known of a scan before its points are decoded.
+
+use std::path::PathBuf;
+
+use crate::{Aabb, Attribute, Lattice};
+
+/// The coordinate reference system as the file tells it; nothing is derived.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Crs {
+    /// OGC WKT text, as stored, without trailing zero bytes.
+    pub wkt: Option<String>,
+    /// EPSG code of the projected (else geographic) system from GeoTIFF keys, 1–32766.
+    pub epsg: Option<u32>,
+    /// EPSG code of the vertical system from GeoTIFF keys.
+    pub vertical_epsg: Option<u32>,
+}
+
+/// What is known of a scan before its points are decoded. Header values are claims, not facts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanInfo {
+    /// The file.
+    pub path: PathBuf,
+    /// For people: "LAZ 1.4, point format 7".
+    pub format: String,
+    /// What the header says, unchecked.
+    pub points_declared: u64,
+    /// What the header says, unchecked; `None` if it says nothing or nonsense (inverted, not finite).
+    pub bounds_declared: Option<Aabb>,
+    /// The lattice of [`crate::Positions::Quantized`] batches; `None` for world coordinates.
+    pub lattice: Option<Lattice>,
+    /// How finely the file stores world coordinates; nothing is told by it of scans that have a lattice.
+    pub resolution: Resolution,
+    /// The scans within the file, where its format knows such (E57, PTX); else empty.
+    pub parts: Vec<ScanPart>,
+    /// The columns beside the position, in order.
+    pub attributes: Vec<Attribute>,
+    /// The coordinate reference system.
+    pub crs: Crs,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+    /// Disagreements that did not stop the reader ("the header declares 10 points, 3 are there"), a line each.
+    pub warnings: Vec<String>,
+}
+
+/// How finely coordinates are stored: steps below that carry nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Resolution {
+    /// In steps of that many world units (scaled integers, or single precision of a known range).
+    Step(f64),
+    /// In single precision, as world coordinates: 24 bits, so the step grows with the distance from 0.
+    Single,
+    /// In double precision, as decimal text, or not known: finer than any lattice.
+    #[default]
+    Double,
+}
+
+/// A scan within a file, as the file tells of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanPart {
+    /// Its name, or empty.
+    pub name: String,
+    /// Points that it declares.
+    pub points: u64,
+    /// `world = rotation · local + translation`, rows of the matrix; the reader has applied it.
+    pub rotation: [[f64; 3]; 3],
+    /// See `rotation`; world units.
+    pub translation: [f64; 3],
+}
+
+/// A part of a scan that decodes without any other part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Piece {
+    /// Index in the scan of the first point.
+    pub first_point: u64,
+    /// Number of points, as the structures of the file give it.
+    pub points: u64,
+    /// Where the (compressed) bytes lie.
+    pub byte_offset: u64,
+    /// How many there are.
+    pub byte_len: u64,
+}

@@ -1,0 +1,150 @@
+//! The public header block of LAS 1.0–1.5 (LAS 1.4 R15 §2.4; 1.5 adds 18 bytes at its end).
+
+use super::bytes::{f64_at, f64x3_at, u16_at, u32_at, u64_at};
+use crate::scan::source::Source;
+use crate::{Aabb, Lattice, ReadError};
+
+/// Bytes of the LAS 1.0–1.2 header; every later one starts with these.
+const MIN_HEADER: u64 = 227;
+/// Bytes of the LAS 1.4 header.
+const HEADER_1_4: u64 = 375;
+
+/// Bytes of a record of each point format, without extra bytes.
+const RECORD_LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+
+/// The fields that reading needs. Counts and offsets are claims.
+#[derive(Debug, Clone)]
+pub(super) struct Header {
+    pub(super) version: (u8, u8),
+    /// Where the variable length records start.
+    pub(super) header_size: u64,
+    pub(super) points_start: u64,
+    pub(super) vlr_count: u32,
+    /// Point format 0–10, without the compression bits.
+    pub(super) point_format: u8,
+    /// Bit 7 or 6 of the point format: LASzip sets it.
+    pub(super) compressed_bit: bool,
+    /// Bytes of a record, ≥ those of its format.
+    pub(super) record_len: usize,
+    pub(super) point_count: u64,
+    pub(super) lattice: Lattice,
+    /// `None` if inverted or not finite.
+    pub(super) bounds: Option<Aabb>,
+    /// 0 if the version has none.
+    pub(super) evlr_start: u64,
+    pub(super) evlr_count: u32,
+}
+
+impl Header {
+    /// Bytes of a record that the point format accounts for; what follows are extra bytes.
+    pub(super) fn format_len(&self) -> usize {
+        RECORD_LEN[usize::from(self.point_format)]
+    }
+
+    /// Reads and checks the header. What does not keep points from being read becomes a line in `warnings`.
+    pub(super) fn read(source: &Source, warnings: &mut Vec<String>) -> Result<Self, ReadError> {
+        let path = source.path();
+        let bytes = source.vec_at(0, HEADER_1_4)?;
+        if !super::is_las(&bytes) {
+            let what = if bytes.is_empty() { "the file is empty" } else { "not a LAS or LAZ file (no LASF signature)" };
+            return Err(ReadError::broken(path, 0, what));
+        }
+        if source.len() < MIN_HEADER {
+            let what = format!("the header has {} of at least {MIN_HEADER} bytes", source.len());
+            return Err(ReadError::broken(path, source.len(), what).advise(CUT_SHORT));
+        }
+        let version = (bytes[24], bytes[25]);
+        if version.0 != 1 || version.1 > 5 {
+            let what = format!("LAS version {}.{} is not known (1.0 to 1.5 are)", version.0, version.1);
+            return Err(ReadError::unsupported(path, what));
+        }
+        let point_format = bytes[104] & 0x3f;
+        if point_format > 10 {
+            return Err(ReadError::unsupported(
+                path,
+                format!("point format {point_format} is not known (0 to 10 are)"),
+            ));
+        }
+        let header = Self {
+            version,
+            header_size: header_size(&bytes, warnings),
+            points_start: u64::from(u32_at(&bytes, 96)),
+            vlr_count: u32_at(&bytes, 100),
+            point_format,
+            compressed_bit: bytes[104] & 0xc0 != 0,
+            record_len: usize::from(u16_at(&bytes, 105)),
+            point_count: u64::from(u32_at(&bytes, 107)),
+            lattice: Lattice { scale: f64x3_at(&bytes, 131), offset: f64x3_at(&bytes, 155) },
+            bounds: bounds(&bytes),
+            evlr_start: 0,
+            evlr_count: 0,
+        };
+        header.with_1_4_fields(&bytes, warnings).checked(source, warnings)
+    }
+
+    fn with_1_4_fields(mut self, bytes: &[u8], warnings: &mut Vec<String>) -> Self {
+        if self.version.1 < 4 || self.header_size < HEADER_1_4 || (bytes.len() as u64) < HEADER_1_4 {
+            return self;
+        }
+        self.evlr_start = u64_at(bytes, 235);
+        self.evlr_count = u32_at(bytes, 243);
+        let (legacy, count) = (self.point_count, u64_at(bytes, 247));
+        if count == 0 && legacy != 0 {
+            warnings.push(format!("the 64-bit point count is 0; the legacy count {legacy} is taken"));
+            return self;
+        }
+        if legacy != 0 && legacy != count {
+            warnings.push(format!("the legacy point count is {legacy}, the 64-bit one {count}; the latter is taken"));
+        }
+        self.point_count = count;
+        self
+    }
+
+    /// Refuses what makes records impossible to find or to place.
+    fn checked(self, source: &Source, warnings: &mut Vec<String>) -> Result<Self, ReadError> {
+        let path = source.path();
+        let need = self.format_len();
+        if self.record_len < need {
+            let what =
+                format!("records are {} bytes long, point format {} needs {need}", self.record_len, self.point_format);
+            return Err(ReadError::broken(path, 105, what).advise(EXPORT_AGAIN));
+        }
+        if self.points_start < MIN_HEADER {
+            let what = format!("the points are said to start at byte {}, inside the header", self.points_start);
+            return Err(ReadError::broken(path, 96, what).advise(EXPORT_AGAIN));
+        }
+        if self.points_start > source.len() {
+            let what = format!("the points start at byte {} but the file has {}", self.points_start, source.len());
+            return Err(ReadError::broken(path, source.len(), what).advise(CUT_SHORT));
+        }
+        if !self.lattice.is_valid() && self.point_count > 0 {
+            let Lattice { scale, offset } = self.lattice;
+            let what = format!("scale {scale:?} or offset {offset:?} cannot place a point (scales must be > 0)");
+            return Err(ReadError::broken(path, 131, what).advise(EXPORT_AGAIN));
+        }
+        if self.bounds.is_none() && self.point_count > 0 {
+            warnings.push("the header's bounds are inverted or not finite; they are not used".to_owned());
+        }
+        Ok(self)
+    }
+}
+
+pub(super) const CUT_SHORT: &str = "it was cut short; copy or export it again";
+pub(super) const EXPORT_AGAIN: &str = "export it again from its source";
+
+fn header_size(bytes: &[u8], warnings: &mut Vec<String>) -> u64 {
+    let size = u64::from(u16_at(bytes, 94));
+    if size < MIN_HEADER {
+        warnings.push(format!("the header says it has {size} bytes; {MIN_HEADER} are taken"));
+        return MIN_HEADER;
+    }
+    size
+}
+
+/// Stored as max x, min x, max y, min y, max z, min z.
+fn bounds(bytes: &[u8]) -> Option<Aabb> {
+    let max = [179, 195, 211].map(|at| f64_at(bytes, at));
+    let min = [187, 203, 219].map(|at| f64_at(bytes, at));
+    let aabb = Aabb { min, max };
+    (!aabb.is_empty() && min.iter().chain(&max).all(|v| v.is_finite())).then_some(aabb)
+}

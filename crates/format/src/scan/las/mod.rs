@@ -1,0 +1,173 @@
+//! LAS 1.0–1.5 and LAZ, point formats 0–10.
+//!
+//! [`open`] reads what stands around the points and cuts them into pieces; [`Scan::decode`] turns a piece into columns.
+//! Nothing that the file says is believed where the bytes can be asked: counts, lengths and offsets are clamped to the
+//! file, disagreements are told in [`ScanInfo::warnings`], and a decompressor's panic comes out as an error.
+//!
+//! * The header's point count is obeyed where it is smaller than what is there (0 means no points), with a warning;
+//!   where it is larger, the points that are there are read.
+//! * A LAZ file without a usable chunk table is still read: layered chunks (formats 6–10) are found one by one, others
+//!   are decoded in sequence as one piece. COPC files are read as the LAZ files that they are.
+//! * Waveform packets (formats 4, 5, 9, 10) are not read, all other values of these formats are.
+//!
+//! ```no_run
+//! use pointmill_format::scan::las;
+//! use pointmill_format::{Scan, Scratch, Wanted};
+//! use std::ops::ControlFlow;
+//!
+//! let scan = las::open("scan.laz".as_ref())?;
+//! let (wanted, mut scratch, mut points) = (Wanted::all(scan.info()), Scratch::default(), 0);
+//! for piece in 0..scan.pieces().len() {
+//!     scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
+//!         points += batch.len();
+//!         ControlFlow::Continue(())
+//!     })?;
+//! }
+//! # Ok::<(), pointmill_format::ReadError>(())
+//! ```
+//!
+//! Sources: ASPRS LAS Specification 1.4 R15 and 1.5; LASzip by M. Isenburg ("LASzip: lossless compression of LiDAR
+//! data", 2013), whose codec is the `laz` crate's.
+
+mod bytes;
+mod chunk_table;
+mod crs;
+mod decode;
+mod decompress;
+mod extra_bytes;
+mod header;
+mod kernels;
+mod laszip;
+mod pieces;
+mod records;
+mod schema;
+
+use std::path::Path;
+
+use crate::scan::source::Source;
+use crate::{Piece, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
+use chunk_table::Layout;
+use header::{EXPORT_AGAIN, Header};
+use laszip::{Arrangement, LaszipRecord};
+use pieces::{Plan, Planner};
+use records::Records;
+use schema::Schema;
+
+/// True if the first bytes of a file say that it is LAS or LAZ.
+pub fn is_las(first_bytes: &[u8]) -> bool {
+    first_bytes.starts_with(b"LASF")
+}
+
+/// Opens a LAS or LAZ file: reads its header, records and (LAZ) chunk table, decodes no point.
+///
+/// # Errors
+/// Not LAS, cut short before the points, a point format or compression that is not known, records that cannot hold
+/// their point format, or a scale that cannot place a point.
+pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
+    Ok(Box::new(LasScan::open(path)?))
+}
+
+/// An open file.
+struct LasScan {
+    source: Source,
+    info: ScanInfo,
+    schema: Schema,
+    record_len: usize,
+    laszip: Option<LaszipRecord>,
+    plan: Plan,
+}
+
+impl LasScan {
+    fn open(path: &Path) -> Result<Self, ReadError> {
+        let source = Source::open(path)?;
+        let mut warnings = Vec::new();
+        let header = Header::read(&source, &mut warnings)?;
+        let records = Records::read(&source, &header, &mut warnings)?;
+        let laszip = find_laszip(&source, &header, &records, &mut warnings)?;
+        let schema = Schema::new(&header, &records, &mut warnings);
+        let crs = crs::read(&records, &mut warnings);
+        let mut planner = Planner { source: &source, header: &header, records: &records, warnings: &mut warnings };
+        let plan = match &laszip {
+            Some(laszip) => planner.laz(laszip)?,
+            None => planner.las(),
+        };
+        let info = ScanInfo {
+            path: path.to_path_buf(),
+            format: format_name(&header, &records, laszip.is_some()),
+            points_declared: header.point_count,
+            bounds_declared: header.bounds,
+            lattice: header.lattice.is_valid().then_some(header.lattice),
+            resolution: Default::default(),
+            parts: Vec::new(),
+            attributes: schema.attributes.clone(),
+            crs,
+            file_bytes: source.len(),
+            warnings: crate::error::as_lines(warnings),
+        };
+        Ok(Self { source, info, schema, record_len: header.record_len, laszip, plan })
+    }
+
+    /// How the chunks of this file are laid out.
+    fn layout(&self, laszip: &LaszipRecord) -> Layout {
+        Layout {
+            points_start: 0,
+            record_len: self.record_len,
+            chunk_points: laszip.chunk_points,
+            layers: laszip.layers(),
+        }
+    }
+}
+
+impl Scan for LasScan {
+    fn info(&self) -> &ScanInfo {
+        &self.info
+    }
+
+    fn pieces(&self) -> &[Piece] {
+        &self.plan.pieces
+    }
+
+    fn decode(
+        &self,
+        piece: usize,
+        wanted: &Wanted,
+        scratch: &mut Scratch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        decode::piece(self, piece, wanted, scratch, sink)
+    }
+}
+
+/// The LASzip record of a compressed file.
+///
+/// Some tools unpack a LAZ file and keep its record. Such a file lacks the compression bits in its point format and is
+/// long enough for plain records.
+fn find_laszip(
+    source: &Source,
+    header: &Header,
+    records: &Records,
+    warnings: &mut Vec<String>,
+) -> Result<Option<LaszipRecord>, ReadError> {
+    let broken = |offset: u64, what: String| ReadError::broken(source.path(), offset, what).advise(EXPORT_AGAIN);
+    let Some(record) = records.find("laszip encoded", 22204) else {
+        let what = "the points are marked as compressed but there is no LASzip record";
+        return if header.compressed_bit { Err(broken(104, what.to_owned())) } else { Ok(None) };
+    };
+    let plain_len = header.point_count.saturating_mul(header.record_len as u64).saturating_add(header.points_start);
+    if !header.compressed_bit && plain_len <= source.len() {
+        warnings
+            .push("there is a LASzip record, but the points are not marked as compressed; it is ignored".to_owned());
+        return Ok(None);
+    }
+    let laszip = LaszipRecord::parse(record, header).map_err(|what| broken(record.data_offset, what))?;
+    Ok((laszip.arrangement != Arrangement::Plain).then_some(laszip))
+}
+
+fn format_name(header: &Header, records: &Records, compressed: bool) -> String {
+    let kind = match (compressed, records.find("copc", 1)) {
+        (true, Some(_)) => "COPC, LAZ",
+        (true, None) => "LAZ",
+        (false, _) => "LAS",
+    };
+    format!("{kind} {}.{}, point format {}", header.version.0, header.version.1, header.point_format)
+}

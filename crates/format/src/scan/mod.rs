@@ -1,0 +1,28 @@
+//! Scans: files of points, of any kind, opened by content and decoded in pieces.
+
+mod decode;
+mod info;
+mod open;
+#[cfg(any(feature = "e57", feature = "las"))]
+mod quiet;
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+mod source;
+// each reader uses its part of it: a build with few of them leaves some of it idle
+#[cfg(any(feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code, unused_imports))]
+mod tabular;
+
+#[cfg(feature = "e57")]
+pub mod e57;
+#[cfg(feature = "las")]
+pub mod las;
+#[cfg(feature = "pcd")]
+pub mod pcd;
+#[cfg(feature = "ply")]
+pub mod ply;
+#[cfg(feature = "text")]
+pub mod text;
+
+pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink, Wanted};
+pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
+pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};

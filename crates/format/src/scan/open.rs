@@ -1,0 +1,258 @@
+//! One door for scans of every kind that this build reads.
+
+use std::fmt;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+use crate::{ReadError, Scan};
+
+/// Bytes from the start of a file that tell its kind, at most; text needs some lines.
+const SNIFF_BYTES: u64 = 4 << 10;
+
+/// The kinds of scans that are told apart by content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ScanKind {
+    /// LAS and LAZ, COPC files among them.
+    #[cfg(feature = "las")]
+    Las,
+    /// ASTM E57.
+    #[cfg(feature = "e57")]
+    E57,
+    /// PLY, ascii and binary.
+    #[cfg(feature = "ply")]
+    Ply,
+    /// PCD, ascii, binary and compressed.
+    #[cfg(feature = "pcd")]
+    Pcd,
+    /// Lines of numbers.
+    #[cfg(feature = "text")]
+    Text(crate::scan::text::TextKind),
+}
+
+/// What a file does not say of itself, for the kinds that need it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct OpenOptions {
+    /// Text: the names of all columns in file order (`text::TextOptions::columns`); `None`: found.
+    pub columns: Option<Vec<String>>,
+    /// Text: what stands between two fields; `None`: found. A blank means any blanks.
+    pub separator: Option<char>,
+    /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
+    pub keep_row_column: bool,
+}
+
+impl ScanKind {
+    /// The kind of a file that starts with these bytes (give some kB, or the whole file if it is shorter).
+    #[allow(unused_variables)] // a build without readers asks nothing
+    pub fn of(first_bytes: &[u8]) -> Option<Self> {
+        #[cfg(feature = "las")]
+        if crate::scan::las::is_las(first_bytes) {
+            return Some(Self::Las);
+        }
+        #[cfg(feature = "e57")]
+        if crate::scan::e57::is_e57(first_bytes) {
+            return Some(Self::E57);
+        }
+        #[cfg(feature = "ply")]
+        if crate::scan::ply::is_ply(first_bytes) {
+            return Some(Self::Ply);
+        }
+        #[cfg(feature = "pcd")]
+        if crate::scan::pcd::is_pcd(first_bytes) {
+            return Some(Self::Pcd);
+        }
+        // last: a binary file may hold lines of numbers, too
+        #[cfg(feature = "text")]
+        if let Some(kind) = crate::scan::text::kind(first_bytes) {
+            return Some(Self::Text(kind));
+        }
+        None
+    }
+
+    /// The kind of the file at `path`, by its content.
+    ///
+    /// # Errors
+    /// The operating system cannot read it. A pipe or a folder is of no kind and is not read.
+    pub fn of_file(path: &Path) -> Result<Option<Self>, ReadError> {
+        Ok(Self::of(&first_bytes(path)?))
+    }
+
+    /// The usual name: "LAS", "E57", "PTX" ….
+    pub const fn name(self) -> &'static str {
+        match self {
+            #[cfg(feature = "las")]
+            Self::Las => "LAS",
+            #[cfg(feature = "e57")]
+            Self::E57 => "E57",
+            #[cfg(feature = "ply")]
+            Self::Ply => "PLY",
+            #[cfg(feature = "pcd")]
+            Self::Pcd => "PCD",
+            #[cfg(feature = "text")]
+            Self::Text(kind) => match kind {
+                crate::scan::text::TextKind::Xyz => "XYZ",
+                crate::scan::text::TextKind::Pts => "PTS",
+                crate::scan::text::TextKind::Ptx => "PTX",
+                crate::scan::text::TextKind::Off => "OFF",
+            },
+        }
+    }
+}
+
+impl fmt::Display for ScanKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What this build reads, for people: "LAS, LAZ, E57, …".
+pub fn supported_scans() -> String {
+    let kinds = [
+        (cfg!(feature = "las"), "LAS, LAZ"),
+        (cfg!(feature = "e57"), "E57"),
+        (cfg!(feature = "ply"), "PLY"),
+        (cfg!(feature = "pcd"), "PCD"),
+        (cfg!(feature = "text"), "text (XYZ, CSV, PTS, PTX, OFF)"),
+    ];
+    let read: Vec<&str> = kinds.into_iter().filter(|(on, _)| *on).map(|(_, name)| name).collect();
+    read.join(", ")
+}
+
+/// Opens a scan of any kind that this build reads; the kind is told by content, never by the name.
+///
+/// # Errors
+/// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
+#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+pub fn open_scan(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+    let first = first_bytes(path)?;
+    let kind = match ScanKind::of(&first) {
+        Some(kind) => kind,
+        // Columns were named for it: then it is text, if it can be.
+        #[cfg(feature = "text")]
+        None if options.columns.is_some() && !first.is_empty() && !first.contains(&0) => {
+            ScanKind::Text(crate::scan::text::TextKind::Xyz)
+        }
+        None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {
+            return Err(ReadError::broken(path, 0, "the file is empty").advise("copy it again, or leave it out"));
+        }
+        None => return Err(unknown(path, &first)),
+    };
+    match kind {
+        #[cfg(feature = "las")]
+        ScanKind::Las => crate::scan::las::open(path),
+        #[cfg(feature = "e57")]
+        ScanKind::E57 => {
+            crate::scan::e57::open_with(path, crate::scan::e57::E57Options { keep_row_column: options.keep_row_column })
+        }
+        #[cfg(feature = "ply")]
+        ScanKind::Ply => crate::scan::ply::open(path),
+        #[cfg(feature = "pcd")]
+        ScanKind::Pcd => crate::scan::pcd::open(path),
+        #[cfg(feature = "text")]
+        ScanKind::Text(_) => {
+            let options =
+                crate::scan::text::TextOptions { columns: options.columns.clone(), separator: options.separator };
+            crate::scan::text::open(path, &options)
+        }
+    }
+}
+
+/// The endings of scans. They never tell what a file is, but that it was to be one.
+const ENDINGS: [&str; 11] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "off", "xyz", "asc", "csv"];
+
+/// Why a file of no kind is refused: as no scan at all, or as one of which too little is left.
+fn unknown(path: &Path, first: &[u8]) -> ReadError {
+    let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    let supported = format!("supported are {}", supported_scans());
+    match ending.filter(|e| ENDINGS.contains(&e.as_str())) {
+        _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),
+        Some(ending) => ReadError::broken(path, 0, format!("called .{ending}, but it is no scan that is known here"))
+            .advise(format!("if it was cut short or damaged, copy it again; {supported}")),
+        None if starts_with_number(first) => ReadError::broken(path, 0, "no whole row of three numbers or more")
+            .advise("if it was cut short, copy it again; if its columns are x,y alone, say so with --columns"),
+        None => ReadError::unsupported(path, "this is no scan that is known here").advise(supported),
+    }
+}
+
+/// True if text begins with digits, as the rows of a scan do.
+fn starts_with_number(first: &[u8]) -> bool {
+    let start = first.trim_ascii_start();
+    let start = start.strip_prefix(b"-").unwrap_or(start);
+    start.first().is_some_and(u8::is_ascii_digit) && !first.contains(&0)
+}
+
+/// The start of a regular file; nothing of anything else: opening a pipe would wait for somebody who writes to it.
+fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let io = |e| ReadError::io(path, "reading the first bytes", e);
+    let mut first = Vec::new();
+    if fs::metadata(path).map_err(io)?.is_file() {
+        File::open(path).map_err(io)?.take(SNIFF_BYTES).read_to_end(&mut first).map_err(io)?;
+    }
+    Ok(first)
+}
+
+#[cfg(all(test, feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+mod tests {
+    use super::*;
+    use crate::ErrorKind;
+    use std::path::PathBuf;
+
+    fn fixtures() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures")
+    }
+
+    /// Every fixture, with its ending.
+    fn scans() -> Vec<(PathBuf, String)> {
+        let folders = ["las", "e57", "rows"].map(|f| fixtures().join(f));
+        let files = folders.iter().flat_map(|f| fs::read_dir(f).unwrap()).map(|e| e.unwrap().path());
+        let ending = |p: &Path| p.extension().unwrap_or_default().to_string_lossy().into_owned();
+        files
+            .map(|p| (p.clone(), ending(&p)))
+            .filter(|(path, ending)| ending != "tsv" && !path.to_string_lossy().contains("LICENSE"))
+            .collect()
+    }
+
+    #[test]
+    fn content_alone_tells_the_kind_of_every_fixture() {
+        let all = scans();
+        assert!(all.len() > 20, "{}", all.len());
+        for (path, ending) in all {
+            let kind = ScanKind::of_file(&path).unwrap().map(|k| k.name());
+            let expected = match ending.as_str() {
+                "las" | "laz" => "LAS",
+                "e57" => "E57",
+                "ply" => "PLY",
+                "pcd" => "PCD",
+                "pts" => "PTS",
+                "ptx" => "PTX",
+                "off" => "OFF",
+                _ => "XYZ",
+            };
+            assert_eq!(kind, Some(expected), "{}", path.display());
+        }
+    }
+
+    #[test]
+    fn what_is_no_scan_is_refused_with_what_is_supported() {
+        let error =
+            open_scan(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml").as_ref(), &OpenOptions::default());
+        let error = error.err().unwrap();
+        assert!(matches!(error.kind, ErrorKind::Unsupported));
+        assert!(error.to_string().contains("LAS, LAZ, E57, PLY, PCD, text"), "{error}");
+    }
+
+    #[test]
+    fn what_was_to_be_a_scan_and_is_none_is_broken() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, bytes) in [("a.ply", "pl"), ("a.LAZ", "LA"), ("a.csv", "X,Y"), ("a.txt", "12.5 1"), ("a.e57", "")] {
+            let path = dir.path().join(name);
+            fs::write(&path, bytes).unwrap();
+            let error = open_scan(&path, &OpenOptions::default()).err().unwrap();
+            assert!(matches!(error.kind, ErrorKind::Broken) && error.offset == Some(0), "{error}");
+        }
+        fs::write(dir.path().join("a.txt"), "1 gallon\n").unwrap();
+        let error = open_scan(&dir.path().join("a.txt"), &OpenOptions::default()).err().unwrap();
+        assert!(matches!(error.kind, ErrorKind::Broken), "{error}");
+    }
+}

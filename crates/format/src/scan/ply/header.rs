@@ -1,0 +1,164 @@
+//! The header: elements and their properties.
+
+use crate::scan::source::Source;
+use crate::scan::tabular::{CUT_SHORT, EXPORT_AGAIN};
+use crate::{AttributeType, ReadError};
+
+/// No header is longer; most have some hundred bytes.
+const MAX_HEADER: u64 = 1 << 20;
+
+/// How the elements are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Ascii,
+    BinaryLittle,
+    BinaryBig,
+}
+
+/// What a property holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Scalar(AttributeType),
+    List { count: AttributeType, item: AttributeType },
+}
+
+/// A property of an element.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Property {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+}
+
+/// A table of rows of properties.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Element {
+    pub(super) name: String,
+    /// As declared.
+    pub(super) count: u64,
+    /// Where in the file its line stands.
+    pub(super) at: u64,
+    pub(super) properties: Vec<Property>,
+}
+
+/// Everything before the data.
+#[derive(Debug)]
+pub(super) struct Header {
+    pub(super) encoding: Encoding,
+    pub(super) elements: Vec<Element>,
+    /// First byte of the data.
+    pub(super) end: u64,
+    pub(super) warnings: Vec<String>,
+}
+
+impl Header {
+    pub(super) fn read(source: &Source) -> Result<Self, ReadError> {
+        let bytes = source.vec_at(0, MAX_HEADER)?;
+        if !super::is_ply(&bytes) {
+            let what =
+                if bytes.is_empty() { "the file is empty" } else { "not a PLY file (it does not start with ply)" };
+            return Err(ReadError::broken(source.path(), 0, what));
+        }
+        let mut parser = Parser { encoding: None, elements: Vec::new(), warnings: Vec::new() };
+        for (at, line) in crate::scan::tabular::lines::lines(&bytes).skip(1) {
+            let text = String::from_utf8_lossy(line);
+            let broken = |what: String| ReadError::broken(source.path(), at as u64, what).advise(EXPORT_AGAIN);
+            if text.trim() == "end_header" {
+                // its line ends with LF or CR LF; the data follows at once
+                let newline = at + line.len();
+                let ending = bytes[newline..].iter().take(2).take_while(|b| matches!(b, b'\r' | b'\n')).count();
+                let end = newline + if bytes[newline..].first() == Some(&b'\n') { 1 } else { ending };
+                let Some(encoding) = parser.encoding else {
+                    return Err(broken("the header has no format line".to_owned()));
+                };
+                let Parser { elements, warnings, .. } = parser;
+                return Ok(Self { encoding, elements, end: end as u64, warnings });
+            }
+            parser.line(&text, at as u64).map_err(broken)?;
+        }
+        let what = format!("the header has no end_header in its {} bytes", bytes.len());
+        Err(ReadError::broken(source.path(), bytes.len() as u64, what).advise(CUT_SHORT))
+    }
+
+    /// Index of the element that holds the points.
+    pub(super) fn vertices(&self, source: &Source) -> Result<usize, ReadError> {
+        let found = ["vertex", "vertices", "point", "points"]
+            .iter()
+            .find_map(|name| self.elements.iter().position(|e| e.name.eq_ignore_ascii_case(name)));
+        found.ok_or_else(|| {
+            let names: Vec<_> = self.elements.iter().map(|e| e.name.as_str()).collect();
+            let there =
+                if names.is_empty() { "it has none".to_owned() } else { format!("it has {}", names.join(", ")) };
+            ReadError::broken(source.path(), self.end, format!("there is no element vertex ({there})"))
+                .advise("export it with vertices")
+        })
+    }
+}
+
+struct Parser {
+    encoding: Option<Encoding>,
+    elements: Vec<Element>,
+    warnings: Vec<String>,
+}
+
+impl Parser {
+    fn line(&mut self, line: &str, at: u64) -> Result<(), String> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words.as_slice() {
+            [] | ["comment" | "obj_info", ..] => {}
+            ["format", kind, rest @ ..] => {
+                self.encoding = Some(match *kind {
+                    "ascii" => Encoding::Ascii,
+                    "binary_little_endian" => Encoding::BinaryLittle,
+                    "binary_big_endian" => Encoding::BinaryBig,
+                    other => return Err(format!("the encoding {other:?} is not known")),
+                });
+                if rest != ["1.0"] {
+                    self.warnings.push(format!("the format version {:?} is read as 1.0", rest.join(" ")));
+                }
+            }
+            ["element", name, count] => {
+                let count = count.parse().map_err(|_| format!("the count {count:?} of element {name} is no number"))?;
+                self.elements.push(Element { name: (*name).to_owned(), count, at, properties: Vec::new() });
+            }
+            ["property", "list", count, item, name] => {
+                let kind = Kind::List { count: count_type(count)?, item: scalar_type(item)? };
+                self.property(name, kind)?;
+            }
+            // names with blanks exist
+            ["property", ty, name @ ..] if !name.is_empty() => {
+                self.property(&name.join(" "), Kind::Scalar(scalar_type(ty)?))?;
+            }
+            _ => return Err(format!("the header line {:?} is not understood", line.trim())),
+        }
+        Ok(())
+    }
+
+    fn property(&mut self, name: &str, kind: Kind) -> Result<(), String> {
+        let element = self.elements.last_mut().ok_or_else(|| format!("property {name} belongs to no element"))?;
+        element.properties.push(Property { name: name.to_owned(), kind });
+        Ok(())
+    }
+}
+
+fn count_type(name: &str) -> Result<AttributeType, String> {
+    match scalar_type(name)? {
+        AttributeType::Float32 | AttributeType::Float64 => Err(format!("a list cannot have {name} items")),
+        ty => Ok(ty),
+    }
+}
+
+fn scalar_type(name: &str) -> Result<AttributeType, String> {
+    Ok(match name {
+        "char" | "int8" => AttributeType::Int8,
+        "uchar" | "uint8" => AttributeType::UInt8,
+        "short" | "int16" => AttributeType::Int16,
+        "ushort" | "uint16" => AttributeType::UInt16,
+        "int" | "int32" => AttributeType::Int32,
+        "uint" | "uint32" => AttributeType::UInt32,
+        "long" | "int64" => AttributeType::Int64,
+        "ulong" | "uint64" => AttributeType::UInt64,
+        "float" | "float32" => AttributeType::Float32,
+        "double" | "float64" => AttributeType::Float64,
+        _ => return Err(format!("the type {name:?} is not known")),
+    })
+}

@@ -1,0 +1,117 @@
+//! Positioned reads: any number of threads read one open file without sharing a cursor.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::ReadError;
+use crate::bytes::read_exact_at;
+
+/// An open file of known length.
+#[derive(Debug)]
+pub(crate) struct Source {
+    file: File,
+    path: PathBuf,
+    len: u64,
+}
+
+impl Source {
+    pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
+        let io = |e| ReadError::io(path, "opening", e);
+        let file = File::open(path).map_err(io)?;
+        let meta = file.metadata().map_err(io)?;
+        if meta.is_dir() {
+            return Err(ReadError::unsupported(path, "this is a folder, not a file"));
+        }
+        Ok(Self { file, path: path.to_path_buf(), len: meta.len() })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Bytes of the file when it was opened.
+    pub(crate) fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Fills `buf` from `offset`.
+    pub(crate) fn read_at(&self, offset: u64, buf: &mut [u8]) -> Result<(), ReadError> {
+        read_exact_at(&self.file, buf, offset).map_err(|e| match e.kind() {
+            io::ErrorKind::UnexpectedEof => {
+                ReadError::broken(&self.path, offset, format!("{} bytes expected, the file ends before", buf.len()))
+                    .advise("it was cut short; copy or export it again")
+            }
+            _ => ReadError::io(&self.path, "reading", e),
+        })
+    }
+
+    /// `N` bytes from `offset`.
+    #[cfg(any(feature = "e57", feature = "las", feature = "pcd"))]
+    pub(crate) fn array_at<const N: usize>(&self, offset: u64) -> Result<[u8; N], ReadError> {
+        let mut buf = [0; N];
+        self.read_at(offset, &mut buf)?;
+        Ok(buf)
+    }
+
+    /// `len` bytes from `offset`, at most what the file holds from there: the allocation never exceeds the file.
+    #[cfg(any(feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+    pub(crate) fn vec_at(&self, offset: u64, len: u64) -> Result<Vec<u8>, ReadError> {
+        let len = len.min(self.len.saturating_sub(offset));
+        let mut buf = vec![0; usize::try_from(len).unwrap_or(0)];
+        self.read_at(offset, &mut buf)?;
+        Ok(buf)
+    }
+
+    /// `len` bytes from `offset` into the front of `buf`, which grows but never shrinks (so that it is zeroed once).
+    pub(crate) fn slice_at<'a>(&self, offset: u64, len: u64, buf: &'a mut Vec<u8>) -> Result<&'a [u8], ReadError> {
+        let end = offset.checked_add(len).filter(|end| *end <= self.len);
+        let Some(len) = end.and_then(|_| usize::try_from(len).ok()) else {
+            return Err(ReadError::broken(&self.path, offset, format!("{len} bytes expected, the file ends before")));
+        };
+        if buf.len() < len {
+            buf.resize(len, 0);
+        }
+        let out = &mut buf[..len];
+        self.read_at(offset, out)?;
+        Ok(out)
+    }
+
+    /// A sequential reader over `offset..end`.
+    #[cfg(feature = "las")]
+    pub(crate) fn reader(&self, offset: u64, end: u64) -> SourceReader<'_> {
+        SourceReader { source: self, next: offset, end: end.min(self.len), buf: Vec::new(), at: 0 }
+    }
+}
+
+/// A buffered reader of a part of a [`Source`].
+#[cfg(feature = "las")]
+pub(crate) struct SourceReader<'a> {
+    source: &'a Source,
+    next: u64,
+    end: u64,
+    buf: Vec<u8>,
+    at: usize,
+}
+
+/// Large enough that a read costs little beside decoding, small beside a batch.
+#[cfg(feature = "las")]
+const READER_BUFFER: u64 = 256 * 1024;
+
+#[cfg(feature = "las")]
+impl io::Read for SourceReader<'_> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.at == self.buf.len() {
+            let len = READER_BUFFER.min(self.end.saturating_sub(self.next));
+            self.buf.resize(len as usize, 0);
+            read_exact_at(&self.source.file, &mut self.buf, self.next)?;
+            self.next += len;
+            self.at = 0;
+        }
+        let rest = &self.buf[self.at..];
+        let n = rest.len().min(out.len());
+        out[..n].copy_from_slice(&rest[..n]);
+        self.at += n;
+        Ok(n)
+    }
+}

@@ -1,0 +1,374 @@
+//! A scan of rows: pieces to batches, whatever the storage.
+
+use super::ascii::{RowParser, Separator};
+use super::binary::{self, Misfit, Rows};
+use super::lines;
+use super::number::Endian;
+use super::schema::Schema;
+use crate::scan::source::Source;
+use crate::{
+    Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo, Scratch, Sink,
+    Wanted,
+};
+
+/// Binary rows that are read at once, so that they are still in the second-level cache when they become columns.
+const READ_BYTES: usize = 128 << 10;
+
+/// Columns of a batch take no more than this: rows of thousands of numbers come in smaller batches.
+const MAX_BATCH_BYTES: usize = 64 << 20;
+
+/// How the rows of a scan lie in its file.
+#[derive(Debug)]
+pub(crate) enum Storage {
+    /// Records of `stride` bytes, one behind the other.
+    Records { stride: usize, endian: Endian },
+    /// Records with lists in them; without these they have `stride` bytes.
+    Lists { parts: Vec<Part>, stride: usize, endian: Endian },
+    /// LZF, all values of a property together: PCD `binary_compressed`.
+    Planes(Planes),
+    /// Lines of numbers.
+    Lines(LineRule),
+}
+
+/// A run of bytes of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// So many bytes that stay.
+    Plain(usize),
+    /// A count and so many items: passed over.
+    List { count: crate::AttributeType, item_bytes: u64 },
+}
+
+/// The planes of a compressed file.
+#[derive(Debug)]
+pub(crate) struct Planes {
+    /// Points of the whole file, all in one piece.
+    pub(crate) points: u64,
+    /// Of each field: offset of its property in a record, and bytes of that property.
+    pub(crate) properties: Vec<(usize, usize)>,
+    /// Bytes of a record.
+    pub(crate) stride: usize,
+    pub(crate) decompress: Decompress,
+}
+
+/// Replaces the last argument by so many decompressed bytes; `Err` says why the first is damaged.
+pub(crate) type Decompress = fn(&[u8], usize, &mut Vec<u8>) -> Result<(), String>;
+
+/// Which lines are rows, and what happens to their points.
+#[derive(Debug)]
+pub(crate) struct LineRule {
+    pub(crate) separator: Separator,
+    pub(crate) is_row: fn(&[u8]) -> bool,
+    /// Lines may end after so many numbers; the others are 0 then.
+    pub(crate) least: usize,
+    /// By first point; empty if the file has none.
+    pub(crate) poses: Vec<Pose>,
+    /// The column that tells the scans apart: the index of the point's pose.
+    pub(crate) scan_column: Option<usize>,
+}
+
+impl LineRule {
+    /// Every number of every line, as it stands there.
+    pub(crate) fn new(separator: Separator, is_row: fn(&[u8]) -> bool) -> Self {
+        Self { separator, is_row, least: usize::MAX, poses: Vec::new(), scan_column: None }
+    }
+}
+
+/// Where a scanner stood: world = (x, y, z, 1) · `rows`.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pose {
+    pub(crate) first_point: u64,
+    pub(crate) rows: [[f64; 3]; 4],
+}
+
+/// An open scan of rows.
+#[derive(Debug)]
+pub(crate) struct RowScan {
+    pub(crate) source: Source,
+    pub(crate) info: ScanInfo,
+    pub(crate) pieces: Vec<Piece>,
+    pub(crate) schema: Schema,
+    pub(crate) storage: Storage,
+}
+
+impl RowScan {
+    /// `points`: as the header declares them.
+    pub(crate) fn new(source: Source, format: String, points: u64, schema: Schema, storage: Storage) -> Self {
+        let info = ScanInfo {
+            path: source.path().to_path_buf(),
+            format,
+            points_declared: points,
+            bounds_declared: None,
+            lattice: None,
+            resolution: Resolution::Double,
+            parts: Vec::new(),
+            attributes: schema.attributes.clone(),
+            crs: Default::default(),
+            file_bytes: source.len(),
+            warnings: Vec::new(),
+        };
+        Self { source, info, pieces: Vec::new(), schema, storage }
+    }
+}
+
+impl Scan for RowScan {
+    fn info(&self) -> &ScanInfo {
+        &self.info
+    }
+
+    fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    fn decode(
+        &self,
+        piece: usize,
+        wanted: &Wanted,
+        scratch: &mut Scratch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let Some(piece) = self.pieces.get(piece) else {
+            let what = format!("there is no piece {piece} (there are {})", self.pieces.len());
+            return Err(ReadError::unsupported(self.source.path(), what));
+        };
+        Decoder { source: &self.source, schema: &self.schema, storage: &self.storage, wanted }
+            .piece(piece, scratch, sink)
+    }
+}
+
+/// Everything that a decode looks at; a probe looks at the same rows with other columns.
+pub(crate) struct Decoder<'a> {
+    pub(crate) source: &'a Source,
+    pub(crate) schema: &'a Schema,
+    pub(crate) storage: &'a Storage,
+    pub(crate) wanted: &'a Wanted,
+}
+
+impl Decoder<'_> {
+    pub(crate) fn piece(&self, piece: &Piece, scratch: &mut Scratch, sink: &mut Sink<'_>) -> Result<(), ReadError> {
+        let Scratch { raw, decoded, batch } = scratch;
+        let batch = fitting_batch(batch, self.schema);
+        match self.storage {
+            Storage::Records { stride, endian } => self.records(piece, *stride, *endian, raw, batch, sink),
+            Storage::Lists { parts, stride, endian } => {
+                let rows = ListRows { parts, stride: *stride, endian: *endian };
+                self.lists(piece, &rows, raw, decoded, batch, sink)
+            }
+            Storage::Planes(planes) => self.planes(piece, planes, raw, decoded, batch, sink),
+            Storage::Lines(rule) => self.lines(piece, rule, raw, batch, sink),
+        }
+    }
+
+    fn records(
+        &self,
+        piece: &Piece,
+        stride: usize,
+        endian: Endian,
+        raw: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let at_once = (READ_BYTES / stride).max(1);
+        let mut at = piece.byte_offset;
+        for (first_point, points) in batches(piece, self.schema) {
+            self.prepare(batch, first_point, points);
+            for first in (0..points).step_by(at_once) {
+                let len = (points - first).min(at_once) * stride;
+                let bytes = self.source.slice_at(at, len as u64, raw)?;
+                binary::fill(Rows { bytes, stride, endian }, &self.schema.fields, self.wanted, first, batch)
+                    .map_err(|m| self.misfit(at + (m.row * stride + m.at) as u64, m))?;
+                at += len as u64;
+            }
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn lists(
+        &self,
+        piece: &Piece,
+        rows: &ListRows<'_>,
+        raw: &mut Vec<u8>,
+        decoded: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let bytes = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
+        let mut at = 0;
+        for (first_point, points) in batches(piece, self.schema) {
+            decoded.clear();
+            for _ in 0..points {
+                rows.compact(bytes, &mut at, decoded).ok_or_else(|| {
+                    let place = piece.byte_offset + at as u64;
+                    ReadError::broken(self.source.path(), place, "a row ends outside its piece; the file has changed")
+                })?;
+            }
+            self.prepare(batch, first_point, points);
+            let filled = Rows { bytes: decoded, stride: rows.stride, endian: rows.endian };
+            binary::fill(filled, &self.schema.fields, self.wanted, 0, batch)
+                .map_err(|m| self.misfit(piece.byte_offset, m))?;
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn planes(
+        &self,
+        piece: &Piece,
+        planes: &Planes,
+        raw: &mut Vec<u8>,
+        decoded: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let compressed = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
+        let total = usize::try_from(planes.points).unwrap_or(usize::MAX);
+        (planes.decompress)(compressed, total.saturating_mul(planes.stride), decoded).map_err(|what| {
+            ReadError::broken(self.source.path(), piece.byte_offset, what)
+                .advise("it is damaged; copy or export it again")
+        })?;
+        for (first_point, points) in batches(piece, self.schema) {
+            self.prepare(batch, first_point, points);
+            for (field, (property_at, width)) in self.schema.fields.iter().zip(&planes.properties) {
+                let start = total * property_at + first_point as usize * width;
+                let bytes = decoded.get(start..start + points * width).unwrap_or_default();
+                let in_plane = super::Field { at: field.at - property_at, ..*field };
+                let rows = Rows { bytes, stride: *width, endian: Endian::Little };
+                binary::field_to_column(rows, &in_plane, self.wanted, 0, batch)
+                    .map_err(|m| self.misfit(piece.byte_offset, m))?;
+            }
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn lines(
+        &self,
+        piece: &Piece,
+        rule: &LineRule,
+        raw: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let bytes = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
+        let elements: Vec<_> = self.schema.attributes.iter().map(|a| a.elements).collect();
+        let Schema { fields, .. } = self.schema;
+        let (wanted, separator, least) = (self.wanted, rule.separator, rule.least);
+        let parser = RowParser { fields, wanted, separator, least, elements: &elements };
+        let mut lines = lines::lines(bytes).filter(|(_, line)| (rule.is_row)(line));
+        for (first_point, points) in batches(piece, self.schema) {
+            self.prepare(batch, first_point, points);
+            for row in 0..points {
+                let (at, line) = lines.next().ok_or_else(|| {
+                    let what = format!("{row} of {points} lines are left; the file has changed");
+                    ReadError::broken(self.source.path(), piece.byte_offset, what)
+                })?;
+                parser.row(line, row, batch).map_err(|m| self.misfit(piece.byte_offset + (at + m.at) as u64, m))?;
+            }
+            self.pose(rule, batch);
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Applies the pose of the batch's scan, and names the scan.
+    fn pose(&self, rule: &LineRule, batch: &mut PointBatch) {
+        let scan = rule.poses.partition_point(|p| p.first_point <= batch.first_point);
+        let Some(pose) = scan.checked_sub(1).and_then(|i| rule.poses.get(i)) else { return };
+        if let Positions::World([xs, ys, zs]) = &mut batch.positions {
+            for ((x, y), z) in xs.iter_mut().zip(ys).zip(zs) {
+                [*x, *y, *z] = pose.apply([*x, *y, *z]);
+            }
+        }
+        if let Some(Column::UInt16(ids)) = rule.scan_column.and_then(|c| batch.columns.get_mut(c)) {
+            ids.fill(u16::try_from(scan - 1).unwrap_or(u16::MAX));
+        }
+    }
+
+    /// Gives the batch room for `points` points.
+    fn prepare(&self, batch: &mut PointBatch, first_point: u64, points: usize) {
+        batch.first_point = first_point;
+        if let Positions::World(xyz) = &mut batch.positions {
+            xyz.iter_mut().for_each(|axis| axis.resize(points, 0.0));
+            if self.schema.flat {
+                xyz[2].fill(0.0);
+            }
+        }
+        for (i, (column, attribute)) in batch.columns.iter_mut().zip(&self.schema.attributes).enumerate() {
+            let wanted = self.wanted.0.get(i).copied().unwrap_or(false);
+            let len = if wanted { points * attribute.elements } else { 0 };
+            crate::with_column!(column, v => v.resize(len, Default::default()));
+        }
+    }
+
+    fn misfit(&self, at: u64, misfit: Misfit) -> ReadError {
+        ReadError::broken(self.source.path(), at, misfit.what)
+            .advise("the file is damaged, or its columns are not what they are called; correct it or export it again")
+    }
+}
+
+/// Runs of at most a batch: first point and number of points.
+fn batches(piece: &Piece, schema: &Schema) -> impl Iterator<Item = (u64, usize)> + use<> {
+    let point_bytes = 24 + schema.attributes.iter().map(crate::Attribute::size).sum::<usize>();
+    let most = (MAX_BATCH_BYTES / point_bytes).clamp(1, MAX_BATCH_POINTS);
+    let (first, points) = (piece.first_point, piece.points);
+    (0..points).step_by(most).map(move |done| (first + done, (points - done).min(most as u64) as usize))
+}
+
+/// The batch of the scratch memory, with columns of this scan's types.
+fn fitting_batch<'a>(batch: &'a mut Option<PointBatch>, schema: &Schema) -> &'a mut PointBatch {
+    let types = || schema.attributes.iter().map(|a| a.ty);
+    let fits = batch
+        .as_ref()
+        .is_some_and(|b| matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types()));
+    if !fits {
+        *batch = None;
+    }
+    batch.get_or_insert_with(|| PointBatch {
+        first_point: 0,
+        positions: Positions::World(Default::default()),
+        columns: types().map(Column::new).collect(),
+    })
+}
+
+/// Records with lists in them.
+struct ListRows<'a> {
+    parts: &'a [Part],
+    stride: usize,
+    endian: Endian,
+}
+
+impl ListRows<'_> {
+    /// Appends the record at `at` without its lists, and moves on; `None` where the bytes end.
+    fn compact(&self, bytes: &[u8], at: &mut usize, out: &mut Vec<u8>) -> Option<()> {
+        for part in self.parts {
+            match *part {
+                Part::Plain(len) => {
+                    out.extend_from_slice(bytes.get(*at..*at + len)?);
+                    *at += len;
+                }
+                Part::List { count, item_bytes } => {
+                    let items = binary::count(bytes.get(*at..*at + count.size())?, count, self.endian)?;
+                    let len = items.checked_mul(item_bytes)?.checked_add(count.size() as u64)?;
+                    *at = at.checked_add(usize::try_from(len).ok()?)?;
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+impl Pose {
+    fn apply(&self, p: [f64; 3]) -> [f64; 3] {
+        let m = &self.rows;
+        std::array::from_fn(|a| p[0] * m[0][a] + p[1] * m[1][a] + p[2] * m[2][a] + m[3][a])
+    }
+}

@@ -1,0 +1,226 @@
+//! Points as lines of numbers: XYZ, TXT, CSV, ASC; PTS; PTX; OFF.
+//!
+//! [`open`] tells the four kinds apart by content ([`kind`]), counts the lines (one pass over the newlines, so that
+//! every piece knows the number of its first point) and looks at some thousand rows to learn what the columns hold.
+//!
+//! **Separator**: `;` if the first row has one, else `,`, else blanks and tabs. Blanks around a separator do not count,
+//! an empty field is NaN, quotes around a field are dropped. Lines that start with `#`, `//` or `%` are comments.
+//!
+//! **Columns**, first what applies:
+//! 1. [`TextOptions::columns`];
+//! 2. a header line (its first field is no number; also as the last comment before the data, as CloudCompare writes
+//!    it) that names x and y;
+//! 3. their number: 3 are x y z; 4 x y z intensity; 6 x y z and r g b, or a normal where all sampled ones have length
+//!    1; 7 x y z intensity r g b, or x y z r g b intensity where columns 4–6 are whole numbers of 0–255 and one of 5–7
+//!    is not; 9 x y z r g b and a normal; 10 x y z intensity r g b and a normal. With any other number those from the
+//!    fourth on become attributes "column 4", ….
+//!
+//! **Values**: positions are doubles. Colours are "rgb" of `uint16`, as they are (rounded) or, where no sample is
+//! above 1 and one is no whole number, 0–1 as 0–65535. Intensity is `uint16` if all samples are whole numbers of
+//! 0–65535, else `float`. In PTS whole numbers of −2048…2047 become 0–4095. Classification is `uint8`, everything
+//! else `double`, or what the name says after a colon (`quality:uint8`, Potree's type names). A later row that does not
+//! fit is an error, never a guess.
+//!
+//! **PTS**: lines with one whole number are counts (a file may have several). **PTX**: the matrix of each scan is applied
+//! in double precision; grid cells at 0 0 0 are places without a point, not points; with more than one scan, "point
+//! source id" is the index of a point's scan. **OFF**: vertices with the colours and normals of COFF, NOFF, CNOFF and
+//! STOFF; faces are not read.
+//!
+//! Sources: Leica Geosystems, "PTS File Format", "PTX File Format"; Geomview manual, "OFF Files".
+
+mod columns;
+mod off;
+mod pts;
+mod ptx;
+mod xyz;
+
+use std::path::Path;
+
+use crate::scan::source::Source;
+use crate::scan::tabular::ascii::{Tokens, parse};
+use crate::scan::tabular::lines;
+use crate::{ReadError, Scan};
+
+/// What the file does not say of itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct TextOptions {
+    /// Names of all columns in file order: `x`, `y`, `z`, `r`, `g`, `b`, `i` (intensity), `c` (classification), `nx`,
+    /// `ny`, `nz`; `-` is left out; any other becomes an attribute of that name. A type may follow a colon
+    /// (`quality:uint8`). `None`: found by the rules above. Ignored in PTX and OFF files.
+    pub columns: Option<Vec<String>>,
+    /// Between two fields; `None`: found. A blank means any blanks.
+    pub separator: Option<char>,
+}
+
+/// The kinds of text that are told apart by content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextKind {
+    /// Lines of numbers: XYZ, TXT, CSV, ASC.
+    Xyz,
+    /// Leica's, with a count line first.
+    Pts,
+    /// Leica's, with scan grids and matrices.
+    Ptx,
+    /// Geomview's object file format.
+    Off,
+}
+
+/// What the first bytes of a file (some kB) are, if they are text of points.
+///
+/// Also binary formats may hold such lines: ask for those first. A file that a user names may be opened as text without
+/// this.
+pub fn kind(first_bytes: &[u8]) -> Option<TextKind> {
+    if is_off(first_bytes) {
+        return Some(TextKind::Off);
+    }
+    if is_ptx(first_bytes) {
+        return Some(TextKind::Ptx);
+    }
+    if is_pts(first_bytes) {
+        return Some(TextKind::Pts);
+    }
+    is_xyz(first_bytes).then_some(TextKind::Xyz)
+}
+
+/// True for OFF, with any of its prefixes.
+pub fn is_off(first_bytes: &[u8]) -> bool {
+    off::Keyword::find(first_bytes).is_some()
+}
+
+/// True for PTS: a line of one whole number, then one of three numbers or more.
+pub fn is_pts(first_bytes: &[u8]) -> bool {
+    matches!(filled(first_bytes).as_slice(), [first, second, ..] if is_count(first) && number_count(second) >= 3)
+}
+
+/// True for PTX: two lines of one whole number each, then one of three numbers.
+pub fn is_ptx(first_bytes: &[u8]) -> bool {
+    let lines = filled(first_bytes);
+    matches!(lines.as_slice(), [columns, rows, scanner, ..]
+        if is_count(columns) && is_count(rows) && number_count(scanner) == 3)
+}
+
+/// True if most lines are rows of three numbers or more, but for a header.
+pub fn is_xyz(first_bytes: &[u8]) -> bool {
+    if first_bytes.contains(&0) {
+        return false;
+    }
+    let lines = filled(first_bytes);
+    let data: Vec<_> = lines.iter().filter(|l| !is_comment(l)).collect();
+    let rows = data.iter().filter(|l| number_count(l) >= 3).count();
+    rows > 0 && rows * 2 >= data.len().saturating_sub(1)
+}
+
+/// Opens a file of any of the four kinds. One that is none of them by content is tried as XYZ.
+///
+/// # Errors
+/// Not text, columns that cannot be told or do not fit `options`, a header (PTX, OFF) that is cut short or makes no
+/// sense, a line of more than 1 MiB.
+pub fn open(path: &Path, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
+    let source = Source::open(path)?;
+    let first = source.vec_at(0, 64 << 10)?;
+    if first.is_empty() {
+        return Err(ReadError::broken(path, 0, "the file is empty"));
+    }
+    if first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff]) {
+        return Err(ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8"));
+    }
+    if let Some(at) = first.iter().position(|b| *b == 0) {
+        return Err(ReadError::broken(path, at as u64, "not text: it has zero bytes"));
+    }
+    match kind(&first) {
+        Some(TextKind::Off) => off::open(source),
+        Some(TextKind::Ptx) => ptx::open(source),
+        Some(TextKind::Pts) => pts::open(source, options),
+        Some(TextKind::Xyz) | None => xyz::open(source, options),
+    }
+}
+
+/// Whether these names can be the columns of a file ([`TextOptions::columns`]).
+///
+/// # Errors
+/// What is wrong with them, for people: x or y is missing, a name stands twice, a type is not known.
+pub fn check_columns(names: &[String]) -> Result<(), String> {
+    columns::check(names)
+}
+
+/// The filled lines of the first bytes, 64 at most; the last one may be cut and counts only if it is the only one.
+fn filled(first_bytes: &[u8]) -> Vec<&[u8]> {
+    let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);
+    let mut lines: Vec<_> = lines::lines(text).map(|(_, l)| l).filter(|l| lines::is_filled(l)).take(64).collect();
+    if lines.len() > 3 && lines.len() < 64 && !text.ends_with(b"\n") {
+        lines.pop();
+    }
+    lines
+}
+
+/// UTF-8 with a signature.
+const BOM: &[u8] = &[0xef, 0xbb, 0xbf];
+
+/// Line starts of comments.
+const COMMENTS: [&[u8]; 3] = [b"#", b"//", b"%"];
+
+fn is_comment(line: &[u8]) -> bool {
+    let line = line.trim_ascii_start();
+    COMMENTS.iter().any(|c| line.starts_with(c))
+}
+
+/// A line of numbers, if the file is what it should be.
+fn is_data(line: &[u8]) -> bool {
+    // a digit first is the usual row
+    if line.first().is_some_and(|b| b.is_ascii_digit() || *b == b'-') {
+        return true;
+    }
+    lines::is_filled(line) && !is_comment(line)
+}
+
+/// A line of one whole number without sign.
+fn is_count(line: &[u8]) -> bool {
+    let line = line.trim_ascii();
+    (1..=20).contains(&line.len()) && line.iter().all(u8::is_ascii_digit)
+}
+
+/// `;` before `,` before blanks: a decimal comma needs another separator.
+fn separator(line: &[u8]) -> Option<u8> {
+    [b';', b','].into_iter().find(|s| line.contains(s))
+}
+
+/// The fields of a line.
+fn fields(line: &[u8], separator: Option<u8>) -> Vec<&[u8]> {
+    let mut tokens = Tokens { line, at: 0, separator };
+    std::iter::from_fn(|| (!tokens.is_empty()).then(|| tokens.token())).collect()
+}
+
+fn is_number(field: &[u8]) -> bool {
+    parse(field).is_ok()
+}
+
+/// Fields up to the first that is no number.
+fn number_count(line: &[u8]) -> usize {
+    fields(line, separator(line)).iter().take_while(|f| !f.is_empty() && is_number(f)).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_told_by_content() {
+        let cases: [(&[u8], Option<TextKind>); 12] = [
+            (b"1 2 3\n4 5 6\n", Some(TextKind::Xyz)),
+            (b"\xef\xbb\xbfX,Y,Z\r\n1,2,3\r\n", Some(TextKind::Xyz)),
+            (b"//X Y Z R\n1 2 3 4\n", Some(TextKind::Xyz)),
+            (b"2\n1 2 3\n1 2 3\n", Some(TextKind::Pts)),
+            (b"2\n3\n0 0 0\n1 0 0\n", Some(TextKind::Ptx)),
+            (b"OFF\n8 6 12\n", Some(TextKind::Off)),
+            (b"COFF 8 6 12\n", Some(TextKind::Off)),
+            (b"OFFSET of the scan\n", None),
+            (b"Dear reader,\nthis is a letter of 3 lines\nand no scan\n", None),
+            (b"{\"a\": [1, 2, 3]}\n", None),
+            (b"1 2 3\0\n", None),
+            (b"", None),
+        ];
+        for (bytes, expected) in cases {
+            assert_eq!(kind(bytes), expected, "{:?}", String::from_utf8_lossy(bytes));
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Planted damage: files cut short, bytes changed at random, fields that are wrong.
+
+use std::ops::Range;
+
+use crate::Random;
+
+/// Places at which [`cuts`] cuts a file.
+pub const CUTS: usize = 64;
+
+/// The file cut at [`CUTS`] places, the first of them byte 0.
+pub fn cuts(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
+    (0..CUTS).map(|k| &bytes[..bytes.len() * k / CUTS])
+}
+
+/// Damaged files to make of each fixture: the environment variable `POINTMILL_MUTATIONS`, or `default`.
+pub fn rounds(default: u64) -> u64 {
+    std::env::var("POINTMILL_MUTATIONS").ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
+/// The file with one to five places changed, each in one of `ranges`: bits, bytes, digits, lengths. The ranges name
+/// where the structures are, since damage among the points seldom shows.
+///
+/// The result may be shorter or longer than `bytes`, because text moves when a character is lost.
+pub fn mutated(bytes: &[u8], ranges: &[Range<usize>], random: &mut Random) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for _ in 0..=random.below(5) {
+        let range = &ranges[random.index(ranges.len())];
+        let (from, to) = (range.start, range.end.min(bytes.len()));
+        if from < to {
+            let at = from + random.index(to - from);
+            change(&mut bytes, at, random);
+        }
+    }
+    bytes
+}
+
+fn change(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
+    match random.below(14) {
+        0..3 => bytes[at] ^= 1 << random.below(8),
+        3..5 => bytes[at] = random.below(256) as u8,
+        5..7 => bytes[at] = 0xff,
+        7..9 => {
+            let len = (bytes.len() - at).min(4);
+            let value = random.next_u32().to_le_bytes();
+            put(bytes, at, &value[..len]);
+        }
+        9..12 => bytes[at] = random.pick(b"0123456789 -.\n\r#,;"),
+        12 => {
+            bytes.remove(at);
+        }
+        _ => {
+            let digits = random.index(20);
+            bytes.splice(at..at, std::iter::repeat_n(b'9', digits));
+        }
+    }
+}
+
+/// Overwrites bytes from `at` on.
+pub fn put(bytes: &mut [u8], at: usize, new: &[u8]) {
+    bytes[at..at + new.len()].copy_from_slice(new);
+}
+
+/// A little-endian number at byte `at`.
+pub fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+}
+
+/// A little-endian number at byte `at`.
+pub fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damage_is_the_same_for_the_same_seed_and_stays_in_its_ranges() {
+        let whole = vec![b'a'; 1000];
+        let (mut lengths, mut unchanged) = ([0; 3], 0);
+        for seed in 0..500 {
+            let damaged = mutated(&whole, &[100..200], &mut Random::new(seed));
+            assert_eq!(damaged, mutated(&whole, &[100..200], &mut Random::new(seed)));
+            let (head, tail) = (&damaged[..100], &damaged[damaged.len() - 700..]);
+            assert!(head.iter().chain(tail).all(|b| *b == b'a'), "seed {seed}");
+            lengths[(damaged.len().cmp(&1000) as i8 + 1) as usize] += 1;
+            unchanged += usize::from(damaged == whole);
+        }
+        assert!(lengths.iter().all(|n| *n > 10), "shorter, equal, longer: {lengths:?}");
+        assert!(unchanged < 10, "{unchanged} files came out whole");
+    }
+
+    #[test]
+    fn cuts_begin_with_nothing_and_never_give_the_whole() {
+        let lengths: Vec<usize> = cuts(&[0; 640]).map(<[u8]>::len).collect();
+        assert_eq!((lengths[0], lengths[1], lengths[63], lengths.len()), (0, 10, 630, 64));
+    }
+}

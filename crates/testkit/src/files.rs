@@ -1,0 +1,174 @@
+//! Fixtures, the corpus of real files, temporary files, and the files of a dataset.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::golden;
+
+/// Folders of `fixtures/` that hold scans.
+pub const SCAN_FOLDERS: [&str; 3] = ["las", "e57", "rows"];
+
+/// The folder of the whole project.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A file or folder of `fixtures/`.
+pub fn fixture(name: &str) -> PathBuf {
+    root().join("fixtures").join(name)
+}
+
+/// The bytes of a file of `fixtures/`.
+pub fn fixture_bytes(name: &str) -> Vec<u8> {
+    read(&fixture(name))
+}
+
+/// A file or folder of the corpus of real scans and datasets, which lies beside the project where it is at hand.
+/// `None` where it is not; standard error names what is missing, so that a test that returns early is seen.
+pub fn corpus(name: &str) -> Option<PathBuf> {
+    let path = root().join("../shared/corpus").join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("skipped: {} does not exist", path.display());
+    None
+}
+
+/// A scan of `fixtures/`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanFixture {
+    /// Below `fixtures/`: "las/format3.las".
+    pub name: String,
+    /// The file.
+    pub path: PathBuf,
+    /// The name of its `ScanKind`: "LAS" for LAZ too, "XYZ" for all lines of numbers without a count.
+    pub kind: &'static str,
+    /// Points that other programs read from it, of `expected.tsv`.
+    pub points: u64,
+}
+
+impl ScanFixture {
+    /// Its bytes.
+    pub fn bytes(&self) -> Vec<u8> {
+        read(&self.path)
+    }
+
+    /// True if the file declares how many points it has, so that a cut one can be recognised.
+    pub fn is_counted(&self) -> bool {
+        self.kind != "XYZ"
+    }
+
+    /// True for files of some kilobytes; the others are real scans, too large to be read thousands of times.
+    pub fn is_small(&self) -> bool {
+        self.path.metadata().is_ok_and(|m| m.len() < 200_000)
+    }
+}
+
+/// The scans of one of [`SCAN_FOLDERS`], sorted by name.
+///
+/// # Panics
+/// If a file has an extension that is not known, or stands in `expected.tsv` without being there.
+pub fn scan_fixtures(folder: &str) -> Vec<ScanFixture> {
+    let mut points = golden::point_counts(folder);
+    let mut scans = Vec::new();
+    for path in entries(&fixture(folder)) {
+        let file = file_name(&path);
+        if file.starts_with("LICENSE") || file == golden::FILE {
+            continue;
+        }
+        // a file without points has no columns to summarise
+        let points = points.remove(&file).unwrap_or(0);
+        scans.push(ScanFixture { name: format!("{folder}/{file}"), kind: kind(&path), path, points });
+    }
+    assert!(points.is_empty(), "in the table of {folder} but not there: {points:?}");
+    assert!(!scans.is_empty(), "no scans in fixtures/{folder}");
+    scans
+}
+
+fn kind(path: &Path) -> &'static str {
+    match path.extension().and_then(|e| e.to_str()).unwrap_or_default() {
+        "las" | "laz" => "LAS",
+        "e57" => "E57",
+        "ply" => "PLY",
+        "pcd" => "PCD",
+        "pts" => "PTS",
+        "ptx" => "PTX",
+        "off" => "OFF",
+        "xyz" | "txt" | "csv" | "asc" => "XYZ",
+        _ => panic!("{}: of what kind is it?", path.display()),
+    }
+}
+
+/// Files and folders of a folder, sorted.
+pub fn entries(folder: &Path) -> Vec<PathBuf> {
+    let listed = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut paths: Vec<PathBuf> = listed.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths
+}
+
+/// The last part of a path, as text.
+pub fn file_name(path: &Path) -> String {
+    path.file_name().unwrap().to_str().unwrap().to_owned()
+}
+
+/// Every file of a dataset with its bytes, except the report of the run: what must be the same for the same points.
+pub fn dataset(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = entries(folder).into_iter().map(|path| (file_name(&path), path));
+    let files: BTreeMap<_, _> = files.filter(|(name, _)| name != "report.json").map(|(n, p)| (n, read(&p))).collect();
+    assert!(!files.is_empty(), "no dataset in {}", folder.display());
+    files
+}
+
+/// Asserts that two datasets are the same byte for byte; names the first file that is not, and where.
+#[track_caller]
+pub fn assert_same_dataset(found: &BTreeMap<String, Vec<u8>>, expected: &BTreeMap<String, Vec<u8>>, what: &str) {
+    let names = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(found), names(expected), "{what}");
+    for (name, bytes) in found {
+        assert_same_bytes(bytes, &expected[name], &format!("{what}: {name}"));
+    }
+}
+
+/// Asserts that two files are the same; says where they first differ.
+#[track_caller]
+pub fn assert_same_bytes(found: &[u8], expected: &[u8], what: &str) {
+    let differs = found.iter().zip(expected).position(|(a, b)| a != b);
+    assert!(found == expected, "{what}: {} and {} bytes, first difference at {differs:?}", found.len(), expected.len());
+}
+
+/// A temporary file with these bytes, removed when dropped.
+pub fn temporary(bytes: &[u8]) -> tempfile::TempPath {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    fs::write(file.path(), bytes).unwrap();
+    file.into_temp_path()
+}
+
+fn read(path: &Path) -> Vec<u8> {
+    fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fixtures_are_known_with_their_points() {
+        let all: Vec<ScanFixture> = SCAN_FOLDERS.iter().flat_map(|folder| scan_fixtures(folder)).collect();
+        assert!(all.len() > 80);
+        let find = |name: &str| all.iter().find(|f| f.name == name).unwrap();
+        assert_eq!((find("las/autzen_trim.laz").points, find("las/autzen_trim.laz").is_small()), (110_000, false));
+        assert_eq!((find("e57/scans.e57").points, find("e57/scans.e57").kind), (600, "E57"));
+        let empty: Vec<&str> = all.iter().filter(|f| f.points == 0).map(|f| f.name.as_str()).collect();
+        assert_eq!(empty, ["e57/no_scans.e57"]);
+    }
+
+    #[test]
+    #[should_panic(expected = "b: 3 and 3 bytes, first difference at Some(1)")]
+    fn a_dataset_that_differs_is_named() {
+        let files = |second: u8| BTreeMap::from([("a".to_owned(), vec![1]), ("b".to_owned(), vec![1, second, 3])]);
+        assert_same_dataset(&files(2), &files(2), "same");
+        assert_same_dataset(&files(2), &files(4), "other");
+    }
+}

@@ -1,0 +1,144 @@
+//! Values of options: parsed here and judged in the commands.
+
+use pointmill_format::Aabb;
+
+pub(super) fn parse_separator(text: &str) -> Result<char, String> {
+    match text {
+        "tab" | "\\t" => Ok('\t'),
+        "space" | "blank" => Ok(' '),
+        "comma" => Ok(','),
+        "semicolon" => Ok(';'),
+        _ => {
+            let mut chars = text.chars();
+            chars.next().filter(|_| chars.next().is_none()).ok_or_else(|| "one character is expected".to_owned())
+        }
+    }
+}
+
+/// Planes of ten bits, or as many as are needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Planes(pub(crate) Option<u8>);
+
+pub(super) fn parse_planes(text: &str) -> Result<Planes, String> {
+    match text {
+        "auto" => Ok(Planes(None)),
+        "10" => Ok(Planes(Some(1))),
+        "20" => Ok(Planes(Some(2))),
+        "30" => Ok(Planes(Some(3))),
+        _ => Err("10, 20, 30 or auto is expected".to_owned()),
+    }
+}
+
+/// Zstandard's own default.
+const ZSTD_LEVEL: i32 = 3;
+
+pub(super) fn parse_compress(text: &str) -> Result<i32, String> {
+    match text.split_once(':').unwrap_or((text, "")) {
+        ("zstd", "") => Ok(ZSTD_LEVEL),
+        ("zstd", level) => level.parse().ok().filter(|l| (1..=19).contains(l)).ok_or("levels are 1 to 19".to_owned()),
+        _ => Err("zstd or zstd:LEVEL is expected".to_owned()),
+    }
+}
+
+/// `--scale`, parsed; `None` is `auto`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scale(pub(crate) Option<f64>);
+
+pub(super) fn parse_scale(text: &str) -> Result<Scale, String> {
+    match (text, text.parse::<f64>()) {
+        ("auto", _) => Ok(Scale(None)),
+        (_, Ok(step)) if step.is_finite() && step > 0.0 => Ok(Scale(Some(step))),
+        _ => Err("write a number above 0, as in 0.001, or auto".to_owned()),
+    }
+}
+
+/// `--attributes`, parsed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Attributes {
+    All,
+    Scene,
+    List(Vec<String>),
+}
+
+pub(super) fn parse_attributes(text: &str) -> Result<Attributes, String> {
+    let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    match text {
+        "all" => Ok(Attributes::All),
+        "scene" => Ok(Attributes::Scene),
+        _ if names.iter().any(String::is_empty) => Err("an attribute name is empty".to_owned()),
+        _ => Ok(Attributes::List(names)),
+    }
+}
+
+/// Parses `1GiB`, `512MB`, `1.5g`, `4096`: bytes. `K`, `M`, `G`, `T` alone and with `iB` are powers of 1024, with `B`
+/// powers of 1000.
+pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
+    let advice = || format!("`{text}` is no size; write it like 2GiB, 512MiB or 1500MB");
+    let text = text.trim();
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let number: f64 = text[..digits].parse().map_err(|_| advice())?;
+    let unit = text[digits..].trim_start().to_ascii_lowercase();
+    let (power, base) = match unit.as_str() {
+        "" | "b" => (0, 1024.0),
+        "k" | "kib" => (1, 1024.0),
+        "m" | "mib" => (2, 1024.0),
+        "g" | "gib" => (3, 1024.0),
+        "t" | "tib" => (4, 1024.0),
+        "kb" => (1, 1000.0_f64),
+        "mb" => (2, 1000.0),
+        "gb" => (3, 1000.0),
+        "tb" => (4, 1000.0),
+        _ => return Err(advice()),
+    };
+    let bytes = number * base.powi(power);
+    // 2^60: no machine has it, and arithmetic on it does not overflow.
+    if bytes >= 1.0 && bytes < (1u64 << 60) as f64 { Ok(bytes as u64) } else { Err(advice()) }
+}
+
+/// Parses `xmin,ymin,zmin..xmax,ymax,zmax`, world coordinates.
+pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
+    let advice = || format!("`{text}` is no box; write it as xmin,ymin,zmin..xmax,ymax,zmax");
+    let (min, max) = text.split_once("..").ok_or_else(advice)?;
+    let corner = |text: &str| {
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+        <[f64; 3]>::try_from(numbers?).ok()
+    };
+    let bounds = Aabb { min: corner(min).ok_or_else(advice)?, max: corner(max).ok_or_else(advice)? };
+    if bounds.is_empty() {
+        return Err(format!("`{text}` is empty: a minimum lies above its maximum"));
+    }
+    Ok(bounds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_take_binary_and_decimal_units() {
+        let table = [
+            ("1GiB", 1 << 30),
+            ("1g", 1 << 30),
+            ("512MiB", 512 << 20),
+            ("512MB", 512_000_000),
+            ("1.5 GiB", 3 << 29),
+            ("4096", 4096),
+        ];
+        for (text, bytes) in table {
+            assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
+        }
+        for text in ["", "GiB", "-1GiB", "1XB", "0", "1e99TB", "..", "9999999999TiB"] {
+            assert!(parse_bytes(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn bounds_are_two_corners() {
+        let b = parse_bounds("-1,2,3.5..4,5e3,6").unwrap();
+        assert_eq!((b.min, b.max), ([-1.0, 2.0, 3.5], [4.0, 5000.0, 6.0]));
+        for text in ["1,2,3", "1,2..3,4", "1,2,3..0,5,6", "nan,0,0..1,1,1", "0,0,0..inf,1,1"] {
+            assert!(parse_bounds(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! `pointmill convert`: what was typed becomes a `Plan`, a run and a summary.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pointmill_converter::{
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, RgbDepth, Sampling,
+    ScaleChoice, Target,
+};
+use pointmill_format::bintree::{Layout, SplitRule};
+
+use crate::args::{
+    Attributes, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg, RgbDepthArg,
+    SamplingArg, SplitArg, TargetArg,
+};
+use crate::exit::{Failure, emit, tell, to_json};
+use crate::human::conversion;
+use crate::human::progress::Progress;
+use crate::inputs::Inputs;
+use crate::interrupt::stop_flag;
+
+/// Brotli's knee for node payloads: above it the time grows several times over for a few per cent.
+const BROTLI_QUALITY: u8 = 5;
+
+pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+    let targets = targets(args)?;
+    let inputs = args.inputs.expand()?;
+    if !args.talk.quiet {
+        inputs.notes.iter().for_each(|note| tell(note));
+    }
+    let plan = plan(args, targets, inputs)?;
+    if args.dry_run {
+        let estimate = pointmill_converter::estimate(&plan)?;
+        return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
+    }
+    protect_inputs(&plan)?;
+    if let Some(file) = &args.report {
+        require_folder(file, &plan.output)?;
+        protect_from_report(&plan, file)?;
+    }
+    let progress = Progress::new(&args.talk, Some(stop_flag()));
+    let result = pointmill_converter::convert(&plan, &progress);
+    let for_people = progress.end();
+    let report = result?;
+    if let Some(file) = &args.report {
+        fs::write(file, to_json(&report)?).map_err(|e| Failure::io(file, "writing the report", &e))?;
+    }
+    if args.json {
+        emit(&to_json(&report)?)?;
+    }
+    if for_people {
+        conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| tell(line));
+    }
+    Ok(())
+}
+
+/// The formats with their settings; an option for a format that is not asked for is a mistake.
+fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
+    let mut targets = Vec::new();
+    for to in &args.to {
+        let target = match to {
+            TargetArg::Potree2 => Target::Potree2,
+            TargetArg::Bintree => Target::Bintree(bintree_settings(&args.bintree)),
+            TargetArg::Batches => Target::Batches(batches_settings(&args.batches)),
+            TargetArg::Potree1 => {
+                let line = "--to potree1 is not supported yet by this version; it writes potree2, bintree and batches";
+                return Err(Failure::Unsupported(line.to_owned()));
+            }
+        };
+        targets.push(target);
+    }
+    let (tree, batches) = (&args.bintree, &args.batches);
+    let given = [
+        ("--capacity", TargetArg::Bintree, tree.capacity.is_some()),
+        ("--split", TargetArg::Bintree, tree.split.is_some()),
+        ("--layout", TargetArg::Bintree, tree.layout.is_some()),
+        ("--lod-cell", TargetArg::Batches, batches.lod_cell.is_some()),
+        ("--planes", TargetArg::Batches, batches.planes.is_some()),
+        ("--compress", TargetArg::Batches, batches.compress.is_some()),
+        ("--no-originals", TargetArg::Batches, batches.no_originals),
+    ];
+    if let Some((option, to, _)) = given.iter().find(|(_, to, given)| *given && !args.to.contains(to)) {
+        return Err(Failure::Usage(format!("{option} is for --to {}", format!("{to:?}").to_lowercase())));
+    }
+    Ok(targets)
+}
+
+fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
+    let usual = BintreeSettings::default();
+    BintreeSettings {
+        capacity: args.capacity.unwrap_or(usual.capacity),
+        split: args.split.map_or(usual.split, |s| match s {
+            SplitArg::Mean => SplitRule::Mean,
+            SplitArg::Median => SplitRule::Median,
+            SplitArg::Midpoint => SplitRule::Midpoint,
+        }),
+        layout: args.layout.map_or(usual.layout, |l| match l {
+            LayoutArg::Files => Layout::Files,
+            LayoutArg::Packed => Layout::Packed,
+        }),
+    }
+}
+
+fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
+    let usual = BatchesSettings::default();
+    BatchesSettings {
+        lod_cell: args.lod_cell.as_ref().map_or(usual.lod_cell, |c| c.0),
+        planes: args.planes.map_or(usual.planes, |p| p.0),
+        zstd_level: args.compress,
+        originals: !args.no_originals,
+    }
+}
+
+fn plan(args: &ConvertArgs, targets: Vec<Target>, inputs: Inputs) -> Result<Plan, Failure> {
+    let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
+    let mut plan = Plan::new(inputs.files, args.output.clone());
+    plan.open = args.inputs.options()?;
+    plan.name = name;
+    plan.targets = targets;
+    plan.sampling = match (args.sampling, args.seed) {
+        (SamplingArg::Random, seed) => Sampling::Random { seed: seed.unwrap_or(0) },
+        (_, Some(_)) => return Err(Failure::Usage("--seed is for --sampling random".to_owned())),
+        (SamplingArg::Poisson, None) => Sampling::Poisson,
+        (SamplingArg::Grid, None) => Sampling::Grid,
+    };
+    plan.encoding = match (args.encoding, args.brotli_quality) {
+        (EncodingArg::Brotli, quality) => Encoding::Brotli { quality: quality.unwrap_or(BROTLI_QUALITY) },
+        (EncodingArg::Default, Some(_)) => {
+            return Err(Failure::Usage("--brotli-quality is for --encoding brotli".to_owned()));
+        }
+        (EncodingArg::Default, None) => Encoding::Default,
+    };
+    plan.leaf_capacity = args.leaf_capacity;
+    plan.attributes = match &args.attributes {
+        None => AttributeChoice::Usual,
+        Some(Attributes::All) => AttributeChoice::All,
+        Some(Attributes::Scene) => AttributeChoice::Scene,
+        Some(Attributes::List(names)) => AttributeChoice::List(names.clone()),
+    };
+    plan.scale = args.scale.0.map_or(ScaleChoice::Auto, ScaleChoice::Fixed);
+    plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every };
+    plan.duplicates = match args.duplicates {
+        DuplicatesArg::Keep => Duplicates::Keep,
+        DuplicatesArg::Drop => Duplicates::Drop,
+    };
+    plan.invalid = on_fault(args.invalid);
+    plan.unreadable = on_fault(args.unreadable);
+    plan.rgb_depth = match args.rgb_depth {
+        RgbDepthArg::Auto => RgbDepth::Auto,
+        RgbDepthArg::Eight => RgbDepth::Eight,
+        RgbDepthArg::Sixteen => RgbDepth::Sixteen,
+    };
+    plan.crs.clone_from(&args.crs);
+    plan.overwrite = args.overwrite;
+    if let Some(bytes) = args.memory {
+        plan.memory_bytes = bytes;
+    }
+    if let Some(threads) = args.threads {
+        plan.threads = usize::from(threads.get());
+    }
+    if let Some(dir) = &args.temp_dir {
+        if !dir.is_dir() {
+            return Err(Failure::Usage(format!("{}: --temp-dir is no folder", dir.display())));
+        }
+        plan.temp_dir = Some(dir.clone());
+    }
+    Ok(plan)
+}
+
+fn on_fault(arg: FaultArg) -> OnFault {
+    match arg {
+        FaultArg::Skip => OnFault::Skip,
+        FaultArg::Fail => OnFault::Fail,
+    }
+}
+
+/// The folder's name if one folder was named, else that of the first scan in order of path, whatever was typed first.
+fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
+    let folder = typed.first().filter(|path| typed.len() == 1 && path.is_dir());
+    let full = folder.map(|path| path.canonicalize().unwrap_or_else(|_| path.clone()));
+    let name = match &full {
+        Some(folder) => folder.file_name(),
+        None => files.first().and_then(|file| file.file_stem()),
+    };
+    name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// The scans that are being read are never replaced. What else may be, the converter judges.
+fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
+    let Ok(output) = plan.output.canonicalize() else {
+        return Ok(()); // not there: nothing to protect
+    };
+    let inside = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file.starts_with(&output));
+    let Some(scan) = plan.inputs.iter().find(inside) else { return Ok(()) };
+    let (output, scan) = (plan.output.display(), scan.display());
+    Err(Failure::Usage(format!("{output}: the output would replace the input {scan}; choose another folder")))
+}
+
+/// The report never replaces a scan.
+fn protect_from_report(plan: &Plan, report: &Path) -> Result<(), Failure> {
+    let Ok(report) = report.canonicalize() else {
+        return Ok(()); // not there: nothing to protect
+    };
+    let same = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file == report);
+    let Some(scan) = plan.inputs.iter().find(same) else { return Ok(()) };
+    Err(Failure::Usage(format!("{}: the report would replace this input; choose another file", scan.display())))
+}
+
+/// Better to learn before the run than after it that the report has no place to go.
+fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty() && *folder != output);
+    if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
+        return Err(Failure::Usage(format!(
+            "{}: the report cannot be written there: no such folder, or a folder itself",
+            file.display()
+        )));
+    }
+    Ok(())
+}

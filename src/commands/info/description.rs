@@ -1,0 +1,29 @@
+//! How every kind of scan and dataset is described.
+
+use pointmill_format::{Aabb, Attribute};
+use serde_json::{Value, json};
+
+use crate::exit::Failure;
+
+/// What there is to say about a scan or a dataset.
+pub(super) struct Told {
+    pub(super) text: String,
+    pub(super) json: Value,
+    /// What kept the rest from being told; the other two hold what could be.
+    pub(super) fault: Option<Failure>,
+}
+
+pub(super) fn attribute_json(attribute: &Attribute) -> Value {
+    json!({
+        "name": attribute.name,
+        "type": attribute.ty.potree_name(),
+        "elements": attribute.elements,
+        "scale": attribute.scale,
+        "offset": attribute.offset,
+        "no_data": attribute.no_data,
+    })
+}
+
+pub(super) fn corners(bounds: &Aabb) -> Value {
+    json!({ "min": bounds.min, "max": bounds.max })
+}

@@ -1,0 +1,191 @@
+//! What a scan is: what its header says and, if its points are decoded, what they say.
+
+use std::path::Path;
+
+use pointmill_format::{OpenOptions, Resolution, Scan, ScanInfo, ScanPart};
+use serde_json::{Map, Value, json};
+
+use super::description::{Told, attribute_json, corners};
+use super::measure::{Measured, measure};
+use crate::exit::Failure;
+use crate::human::quantities::{bytes, count, number, numbers, plural};
+use crate::human::text::{self, Table, attribute_line};
+
+/// Scans of a file that are named one by one for people; JSON names all.
+const MAX_PARTS: usize = 30;
+
+/// Tells of a scan; `deep`: decodes its points, too.
+pub(super) fn tell(file: &Path, options: &OpenOptions, deep: bool) -> Result<Told, Failure> {
+    let scan = pointmill_format::open_scan(file, options)?;
+    let (measured, fault) = match deep.then(|| measure(&*scan)) {
+        Some((measured, fault)) => (Some(measured), fault.map(Failure::from)),
+        None => (None, None),
+    };
+    let measured = measured.as_ref();
+    Ok(Told { text: text(&*scan, measured), json: json(&*scan, measured), fault })
+}
+
+fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
+    let info = scan.info();
+    let mut t = Table::about(&info.path);
+    t.row("format", &info.format);
+    t.row("points", count(info.points_declared));
+    let declared = info.bounds_declared.map_or_else(|| "not told".to_owned(), |b| text::corners(&b.min, &b.max));
+    t.row("bounds", declared);
+    if let Some(measured) = measured {
+        let invalid = match measured.invalid {
+            0 => String::new(),
+            n => format!(", {} of them without a valid position", count(n)),
+        };
+        t.row("decoded", plural(measured.points, "point") + &invalid);
+        let bounds = &measured.bounds;
+        t.row("measured", if bounds.is_empty() { "nothing".into() } else { text::corners(&bounds.min, &bounds.max) });
+    }
+    match info.lattice {
+        Some(l) => t.row("lattice", format!("step {}, offset {}", numbers(&l.scale), numbers(&l.offset))),
+        None => t.row("resolution", resolution(info, measured)),
+    }
+    t.row("CRS", text::crs(&info.crs));
+    let pieces = plural(scan.pieces().len() as u64, "piece");
+    t.row("size", format!("{}, {pieces} to decode in parallel", bytes(info.file_bytes)));
+    for (i, part) in info.parts.iter().take(MAX_PARTS).enumerate() {
+        t.row(if i == 0 { "scans" } else { "" }, part_line(i, part));
+    }
+    if let Some(more @ 1..) = info.parts.len().checked_sub(MAX_PARTS) {
+        t.row("", format!("and {}; --json names all", plural(more as u64, "more scan")));
+    }
+    for (i, attribute) in info.attributes.iter().enumerate() {
+        let ranges = measured.map(|m| m.ranges[i].as_slice());
+        t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, ranges));
+    }
+    info.warnings.iter().for_each(|w| t.row("warning", w));
+    t.0
+}
+
+/// How finely coordinates are stored, and what that means where the points are.
+fn resolution(info: &ScanInfo, measured: Option<&Measured>) -> String {
+    match info.resolution {
+        Resolution::Step(step) => format!("stored in steps of {}", number(step)),
+        Resolution::Double => "stored in double precision, or as decimal text".to_owned(),
+        Resolution::Single => {
+            let measured = measured.map(|m| m.bounds).filter(|b| !b.is_empty());
+            match measured.or(info.bounds_declared) {
+                None => "stored in single precision; --deep tells what that means where the points are".to_owned(),
+                Some(b) => {
+                    let steps = [0, 1, 2].map(|a| single_step(b.min[a].abs().max(b.max[a].abs())));
+                    format!("stored in single precision: steps of {} at the far ends", numbers(&steps))
+                }
+            }
+        }
+    }
+}
+
+/// The step of single precision at `v` ≥ 0.
+fn single_step(v: f64) -> f64 {
+    let v = v as f32;
+    f64::from(v.next_up()) - f64::from(v)
+}
+
+/// "2: Hall, 1,200 points, at 3 4 5, turned by 30° about 0 0 1".
+fn part_line(index: usize, part: &ScanPart) -> String {
+    let name = if part.name.is_empty() { String::new() } else { format!("{}, ", part.name) };
+    let at = numbers(&part.translation);
+    format!("{index}: {name}{}, at {at}{}", plural(part.points, "point"), turn(&part.rotation))
+}
+
+/// A rotation as its angle and axis; another matrix as its rows.
+fn turn(m: &[[f64; 3]; 3]) -> String {
+    let dot = |a: usize, b: usize| (0..3).map(|i| m[a][i] * m[b][i]).sum::<f64>();
+    let is_rotation = (0..3).all(|a| (0..=a).all(|b| (dot(a, b) - f64::from(u8::from(a == b))).abs() < 1e-4));
+    let minors = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| m[1][i] * m[2][j] - m[1][j] * m[2][i]);
+    let determinant: f64 = (0..3).map(|i| m[0][i] * minors[i]).sum();
+    if !is_rotation || determinant < 0.0 {
+        return format!(", times the matrix {}", m.each_ref().map(|row| numbers(row)).join("; "));
+    }
+    // twice the sine times the axis, and one more than twice the cosine
+    let axis = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]];
+    let length = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let degrees = length.atan2(m[0][0] + m[1][1] + m[2][2] - 1.0).to_degrees();
+    if degrees < 1e-4 {
+        return String::new();
+    }
+    // at 180° the axis is that of the symmetric part instead
+    let axis = if length > 1e-4 { axis.map(|v| v / length) } else { half_turn_axis(m) };
+    let short = |v: f64| number((v * 1e4).round() / 1e4);
+    format!(", turned by {}° about {}", short(degrees), axis.map(short).join(" "))
+}
+
+/// The axis of a rotation by 180°: `m + 1` is twice its outer product.
+fn half_turn_axis(m: &[[f64; 3]; 3]) -> [f64; 3] {
+    let largest = (1..3).fold(0, |best, a| if m[a][a] > m[best][best] { a } else { best });
+    let column: [f64; 3] = std::array::from_fn(|i| m[i][largest] + f64::from(u8::from(i == largest)));
+    let length = column.iter().map(|v| v * v).sum::<f64>().sqrt();
+    column.map(|v| v / length)
+}
+
+fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
+    let info = scan.info();
+    let part = |p: &ScanPart| json!({ "name": p.name, "points": p.points, "rotation": p.rotation, "translation": p.translation });
+    let resolution = match info.resolution {
+        _ if info.lattice.is_some() => Value::Null,
+        Resolution::Step(step) => json!({ "stored": "steps", "step": step }),
+        Resolution::Single => json!({ "stored": "single" }),
+        Resolution::Double => json!({ "stored": "double or text" }),
+    };
+    let mut object = json!({
+        "path": info.path.to_string_lossy(),
+        "kind": "scan",
+        "format": info.format,
+        "points_declared": info.points_declared,
+        "bounds_declared": info.bounds_declared.map(|b| corners(&b)),
+        "lattice": info.lattice.map(|l| json!({ "scale": l.scale, "offset": l.offset })),
+        "resolution": resolution,
+        "crs": { "wkt": info.crs.wkt, "epsg": info.crs.epsg, "vertical_epsg": info.crs.vertical_epsg },
+        "scans": info.parts.iter().map(part).collect::<Vec<_>>(),
+        "attributes": info.attributes.iter().map(attribute_json).collect::<Vec<_>>(),
+        "pieces": scan.pieces().len(),
+        "file_bytes": info.file_bytes,
+        "warnings": info.warnings,
+    });
+    if let Some(measured) = measured {
+        let names = info.attributes.iter().map(|a| a.name.clone());
+        let ranges = measured.ranges.iter().map(|elements| {
+            let ends = |end: usize| elements.iter().map(|e| e[end]).collect::<Vec<_>>();
+            json!({ "min": ends(0), "max": ends(1) })
+        });
+        object["measured"] = json!({
+            "points": measured.points,
+            "invalid": measured.invalid,
+            "bounds": (!measured.bounds.is_empty()).then(|| corners(&measured.bounds)),
+            "ranges": names.zip(ranges).collect::<Map<_, _>>(),
+        });
+    }
+    object
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotations_are_told_by_angle_and_axis() {
+        assert_eq!(turn(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), "");
+        assert_eq!(turn(&[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), ", turned by 90° about 0 0 1");
+        assert_eq!(turn(&[[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]), ", turned by 180° about 0 0 1");
+        let (c, s) = (30f64.to_radians().cos(), 30f64.to_radians().sin());
+        assert_eq!(turn(&[[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]), ", turned by 30° about 1 0 0");
+        assert_eq!(
+            turn(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0]]),
+            ", times the matrix 1 0 0; 0 1 0; 0 0 2"
+        );
+        assert!(turn(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]).contains("matrix"), "a mirror");
+    }
+
+    #[test]
+    fn single_precision_is_told_as_steps() {
+        assert_eq!(
+            [single_step(0.6), single_step(500_000.0), single_step(5_400_000.0)],
+            [2f64.powi(-24), 0.03125, 0.5]
+        );
+    }
+}

@@ -1,0 +1,5 @@
+//! The commands, a file or folder for each.
+
+pub(crate) mod convert;
+pub(crate) mod info;
+pub(crate) mod validate;

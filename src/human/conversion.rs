@@ -1,0 +1,139 @@
+//! How reports of runs and estimates look to people. No figure is worked out here.
+
+use pointmill_converter::{Estimate, OutputReport, Plan, Report};
+use serde_json::Value;
+
+use super::quantities::{bytes, count, number, numbers, plural, rate, seconds};
+use super::text::{Table, batches, corners, or_none};
+
+/// The summary of a run, line by line.
+pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String> {
+    let mut lines: Vec<String> = report.outputs.iter().map(|output| output_line(output, plan)).collect();
+    let per_second = report.points.read as f64 / report.seconds.max(1e-9);
+    let memory = report.peak_memory_bytes.map_or_else(String::new, |peak| format!(", peak memory {}", bytes(peak)));
+    let temporary = match report.temp_bytes {
+        0 => String::new(),
+        n => format!(", temporary files {}", bytes(n)),
+    };
+    lines.push(format!("{}, {}{memory}{temporary}", seconds(report.seconds), rate(per_second)));
+    lines.extend(points_lines(report));
+    lines.push(coordinates_line(report));
+    for output in &report.outputs {
+        lines.extend(dropped_line(output, report.outputs.len() > 1));
+    }
+    if verbose {
+        lines.extend(details(report));
+    }
+    lines
+}
+
+/// What was made.
+fn output_line(output: &OutputReport, plan: &Plan) -> String {
+    let parts = match output.details.get("batches").and_then(Value::as_u64) {
+        Some(n) => batches(n),
+        None => {
+            let tree = &output.tree;
+            format!("{}, {}", plural(tree.nodes, "node"), plural(u64::from(tree.depth) + 1, "level"))
+        }
+    };
+    let place = plan.output.join(&output.folder);
+    // joining nothing leaves a separator at the end
+    let place = if output.folder.is_empty() { &plan.output } else { &place };
+    format!("{}: {} in {parts}, {}", place.display(), plural(output.points, "point"), bytes(output.bytes))
+}
+
+/// Attributes that are not in an output, those of one reason together.
+fn dropped_line(output: &OutputReport, name_it: bool) -> Option<String> {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for dropped in &output.attributes_dropped {
+        match reasons.iter_mut().find(|(why, _)| *why == dropped.why) {
+            Some((_, names)) => names.push(&dropped.name),
+            None => reasons.push((&dropped.why, vec![&dropped.name])),
+        }
+    }
+    let of = if name_it { format!(" of {}", output.format) } else { String::new() };
+    let told = reasons.iter().map(|(why, names)| format!("{} ({why})", names.join(", ")));
+    (!reasons.is_empty()).then(|| format!("attributes left out{of}: {}", told.collect::<Vec<_>>().join("; ")))
+}
+
+fn points_lines(report: &Report) -> Vec<String> {
+    let p = &report.points;
+    let from = plural(report.inputs.len() as u64, "scan");
+    if points_left_out(report) == 0 {
+        return vec![format!("all {} of {from} are in the dataset", plural(p.read, "point"))];
+    }
+    let causes = [
+        (p.outside_bounds, "outside --bounds"),
+        (p.other_class, "of other classes than --class"),
+        (p.thinned, "thinned out by --every"),
+        (p.duplicates_dropped, "duplicates, dropped"),
+        (p.invalid, "without a valid position"),
+        (p.unreadable, "lost, because parts of the inputs cannot be decoded"),
+    ];
+    let causes = causes.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n)));
+    vec![format!("of {} in {from}, left out: {}", plural(p.read, "point"), causes.collect::<Vec<_>>().join(", "))]
+}
+
+fn coordinates_line(report: &Report) -> String {
+    let change = &report.coordinate_change;
+    let step = numbers(&report.grid.scale);
+    if change.max.iter().all(|v| *v == 0.0) {
+        return format!("coordinates are unchanged, step {step}");
+    }
+    // 0.07 read as a double and 7 steps of 0.01 differ in the last bits
+    let farthest =
+        report.inputs.iter().filter_map(|i| i.bounds_measured).flatten().fold(0.0f64, |far, v| far.max(v.abs()));
+    if change.max.iter().zip(&report.grid.scale).all(|(max, step)| *max <= (step * 1e-6).min(farthest * 1e-15)) {
+        return format!("coordinates are unchanged but for the rounding of doubles, step {step}");
+    }
+    format!(
+        "coordinates moved by at most {} (root mean square {}), step {step}",
+        numbers(&change.max),
+        numbers(&change.rms)
+    )
+}
+
+fn details(report: &Report) -> Vec<String> {
+    let mut lines = vec![format!("grid: {}", report.grid.why), format!("attributes: {}", report.attributes.join(", "))];
+    for input in &report.inputs {
+        let read = plural(input.points_read, "point");
+        lines.push(format!("input {}: {}, {read}, {}", input.path.display(), input.format, or_none(&input.crs)));
+    }
+    for phase in &report.phases {
+        lines.push(format!("phase {}: {}, {}", phase.name, seconds(phase.seconds), rate(phase.points_per_second)));
+    }
+    for (level, points) in report.tree.points_per_level.iter().enumerate() {
+        let nodes = report.tree.nodes_per_level.get(level).copied().unwrap_or(0);
+        lines.push(format!("level {level}: {} in {}", plural(*points, "point"), plural(nodes, "node")));
+    }
+    lines.push(format!("checksum in {} out {}", report.checksum_in, report.checksum_out));
+    lines
+}
+
+/// What a run would do.
+pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
+    let mut t = Table::default();
+    t.row("inputs", plural(estimate.inputs.len() as u64, "scan"));
+    t.row("points", format!("{} (as the headers say)", count(estimate.points)));
+    t.row("bounds", estimate.bounds.map_or_else(|| "unknown".to_owned(), |b| corners(&b[..3], &b[3..])));
+    t.row("CRS", or_none(&estimate.crs));
+    t.row("step", format!("{}, {}", numbers(&estimate.grid.scale), estimate.grid.why));
+    t.row("cube side", number(estimate.grid.cube_side));
+    t.row("attributes", estimate.attributes.join(", "));
+    t.row("bytes a point", estimate.bytes_per_point.to_string());
+    t.row("memory", format!("{} of {} allowed", bytes(estimate.memory_bytes), bytes(plan.memory_bytes)));
+    t.row("temporary", bytes(estimate.temp_bytes));
+    t.row("output", format!("{} in {}", bytes(estimate.output_bytes), plan.output.display()));
+    if plan.output.exists() {
+        let advice = if plan.overwrite { "will be replaced" } else { "needs --overwrite to be replaced" };
+        t.row("exists", advice);
+    }
+    estimate.warnings.iter().for_each(|w| t.row("warning", w));
+    t.0
+}
+
+/// What a report says besides figures: true if every point read is in the dataset or accounted for.
+fn points_left_out(report: &Report) -> u64 {
+    let p = &report.points;
+    p.outside_bounds + p.other_class + p.thinned + p.duplicates_dropped + p.invalid + p.unreadable
+}

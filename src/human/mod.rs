@@ -1,0 +1,7 @@
+//! How results look to people: JSON is made in the commands.
+
+pub(crate) mod conversion;
+pub(crate) mod progress;
+pub(crate) mod quantities;
+pub(crate) mod text;
+pub(crate) mod validation;

@@ -1,0 +1,214 @@
+//! What a run tells while it works, and how it hears that it shall stop.
+
+use std::io::{self, IsTerminal as _, Write as _};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+use pointmill_converter::{Events, Phase};
+use serde_json::json;
+
+use super::quantities::{count, rate, seconds};
+use crate::args::{ProgressArg, TalkArgs};
+use crate::exit::tell;
+
+/// No program needs JSON lines more often, and a line a batch would be thousands.
+const JSON_INTERVAL: Duration = Duration::from_millis(500);
+/// More lines than this hide what matters; the report has them all.
+const MAX_WARNINGS: u64 = 20;
+
+enum Face {
+    Bar(ProgressBar),
+    Json,
+    Silent,
+}
+
+/// Tells of phases, rates and warnings on standard error; standard output is for results.
+pub(crate) struct Progress {
+    face: Face,
+    quiet: bool,
+    warnings: AtomicU64,
+    stop: Option<&'static AtomicBool>,
+    done: AtomicU64,
+    state: Mutex<State>,
+}
+
+struct State {
+    phase: &'static str,
+    total: u64,
+    began: Instant,
+    told: Instant,
+}
+
+impl Progress {
+    /// `stop`: what says that the run shall end, if it can.
+    pub(crate) fn new(talk: &TalkArgs, stop: Option<&'static AtomicBool>) -> Self {
+        let bar = || Face::Bar(ProgressBar::no_length());
+        let face = match talk.progress {
+            ProgressArg::Json => Face::Json,
+            ProgressArg::None => Face::Silent,
+            ProgressArg::Bar => bar(),
+            ProgressArg::Auto if talk.quiet || !io::stderr().is_terminal() => Face::Silent,
+            ProgressArg::Auto => bar(),
+        };
+        let now = Instant::now();
+        Self {
+            face,
+            quiet: talk.quiet,
+            warnings: AtomicU64::new(0),
+            stop,
+            done: AtomicU64::new(0),
+            state: Mutex::new(State { phase: "start", total: 0, began: now, told: now }),
+        }
+    }
+
+    /// A phase begins; `total` counts points, 0 is unknown.
+    pub(crate) fn begin(&self, phase: &'static str, total: u64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if state.phase != "start" {
+            self.tell_json(&mut state); // the last figures of the phase that ends
+        }
+        self.done.store(0, Ordering::Relaxed);
+        let now = Instant::now();
+        *state = State { phase, total, began: now, told: now };
+        self.tell_json(&mut state);
+        if let Face::Bar(bar) = &self.face {
+            bar.reset();
+            bar.set_style(style(total));
+            bar.set_message(phase);
+            bar.set_length(total);
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+    }
+
+    /// `points` more are done.
+    pub(crate) fn step(&self, points: u64) {
+        self.done.fetch_add(points, Ordering::Relaxed);
+        match &self.face {
+            Face::Bar(bar) => bar.inc(points),
+            // Whoever finds the lock taken leaves the telling to its holder.
+            Face::Json => {
+                if let Ok(mut state) = self.state.try_lock()
+                    && state.told.elapsed() >= JSON_INTERVAL
+                {
+                    self.tell_json(&mut state);
+                }
+            }
+            Face::Silent => {}
+        }
+    }
+
+    /// `done` of `total` points of a phase are done; for those who count by themselves, and may be overtaken.
+    pub(crate) fn at(&self, phase: &'static str, done: u64, total: u64) {
+        let (same_phase, same_total) = {
+            let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            (state.phase == phase, state.total == total)
+        };
+        if !same_phase {
+            self.begin(phase, total);
+        } else if !same_total {
+            self.state.lock().unwrap_or_else(PoisonError::into_inner).total = total;
+            if let Face::Bar(bar) = &self.face {
+                bar.set_length(total);
+            }
+        }
+        self.step(done.saturating_sub(self.done.load(Ordering::Relaxed)));
+    }
+
+    /// One line that the user should know.
+    pub(crate) fn note(&self, line: &str) {
+        if self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
+            return;
+        }
+        match &self.face {
+            Face::Bar(bar) => bar.suspend(|| tell(&format!("warning: {line}"))),
+            Face::Json => write_line(&json!({ "warning": line })),
+            Face::Silent => tell(&format!("warning: {line}")),
+        }
+    }
+
+    /// True once Ctrl-C was pressed.
+    pub(crate) fn stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
+    /// Clears the bar, so that other lines can follow; true if people are to be told of the result.
+    pub(crate) fn end(&self) -> bool {
+        match &self.face {
+            Face::Bar(bar) => bar.finish_and_clear(),
+            Face::Json => self.tell_json(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner)),
+            Face::Silent => {}
+        }
+        let hidden = self.warnings.load(Ordering::Relaxed).saturating_sub(MAX_WARNINGS);
+        let for_people = !self.quiet && !matches!(self.face, Face::Json);
+        if for_people && hidden > 0 {
+            tell(&format!("warning: {hidden} more warnings; the report has them all"));
+        }
+        for_people
+    }
+
+    fn tell_json(&self, state: &mut State) {
+        if !matches!(self.face, Face::Json) {
+            return;
+        }
+        state.told = Instant::now();
+        let done = self.done.load(Ordering::Relaxed);
+        let elapsed = state.began.elapsed().as_secs_f64();
+        let per_second = if elapsed > 0.0 { done as f64 / elapsed } else { 0.0 };
+        let left = (done > 0 && state.total > 0).then(|| state.total.saturating_sub(done) as f64 / per_second);
+        write_line(&json!({
+            "phase": state.phase,
+            "done": done,
+            "total": (state.total > 0).then_some(state.total),
+            "points_per_second": per_second.round(),
+            "eta_seconds": left.map(|s| (s * 10.0).round() / 10.0),
+        }));
+    }
+}
+
+impl Events for Progress {
+    fn phase(&self, phase: Phase, total: u64) {
+        self.begin(phase.name(), total);
+    }
+
+    fn advance(&self, points: u64) {
+        self.step(points);
+    }
+
+    fn warning(&self, line: &str) {
+        self.note(line);
+    }
+
+    fn stop_requested(&self) -> bool {
+        self.stopped()
+    }
+}
+
+fn write_line(object: &serde_json::Value) {
+    // Nobody is left to tell when standard error is closed.
+    let _ = writeln!(io::stderr().lock(), "{object}");
+}
+
+fn style(total: u64) -> ProgressStyle {
+    let template = match total {
+        0 => "{msg:8} {spinner} {elapsed}",
+        _ => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {speed}  {left}",
+    };
+    let per_second = |state: &ProgressState| state.pos() as f64 / state.elapsed().as_secs_f64().max(1e-3);
+    ProgressStyle::with_template(template)
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .progress_chars("=> ")
+        .with_key("points", |state: &ProgressState, w: &mut dyn std::fmt::Write| {
+            let _ = write!(w, "{} of {} points", count(state.pos()), count(state.len().unwrap_or(0)));
+        })
+        .with_key("speed", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
+            let _ = write!(w, "{}", rate(per_second(state)));
+        })
+        .with_key("left", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
+            let left = state.len().unwrap_or(0).saturating_sub(state.pos());
+            if state.pos() > 0 {
+                let _ = write!(w, "{} left", seconds(left as f64 / per_second(state)));
+            }
+        })
+}

@@ -1,0 +1,111 @@
+//! How the outcome of a validation looks to people. No figure is worked out here.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use pointmill_validate::{DatasetKind, LeafQuality, LevelQuality, Outcome};
+
+use super::quantities::{count, plural};
+use super::text::printable;
+
+/// What a validation found: checks, quality by level, problems.
+pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> String {
+    let mut out = printable(&dataset.to_string_lossy());
+    let nodes = match (outcome.format, outcome.nodes) {
+        (DatasetKind::Batches, 1) => "1 batch".to_owned(),
+        (DatasetKind::Batches, n) => format!("{} batches", count(n)),
+        (_, n) => plural(n, "node"),
+    };
+    let points = plural(outcome.points, "point");
+    let _ = writeln!(out, ": {} {}, {points} in {nodes}", outcome.format, outcome.encoding.unwrap_or_default());
+    for check in &outcome.checks {
+        let verdict = match (check.ok, &check.skipped) {
+            (false, _) => "BROKEN",
+            (true, Some(_)) if check.checked > 0 => "in part",
+            (true, Some(_)) => "skipped",
+            (true, None) => "ok",
+        };
+        let detail = match (&check.skipped, check.ok) {
+            (Some(why), _) => why.clone(),
+            (None, true) => format!("{} checked", count(check.checked)),
+            (None, false) => format!("{} checked, {} found", count(check.checked), count(check.found)),
+        };
+        let _ = writeln!(out, "  {verdict:<8} {:<17} {} ({detail})", check.name.name(), check.promise);
+    }
+    if let Some(against) = &outcome.against {
+        let (expected, found) = (count(against.points_expected), count(against.points_found));
+        let sources = plural(against.sources as u64, "scan");
+        let _ = writeln!(out, "  {sources}: {expected} points expected, {found} found");
+        if !against.attributes_not_in_dataset.is_empty() {
+            let names = against.attributes_not_in_dataset.join(", ");
+            let _ = writeln!(out, "  not compared, for the dataset does not have them: {}", printable(&names));
+        }
+    }
+    out.push_str(&quality(&outcome.quality, verbose));
+    out.push_str(&outcome.leaves.as_ref().map(leaves).unwrap_or_default());
+    out + &problems(outcome)
+}
+
+/// Distances over the spacing of the level; `–` where there is nothing to measure.
+fn quality(levels: &[LevelQuality], verbose: bool) -> String {
+    let mut out = String::new();
+    if levels.is_empty() {
+        return out;
+    }
+    let _ = writeln!(
+        out,
+        "  level   nodes        points     spacing  nearest: min   mean   largest hole   seam: min   close"
+    );
+    let ratio = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
+    for l in levels {
+        let _ = writeln!(
+            out,
+            "  {:>5} {:>7} {:>13} {:>11.5} {:>13} {:>6} {:>14} {:>11} {:>7}",
+            l.level,
+            count(l.nodes),
+            count(l.points),
+            l.spacing,
+            ratio(l.nearest_min),
+            ratio(l.nearest_mean),
+            if l.largest_hole.is_some_and(|hole| hole >= 4.0) { "≥ 4".to_owned() } else { ratio(l.largest_hole) },
+            ratio(l.seam_min),
+            count(l.seam_close)
+        );
+    }
+    if verbose {
+        out.push_str(
+            "  Distances are over the spacing of the level. Nearest: from a point of an inner node to the next of that\n  \
+             node. Largest hole: from a point of a deeper level to the next one drawn. Seam: between inner nodes; close:\n  \
+             points that have one of another node nearer than the spacing.\n",
+        );
+    }
+    out
+}
+
+/// Sizes of the leaves of a binary tree.
+fn leaves(leaves: &LeafQuality) -> String {
+    if leaves.leaves == 0 {
+        return String::new();
+    }
+    let LeafQuality { points_min, points_mean, points_max, depth, volume, largest_error, largest_bound, .. } = leaves;
+    format!(
+        "  {} of {} to {} points, {} on average, down to depth {depth}; volume of their boxes {volume:.0}\n  \
+         positions are off by {largest_error:.1e} at most, {largest_bound:.1e} is allowed\n",
+        if leaves.leaves == 1 { "1 leaf".to_owned() } else { format!("{} leaves", count(leaves.leaves)) },
+        count(*points_min),
+        count(*points_max),
+        count(points_mean.round() as u64),
+    )
+}
+
+/// One problem a line.
+pub(crate) fn problems(outcome: &Outcome) -> String {
+    let mut out = String::new();
+    outcome.problems.iter().for_each(|problem| out += &(printable(&problem.to_string()) + "\n"));
+    let errors: u64 = outcome.checks.iter().map(|check| check.found + check.warnings).sum();
+    let hidden = errors.saturating_sub(outcome.problems.len() as u64);
+    if hidden > 0 {
+        let _ = writeln!(out, "and {} more", count(hidden));
+    }
+    out
+}
