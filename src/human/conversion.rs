@@ -1,7 +1,9 @@
 //! How reports of runs and estimates look to people. No figure is worked out here.
 
-use pointmill_converter::{Estimate, OutputReport, Plan, Report};
+use pointmill_converter::{DropReason, Estimate, OutputReport, Plan, Report};
 use serde_json::Value;
+
+use crate::flags;
 
 use super::quantities::{bytes, count, number, numbers, plural, rate, seconds};
 use super::text::{Table, batches, corners, or_none};
@@ -44,20 +46,21 @@ fn output_line(output: &OutputReport, plan: &Plan) -> String {
 
 /// Attributes that are not in an output, those of one reason together.
 fn dropped_line(output: &OutputReport, name_it: bool) -> Option<String> {
-    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    let mut reasons: Vec<(&DropReason, Vec<&str>)> = Vec::new();
     for dropped in &output.attributes_dropped {
-        match reasons.iter_mut().find(|(why, _)| *why == dropped.why) {
+        match reasons.iter_mut().find(|(why, _)| **why == dropped.why) {
             Some((_, names)) => names.push(&dropped.name),
             None => reasons.push((&dropped.why, vec![&dropped.name])),
         }
     }
     let of = if name_it { format!(" of {}", output.format) } else { String::new() };
-    let told = reasons.iter().map(|(why, names)| format!("{} ({why})", names.join(", ")));
-    (!reasons.is_empty()).then(|| format!("attributes left out{of}: {}", told.collect::<Vec<_>>().join("; ")))
+    let each = reasons.iter().map(|(why, names)| format!("{} ({})", names.join(", "), flags::drop_reason(why)));
+    (!reasons.is_empty()).then(|| format!("attributes left out{of}: {}", each.collect::<Vec<_>>().join("; ")))
 }
 
 fn points_lines(report: &Report) -> Vec<String> {
     let p = &report.points;
+    let duplicates = duplicates_dropped(report);
     let from = plural(report.inputs.len() as u64, "scan");
     if points_left_out(report) == 0 {
         return vec![format!("all {} of {from} are in the dataset", plural(p.read, "point"))];
@@ -66,7 +69,7 @@ fn points_lines(report: &Report) -> Vec<String> {
         (p.outside_bounds, "outside --bounds"),
         (p.other_class, "of other classes than --class"),
         (p.thinned, "thinned out by --every"),
-        (p.duplicates_dropped, "duplicates, dropped"),
+        (duplicates, "duplicates, dropped"),
         (p.invalid, "without a valid position"),
         (p.unreadable, "lost, because parts of the inputs cannot be decoded"),
     ];
@@ -94,7 +97,7 @@ fn coordinates_line(report: &Report) -> String {
 }
 
 fn details(report: &Report) -> Vec<String> {
-    let mut lines = vec![format!("grid: {}", report.grid.why), format!("attributes: {}", report.attributes.join(", "))];
+    let mut lines = vec![format!("grid: {}", report.grid.why)];
     for input in &report.inputs {
         let read = plural(input.points_read, "point");
         lines.push(format!("input {}: {}, {read}, {}", input.path.display(), input.format, or_none(&input.crs)));
@@ -102,11 +105,15 @@ fn details(report: &Report) -> Vec<String> {
     for phase in &report.phases {
         lines.push(format!("phase {}: {}, {}", phase.name, seconds(phase.seconds), rate(phase.points_per_second)));
     }
-    for (level, points) in report.tree.points_per_level.iter().enumerate() {
-        let nodes = report.tree.nodes_per_level.get(level).copied().unwrap_or(0);
-        lines.push(format!("level {level}: {} in {}", plural(*points, "point"), plural(nodes, "node")));
+    for output in &report.outputs {
+        lines.push(format!("{} attributes: {}", output.format, output.attributes.join(", ")));
+        for (level, points) in output.tree.points_per_level.iter().enumerate() {
+            let nodes = output.tree.nodes_per_level.get(level).copied().unwrap_or(0);
+            let (points, nodes) = (plural(*points, "point"), plural(nodes, "node"));
+            lines.push(format!("{} level {level}: {points} in {nodes}", output.format));
+        }
+        lines.push(format!("{} checksum {} of {}", output.format, output.checksum, report.checksum_in));
     }
-    lines.push(format!("checksum in {} out {}", report.checksum_in, report.checksum_out));
     lines
 }
 
@@ -128,12 +135,17 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
         let advice = if plan.overwrite { "will be replaced" } else { "needs --overwrite to be replaced" };
         t.row("exists", advice);
     }
-    estimate.warnings.iter().for_each(|w| t.row("warning", w));
+    estimate.warnings.iter().for_each(|w| t.row("warning", flags::warning_line(w)));
     t.0
 }
 
-/// What a report says besides figures: true if every point read is in the dataset or accounted for.
+/// Points that are not in the datasets, whatever the cause.
 fn points_left_out(report: &Report) -> u64 {
     let p = &report.points;
-    p.outside_bounds + p.other_class + p.thinned + p.duplicates_dropped + p.invalid + p.unreadable
+    p.outside_bounds + p.other_class + p.thinned + duplicates_dropped(report) + p.invalid + p.unreadable
+}
+
+/// Only octrees drop duplicates, and there is one octree at most.
+fn duplicates_dropped(report: &Report) -> u64 {
+    report.outputs.iter().map(|o| o.duplicates_dropped).max().unwrap_or(0)
 }

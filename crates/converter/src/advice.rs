@@ -73,7 +73,9 @@ impl fmt::Display for Advice {
             Self::NameAttributes => "name the attributes to keep",
             Self::LeaveOutAttribute => "leave it out",
             Self::PackLeaves => "the packed layout puts all leaves into one file",
-            Self::ConvertApart => "leave out the input whose offset or scale is wrong, or convert the inputs separately",
+            Self::ConvertApart => {
+                "leave out the input whose offset or scale is wrong, or convert the inputs separately"
+            }
             Self::MoveAway => "move it away, or choose another output",
             Self::OtherOutput => "choose another output",
         };

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use pointmill_converter::{ConvertError, Plan, Report, Silent, convert};
+use pointmill_converter::{ConvertError, Plan, Potree2Settings, Report, Silent, convert};
 use pointmill_format::ErrorKind;
 
 const CUTS: usize = 64;
@@ -30,7 +30,7 @@ fn fixtures(folder: &str) -> Vec<PathBuf> {
 fn run(input: &Path, output: &Path) -> Result<Report, ConvertError> {
     let mut plan = Plan::new(vec![input.to_path_buf()], output.to_path_buf());
     (plan.threads, plan.overwrite) = (1, true);
-    convert(&plan, &Silent)
+    convert(&plan, &[Potree2Settings::default().into()], &Silent)
 }
 
 fn check(folder: &str) {

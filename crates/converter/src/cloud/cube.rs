@@ -198,8 +198,7 @@ mod tests {
 
     #[test]
     fn unequal_scales_give_one_cube_and_points_inside_it() {
-        let bounds =
-            JobBounds::new([-1_220_000_000, 450_000_000, 0], [-1_219_900_000, 450_100_000, 30_000]);
+        let bounds = JobBounds::new([-1_220_000_000, 450_000_000, 0], [-1_219_900_000, 450_100_000, 30_000]);
         let l = lattice([1e-7, 1e-7, 0.01]);
         let cube = Cube::around(&bounds, &l).unwrap();
         assert!(cube.side >= 300.0 && cube.side < 1200.0);
@@ -211,8 +210,7 @@ mod tests {
 
     #[test]
     fn the_box_of_a_node_holds_its_points() {
-        let bounds =
-            JobBounds::new([-1_220_000_000, 450_000_000, 0], [-1_219_900_000, 450_100_000, 30_000]);
+        let bounds = JobBounds::new([-1_220_000_000, 450_000_000, 0], [-1_219_900_000, 450_100_000, 30_000]);
         for scale in [[1e-7, 1e-7, 0.01], [0.01; 3], [0.3, 0.001, 7.0]] {
             let Ok(cube) = Cube::around(&bounds, &lattice(scale)) else { continue };
             let mut state = 1u64;

@@ -103,9 +103,9 @@ impl fmt::Display for LatticeReason {
             Basis::Requested => f.write_str("as requested"),
             Basis::Sources => f.write_str("that of the sources"),
             Basis::FinestOfSources => f.write_str("the finest scale of the sources, per axis"),
-            Basis::FinestOfSome => {
-                f.write_str("the finest scale of the sources that have a lattice, per axis; the others are rounded to it")
-            }
+            Basis::FinestOfSome => f.write_str(
+                "the finest scale of the sources that have a lattice, per axis; the others are rounded to it",
+            ),
             Basis::PartOfFinest => f.write_str(
                 "a power of ten below the finest scale of the sources that have a lattice, for the other sources",
             ),

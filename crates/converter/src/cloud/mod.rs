@@ -25,7 +25,7 @@ pub(crate) use cube::{ANCHOR_BITS, Cube, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
 pub(crate) use frames::{JobBounds, JobColumns, JobPoint, StoredOrigin, StoredPoint, TreePoint};
 pub(crate) use grouping::{CellHash, Grouping};
-pub(crate) use intake::{Intake, SourceIntake};
+pub(crate) use intake::Intake;
 pub(crate) use lattice::{Basis, JobLattice, LatticeReason, Steps};
 pub(crate) use ledger::Ledger;
 pub(crate) use moments::Moments;
@@ -33,7 +33,7 @@ pub(crate) use morton_sort::MortonSorter;
 pub(crate) use record::{RecordFrame, copy_record, position};
 pub(crate) use regroup::Regrouper;
 pub(crate) use segments::{Segment, Segments};
-pub(crate) use stats::{Change, Range, Stats};
+pub(crate) use stats::{Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 
 use pointmill_format::Resolution;
@@ -108,12 +108,13 @@ impl<'a> Cloud<'a> {
 
     /// Least step of the coordinates of the sources, world units; that of the lattice where a source states none.
     pub(crate) fn source_step(&self) -> [f64; 3] {
-        let step = |source: &crate::sources::Source, a: usize| {
-            match (source.scan.info().lattice, source.scan.info().resolution) {
-                (Some(lattice), _) => lattice.scale[a],
-                (None, Resolution::Step(step)) => step,
-                (None, _) => self.lattice.lattice.scale[a],
-            }
+        let step = |source: &crate::sources::Source, a: usize| match (
+            source.scan.info().lattice,
+            source.scan.info().resolution,
+        ) {
+            (Some(lattice), _) => lattice.scale[a],
+            (None, Resolution::Step(step)) => step,
+            (None, _) => self.lattice.lattice.scale[a],
         };
         std::array::from_fn(|a| self.sources.all.iter().map(|s| step(s, a)).fold(f64::INFINITY, f64::min))
     }

@@ -222,13 +222,7 @@ enum Rows<'a> {
 }
 
 /// Puts the positions of some rows on the job lattice and returns their bounds there.
-fn quantize(
-    map: &SourceMap,
-    batch: &PointBatch,
-    rows: &Rows<'_>,
-    q: &mut JobColumns,
-    stats: &mut Stats,
-) -> JobBounds {
+fn quantize(map: &SourceMap, batch: &PointBatch, rows: &Rows<'_>, q: &mut JobColumns, stats: &mut Stats) -> JobBounds {
     let mut bounds = JobBounds::EMPTY;
     for a in 0..3 {
         let q = &mut q.0[a];

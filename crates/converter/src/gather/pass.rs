@@ -8,9 +8,7 @@ use super::axis::SourceMap;
 use super::batch::Worker;
 use super::context::{CellPart, CellParts, Context, Demand};
 use super::partition::Partition;
-use crate::cloud::{
-    Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton,
-};
+use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton};
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
 use crate::runtime::Runtime;
@@ -91,9 +89,7 @@ impl<'a> Pass<'a> {
     }
 
     fn read(&self) -> Result<(Stats, CellParts), ConvertError> {
-        let pieces = |(s, source): (usize, &Source)| {
-            (0..source.scan.pieces().len()).map(move |p| (s, p))
-        };
+        let pieces = |(s, source): (usize, &Source)| (0..source.scan.pieces().len()).map(move |p| (s, p));
         let pieces: Vec<(usize, usize)> = self.context.sources.all.iter().enumerate().flat_map(pieces).collect();
         let parts = self.rt.in_parallel(
             pieces.len(),

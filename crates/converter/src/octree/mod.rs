@@ -16,13 +16,13 @@ mod raise;
 mod sample;
 mod sink;
 
+pub(crate) use commit::Octree;
 #[cfg(feature = "bench")]
 pub(crate) use order::{OrderScratch, Point, order};
+pub(crate) use sample::SPACING_BITS;
 #[cfg(feature = "bench")]
 pub(crate) use sample::Sampler;
-pub(crate) use sample::SPACING_BITS;
 pub use sample::Sampling;
-pub(crate) use commit::Octree;
 pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
 
 use crate::cloud::Cloud;

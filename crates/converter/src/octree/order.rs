@@ -19,13 +19,7 @@ pub(crate) struct OrderScratch {
 
 /// Sorts the records of a chunk below a node of `level` into `out`: Morton order, and records that share a place by
 /// their bytes, so that the order depends on the points alone.
-pub(crate) fn order(
-    records: &[u8],
-    frame: &RecordFrame,
-    level: u8,
-    scratch: &mut OrderScratch,
-    out: &mut Vec<Point>,
-) {
+pub(crate) fn order(records: &[u8], frame: &RecordFrame, level: u8, scratch: &mut OrderScratch, out: &mut Vec<Point>) {
     let stride = frame.stride;
     let OrderScratch { trees, sorter } = scratch;
     trees.clear();

@@ -56,10 +56,8 @@ pub(super) fn finish_node<'r>(
     out: &mut Vec<u8>,
 ) -> Result<FinishedNode, ConvertError> {
     let (count, start) = (records.len(), out.len());
-    let points = u32::try_from(count).map_err(|_| crate::error::Unsupported::CrowdedNode {
-        points: count as u64,
-        max: u64::from(u32::MAX),
-    })?;
+    let points = u32::try_from(count)
+        .map_err(|_| crate::error::Unsupported::CrowdedNode { points: count as u64, max: u64::from(u32::MAX) })?;
     encoder.encode(key, records, written, out)?;
     Ok(FinishedNode { key, points, byte_offset: start as u64, byte_size: (out.len() - start) as u64 })
 }

@@ -2,7 +2,7 @@
 
 use crate::cloud::Range;
 use crate::plan::AttributeChoice;
-use crate::report::{DroppedAttribute, DropReason};
+use crate::report::{DropReason, DroppedAttribute};
 use crate::sources::Schema;
 
 /// Attributes that go into a dataset, and those that do not.

@@ -9,6 +9,6 @@ pub(crate) mod potree2;
 mod staging;
 
 pub(crate) use attributes::choose as choose_attributes;
-pub(crate) use output::{DiskSize, check, wants};
 pub use output::Target;
+pub(crate) use output::{DiskSize, check, wants};
 pub(crate) use staging::StagedFolder;

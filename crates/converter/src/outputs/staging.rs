@@ -242,7 +242,10 @@ mod tests {
         assert!(matches!(stage(&out, false), Err(ConvertError::Output(OutputFault::Exists(_)))));
         assert!(matches!(stage(&out, true), Err(ConvertError::Output(OutputFault::NotADataset(_)))));
         fs::write(out.join("metadata.json"), "{}").unwrap();
-        assert!(matches!(stage(&out, true), Err(ConvertError::Output(OutputFault::NotADataset(_)))), "metadata of something else");
+        assert!(
+            matches!(stage(&out, true), Err(ConvertError::Output(OutputFault::NotADataset(_)))),
+            "metadata of something else"
+        );
         fs::write(out.join("metadata.json"), "{\"hierarchy\": {}}").unwrap();
         let refused = stage(&out, true).err().map(|e| e.to_string()).unwrap_or_default();
         assert!(refused.contains("letter.txt"), "{refused}");

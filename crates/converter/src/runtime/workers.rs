@@ -82,7 +82,17 @@ mod tests {
 
     #[test]
     fn every_unit_is_done_once() {
-        let sums = runtime(3).in_parallel(1000, || 0, |sum, unit| { *sum += unit; Ok(()) }, |sum| sum).unwrap();
+        let sums = runtime(3)
+            .in_parallel(
+                1000,
+                || 0,
+                |sum, unit| {
+                    *sum += unit;
+                    Ok(())
+                },
+                |sum| sum,
+            )
+            .unwrap();
         assert_eq!(sums.iter().sum::<usize>(), 499_500);
     }
 

@@ -125,10 +125,9 @@ fn from_wkt(text: &str, geotiff_epsg: Option<u32>) -> ResolvedCrs {
             ResolvedCrs { projection, note, ..ResolvedCrs::default() }
         }
         (None, None, Some(code)) => from_code(code),
-        (None, None, None) => ResolvedCrs {
-            note: Some(CrsNote::NoCode { name: printable(&system.name) }),
-            ..ResolvedCrs::default()
-        },
+        (None, None, None) => {
+            ResolvedCrs { note: Some(CrsNote::NoCode { name: printable(&system.name) }), ..ResolvedCrs::default() }
+        }
     };
     let disagree = |a: u32| geotiff_epsg.filter(|&b| horizontal(a) != horizontal(b));
     if let Some((a, b)) = system.epsg.and_then(|a| Some((a, disagree(a)?))) {

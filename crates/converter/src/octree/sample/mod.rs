@@ -9,8 +9,8 @@ mod spacing;
 
 use pointmill_format::NodeKey;
 
-pub use spacing::Sampling;
 pub(crate) use spacing::SPACING_BITS;
+pub use spacing::Sampling;
 
 use crate::cloud::TreePoint;
 use spacing::cell_shift;

@@ -141,12 +141,7 @@ fn planes_at_most(frame: &Frame, planes: Option<u8>) -> Precision {
     // no batch is larger than the cloud
     let far = frame.grid.relative(frame.tight.max);
     let near = frame.grid.relative(frame.tight.min);
-    let cloud = BatchRecord {
-        min: near.map(f32_below),
-        first_point: 0,
-        max: far.map(f32_above),
-        points: 1,
-    };
+    let cloud = BatchRecord { min: near.map(f32_below), first_point: 0, max: far.map(f32_above), points: 1 };
     Precision::for_steps([&cloud], frame.lattice.scale)
 }
 

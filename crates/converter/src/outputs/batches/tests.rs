@@ -10,9 +10,11 @@ use pointmill_format::batches::{
 };
 use pointmill_format::{Attribute, AttributeType, Lattice};
 
-use crate::events::Silent;
-use crate::plan::{AttributeChoice, BatchesSettings, Plan, Target};
+use super::BatchesSettings;
+use crate::plan::{AttributeChoice, Plan, Setting};
 use crate::report::Report;
+use crate::runtime::Silent;
+use crate::warning::Warning;
 use crate::{ConvertError, convert};
 
 /// A scan in memory.
@@ -131,19 +133,18 @@ impl Bench {
         Self { dir, inputs }
     }
 
-    fn plan(&self, settings: BatchesSettings) -> Plan {
+    fn plan(&self) -> Plan {
         let mut plan = Plan::new(self.inputs.clone(), self.dir.path().join("out"));
         plan.name = "cloud".into();
-        plan.targets = vec![Target::Batches(settings)];
         plan.memory_bytes = 1 << 30;
         plan.threads = 2;
         plan.overwrite = true;
         plan
     }
 
-    fn convert(&self, plan: &Plan) -> Result<(Vec<u8>, Report), ConvertError> {
-        let report = convert(plan, &Silent)?;
-        Ok((fs::read(plan.output.join(super::FILE)).unwrap(), report))
+    fn convert(&self, plan: &Plan, settings: BatchesSettings) -> Result<(Vec<u8>, Report), ConvertError> {
+        let report = convert(plan, &[settings.into()], &Silent)?;
+        Ok((fs::read(plan.output.join("points.qbatch")).unwrap(), report))
     }
 }
 
@@ -162,19 +163,19 @@ fn check(what: &str, scan: &Scan, settings: BatchesSettings) {
     let points = scan.positions.len() as u64;
     for (threads, task_points, extras) in [(1, points, false), (2, points / 3, true), (3, 1_000, true), (4, 130, true)]
     {
-        let mut plan = bench.plan(settings);
+        let mut plan = bench.plan();
         plan.threads = threads;
         plan.task_points = Some(task_points);
         if extras {
             plan.attributes = AttributeChoice::List(vec!["intensity".into(), "rgb".into(), "classification".into()]);
         }
-        let (ours, report) = bench.convert(&plan).unwrap();
+        let (ours, report) = bench.convert(&plan, settings).unwrap();
         let (expected, written) = scan.reference(&ours, extras);
         assert_same(&ours, &expected, &format!("{what}, {threads} threads, tasks of {task_points} points"));
         let details = &report.outputs[0].details;
         assert_eq!(details["lod_points"], serde_json::json!(written.lod_points), "{what}");
         assert_eq!((report.outputs[0].points, report.outputs[0].bytes), (points, written.bytes));
-        assert_eq!(report.checksum_in, report.checksum_out);
+        assert_eq!(report.checksum_in, report.outputs[0].checksum);
     }
 }
 
@@ -233,7 +234,7 @@ fn planes_are_left_out_when_asked_or_not_needed() {
         let settings = BatchesSettings { planes, ..cell(1.0) };
         check(&format!("{planes:?}"), &scan, settings);
         let bench = Bench::new(&[&scan]);
-        let (bytes, report) = bench.convert(&bench.plan(settings)).unwrap();
+        let (bytes, report) = bench.convert(&bench.plan(), settings).unwrap();
         let bits = Header::parse(&bytes, Path::new("")).unwrap().precision().bits();
         assert_eq!(bits, planes.map_or(10, |p| 10 * u32::from(p)), "9 m in steps of 1 cm");
         assert_eq!(report.outputs[0].details["planes"], bits);
@@ -248,13 +249,13 @@ fn planes_are_left_out_when_asked_or_not_needed() {
 fn neither_memory_nor_the_order_of_inputs_shows() {
     let scan = Scan::surface(240_000, 12_000, 0.01);
     let bench = Bench::new(&[&scan]);
-    let mut plan = bench.plan(cell(1.0));
+    let mut plan = bench.plan();
     plan.threads = 1;
-    let (expected, _) = bench.convert(&plan).unwrap();
+    let (expected, _) = bench.convert(&plan, cell(1.0)).unwrap();
     plan.memory_bytes = 1 << 20;
-    let Err(ConvertError::Memory { needed, .. }) = bench.convert(&plan) else { panic!("1 MiB cannot do") };
+    let Err(ConvertError::Memory { needed, .. }) = bench.convert(&plan, cell(1.0)) else { panic!("1 MiB cannot do") };
     plan.memory_bytes = needed;
-    let (spilled, report) = bench.convert(&plan).unwrap();
+    let (spilled, report) = bench.convert(&plan, cell(1.0)).unwrap();
     assert!(report.temp_bytes > 0);
     assert_same(&spilled, &expected, "spilled");
 
@@ -264,9 +265,9 @@ fn neither_memory_nor_the_order_of_inputs_shows() {
         part.values = scan.values.iter().skip(k).step_by(3).rev().copied().collect();
     }
     let bench = Bench::new(&[&parts[2], &parts[0], &parts[1]]);
-    let mut plan = bench.plan(cell(1.0));
+    let mut plan = bench.plan();
     plan.task_points = Some(9_999);
-    let (joined, _) = bench.convert(&plan).unwrap();
+    let (joined, _) = bench.convert(&plan, cell(1.0)).unwrap();
     assert_same(&joined, &expected, "three files");
 }
 
@@ -279,37 +280,37 @@ fn colours_of_eight_bits_keep_their_values_also_beside_others() {
     wide.values.iter_mut().for_each(|v| *v = v.map(|c| c * 257));
     let ours = |scan| {
         let bench = Bench::new(&[scan]);
-        bench.convert(&bench.plan(cell(1.0))).unwrap()
+        bench.convert(&bench.plan(), cell(1.0)).unwrap()
     };
     let (narrow, report) = ours(&eight);
-    assert!(!report.warnings.iter().any(|w| w.contains("16 bits")), "{:?}", report.warnings);
+    assert!(!report.warnings.contains(&Warning::ColoursNarrowed), "{:?}", report.warnings);
     let (widened, report) = ours(&wide);
-    assert!(report.warnings.iter().any(|w| w.contains("16 bits")), "{:?}", report.warnings);
+    assert!(report.warnings.contains(&Warning::ColoursNarrowed), "{:?}", report.warnings);
     assert_same(&narrow, &widened, "the same colours");
 }
 
 #[test]
-fn without_colour_grey_shows_the_intensity_and_its_range_is_told() {
+fn without_colour_grey_shows_the_intensity_and_its_range_is_reported() {
     let bench = Bench::new(&[]);
     let points: Vec<String> = (0..300).map(|i| format!("{} {} 0 {}", i % 20, i / 20, 1000 + i)).collect();
     let (path, head) = (bench.dir.path().join("a.xyz"), "x y z intensity");
     fs::write(&path, format!("{head}\n{}\n", points.join("\n"))).unwrap();
-    let mut plan = bench.plan(cell(100.0));
+    let mut plan = bench.plan();
     plan.inputs = vec![path.clone()];
-    let (ours, report) = bench.convert(&plan).unwrap();
+    let (ours, report) = bench.convert(&plan, cell(100.0)).unwrap();
     let ours = Batches::open_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
     let description = ours.description();
     assert_eq!(description.colour, ColourSource::Intensity);
     assert_eq!(description.extra["intensityRange"], serde_json::json!([1000, 1299]));
-    assert!(report.warnings.iter().any(|w| w.contains("grey shows the intensity, 1000 to 1299")));
-    assert_eq!(report.attributes, ["position"]);
+    assert!(report.warnings.contains(&Warning::GreyIntensity { least: 1000.0, greatest: 1299.0 }));
+    assert_eq!(report.outputs[0].attributes, ["position"]);
     let words = ours.colour().unwrap();
     let of_lod_3: Vec<u32> = words.iter().filter(|w| **w >> 24 == 3).map(|w| w & 0xff).collect();
     assert!(words.iter().all(|w| w & 0xff == w >> 8 & 0xff));
     assert!(of_lod_3.len() > 250 && of_lod_3.iter().max() >= Some(&254), "{of_lod_3:?}");
 
     fs::write(&path, "0 0 0\n1 1 1\n").unwrap();
-    let (ours, _) = bench.convert(&plan).unwrap();
+    let (ours, _) = bench.convert(&plan, cell(100.0)).unwrap();
     let ours = Batches::open_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
     assert!(ours.colour().unwrap().iter().all(|w| w & 0xff_ffff == 0xff_ffff));
 }
@@ -318,8 +319,8 @@ fn without_colour_grey_shows_the_intensity_and_its_range_is_told() {
 fn originals_can_be_left_out() {
     let scan = Scan::surface(30_000, 2_000, 0.01);
     let bench = Bench::new(&[&scan]);
-    let (with, _) = bench.convert(&bench.plan(cell(1.0))).unwrap();
-    let (without, report) = bench.convert(&bench.plan(BatchesSettings { originals: false, ..cell(1.0) })).unwrap();
+    let (with, _) = bench.convert(&bench.plan(), cell(1.0)).unwrap();
+    let (without, report) = bench.convert(&bench.plan(), BatchesSettings { originals: false, ..cell(1.0) }).unwrap();
     let [a, b] = [&with, &without].map(|f| Header::parse(f, Path::new("")).unwrap());
     assert_eq!((b.sections.originals, b.flags.0), (None, a.flags.0 & !8));
     let points = a.sections.originals.unwrap() as usize;
@@ -336,16 +337,16 @@ fn compressed_sections_are_those_of_the_plain_compressor() {
     let bench = Bench::new(&[&scan]);
     for originals in [true, false] {
         let settings = BatchesSettings { originals, ..cell(1.0) };
-        let mut plan = bench.plan(settings);
+        let mut plan = bench.plan();
         plan.attributes = AttributeChoice::All;
-        let (plain, _) = bench.convert(&plan).unwrap();
+        let (plain, _) = bench.convert(&plan, settings).unwrap();
         let plain = Batches::open_bytes(AlignedBytes::from(plain.as_slice()), Path::new("")).unwrap();
         let mut expected = Cursor::new(Vec::new());
         compress(&plain, &mut expected, 3, 16).unwrap();
         for threads in [1, 3] {
             plan.threads = threads;
-            plan.targets = vec![Target::Batches(BatchesSettings { zstd_level: Some(3), ..settings })];
-            let (ours, report) = bench.convert(&plan).unwrap();
+            let zstd = BatchesSettings { zstd_level: Some(3), ..settings };
+            let (ours, report) = bench.convert(&plan, zstd).unwrap();
             assert_same(&ours, expected.get_ref(), "compressed");
             assert_eq!(report.output_bytes, ours.len() as u64);
         }
@@ -355,6 +356,6 @@ fn compressed_sections_are_those_of_the_plain_compressor() {
 #[test]
 fn cells_that_are_too_small_are_refused_with_advice() {
     let bench = Bench::new(&[&Scan::surface(10, 100_000, 1.0)]);
-    let Err(error) = bench.convert(&bench.plan(cell(1e-6))) else { panic!("2^37 cells") };
-    assert!(matches!(error, ConvertError::Usage(_)) && error.to_string().starts_with("--lod-cell"), "{error}");
+    let Err(error) = bench.convert(&bench.plan(), cell(1e-6)) else { panic!("2^37 cells") };
+    assert!(matches!(&error, ConvertError::Plan(e) if e.setting == Setting::LodCell), "{error}");
 }

@@ -48,8 +48,7 @@ impl Columns {
             Extra::Own(i) => schema.attributes[*i].clone(),
             Extra::Rgba(_) => Attribute::new(RGBA, AttributeType::UInt8, 4),
         });
-        let record = RecordLayout::new(attributes)
-            .map_err(|what| Unsupported::LeafColumns(what.to_string()))?;
+        let record = RecordLayout::new(attributes).map_err(|what| Unsupported::LeafColumns(what.to_string()))?;
         let moves = extras.iter().zip(record.extras()).map(|(extra, placed)| {
             let to = placed.offset - pointmill_format::bintree::CORE_BYTES;
             match extra {

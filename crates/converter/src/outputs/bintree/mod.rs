@@ -183,7 +183,8 @@ fn write_index(
     };
     let file = staged.create(INDEX_FILE)?;
     let fail = |e| file.failed("writing the index", e);
-    let mut index = IndexWriter::new(BufWriter::with_capacity(1 << 20, Sequential::new(&file)), &header).map_err(fail)?;
+    let mut index =
+        IndexWriter::new(BufWriter::with_capacity(1 << 20, Sequential::new(&file)), &header).map_err(fail)?;
     for node in nodes {
         index.node(node).map_err(fail)?;
     }
