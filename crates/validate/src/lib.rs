@@ -24,98 +24,21 @@ mod batches;
 mod bintree;
 mod check;
 mod finding;
+mod options;
+mod outcome;
 mod place;
 mod potree2;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use pointmill_format::{OpenOptions, ReadError};
-use serde::Serialize;
+use pointmill_format::ReadError;
 
-pub use against::AgainstSummary;
-pub use bintree::LeafQuality;
 pub use check::Check;
 pub use finding::{CheckResult, Finding, Severity};
+pub use options::{Options, Progress, ProgressFn};
+pub use outcome::{AgainstSummary, LeafQuality, LevelQuality, Outcome};
 pub use place::{BinaryNode, Place};
 pub use pointmill_format::{DatasetKind, Located, locate};
-pub use potree2::LevelQuality;
-
-/// What to check, and with what means.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// The scans that the dataset was made from, files only; empty: no comparison.
-    pub against: Vec<PathBuf>,
-    /// What text and E57 files do not say of themselves; as they were opened for the conversion.
-    pub open: OpenOptions,
-    /// Worker threads; 0: one for each core.
-    pub threads: usize,
-    /// What caches and the search for differing records may use, bytes. A guide, not a ceiling for the process.
-    pub memory_bytes: u64,
-    /// Problems listed for each check; all are counted.
-    pub max_problems: usize,
-    /// Check spacing and coverage and measure quality: the dearest part of a validation.
-    pub neighbourhoods: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            against: Vec::new(),
-            open: OpenOptions::default(),
-            threads: 0,
-            memory_bytes: 512 << 20,
-            max_problems: 20,
-            neighbourhoods: true,
-        }
-    }
-}
-
-/// How far a validation is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
-    /// `points` (of the dataset), `sources` (decoding the scans), `differences` (looking for what differs).
-    pub phase: &'static str,
-    /// Points done in this phase. Calls from several threads may overtake each other.
-    pub done: u64,
-    /// Points of the phase, as far as is known.
-    pub total: u64,
-}
-
-/// Receives progress, from worker threads.
-pub type ProgressFn<'a> = dyn Fn(Progress) + Sync + 'a;
-
-/// What a validation found. Serialises to the object of `validate --json`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
-    /// No check found an error.
-    pub ok: bool,
-    /// Which format was found.
-    pub format: DatasetKind,
-    /// Encoding of the payloads or layout of the files, if the metadata could be read.
-    pub encoding: Option<&'static str>,
-    /// Points by the metadata.
-    pub points: u64,
-    /// Nodes that were reached from the root; batches.
-    pub nodes: u64,
-    /// One entry for each of [`Check::of`], in that order.
-    pub checks: Vec<CheckResult>,
-    /// Findings, by check, at most [`Options::max_problems`] each; errors before warnings, coarse or early places
-    /// before others.
-    pub problems: Vec<Finding>,
-    /// One entry a level of an octree; empty for other formats.
-    pub quality: Vec<LevelQuality>,
-    /// Of a binary tree whose index could be read.
-    pub leaves: Option<LeafQuality>,
-    /// The comparison with the sources, if there was one.
-    pub against: Option<AgainstSummary>,
-}
-
-impl Outcome {
-    /// The account of a check; `None` if the format does not have it.
-    pub fn check(&self, check: Check) -> Option<&CheckResult> {
-        self.checks.iter().find(|c| c.name == check)
-    }
-}
 
 /// Checks the dataset at `dataset`, whose format [`locate`] finds. Broken promises are findings, not errors.
 ///

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use super::block::{BUCKETS, Block, bucket, value};
-use super::{Against, Colour, Context, Sum};
+use super::sides::{Against, Colour, Context, Sum};
 use crate::check::Check;
 use crate::finding::Finding;
 use crate::place::Place;

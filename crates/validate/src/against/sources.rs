@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::block::{BLOCK_POINTS, Block, append_words};
 use super::rules::Conversion::{AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
-use crate::{Progress, ProgressFn};
+use crate::options::{Progress, ProgressFn};
 
 /// A scan, and where its columns go.
 pub(crate) struct Source {

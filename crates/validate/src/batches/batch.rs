@@ -9,7 +9,7 @@ use super::formulas::{BATCH, decode, distance_squared, morton, power};
 use super::header::Header;
 use super::originals::Entry;
 use super::positions::{Axis, Recovered};
-use super::walk::Task;
+use super::task::Task;
 
 /// The bytes of one batch.
 #[derive(Debug)]

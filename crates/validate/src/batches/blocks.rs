@@ -7,9 +7,9 @@ use pointmill_format::ReadError;
 use rayon::prelude::*;
 
 use super::bytes::{Bytes, u32_at, u64_at};
+use super::extents::{beyond, raw_bytes, slot_range};
 use super::formulas::BATCH;
 use super::header::Header;
-use super::sections::{beyond, raw_bytes, slot_range};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 

@@ -7,7 +7,7 @@ use super::figures::Errors;
 use super::formulas::{BATCH, power};
 use super::order::Key;
 use super::positions::Axis;
-use super::walk::Task;
+use super::task::Task;
 use crate::against::rules::grey;
 use crate::check::Check;
 use crate::finding::Finding;

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::batch::Grid;
 use super::header::Header;
-use crate::ProgressFn;
 use crate::against::Against;
+use crate::options::ProgressFn;
 
 /// A position and its Morton code.
 type Row = (u128, [i64; 3]);

@@ -21,6 +21,7 @@ mod boxes;
 mod bytes;
 mod description;
 mod examine;
+mod extents;
 mod figures;
 mod formulas;
 mod header;
@@ -32,17 +33,19 @@ mod positions;
 mod ranges;
 mod records;
 mod sections;
+mod task;
 mod walk;
 
 use std::path::Path;
 
-use pointmill_format::ReadError;
+use pointmill_format::{DatasetKind, ReadError};
 use serde_json::json;
 
-use crate::against::{Against, AgainstSummary, Context};
+use crate::against::{Against, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::{DatasetKind, Options, Outcome, ProgressFn};
+use crate::options::{Options, ProgressFn};
+use crate::outcome::{AgainstSummary, Outcome};
 use batch_records::Box32;
 use bytes::Bytes;
 use description::{Colour, Description};
@@ -50,7 +53,8 @@ use header::Header;
 use known::Unknown;
 use positions::Axis;
 use records::Records;
-use walk::{Task, Walked, walk};
+use task::Task;
+use walk::{Walked, walk};
 
 /// Checks the file `path`.
 ///

@@ -8,7 +8,7 @@ use super::blocks::{Cache, Reported};
 use super::description::{Colour, Description};
 use super::examine::{axes, points_of};
 use super::header::Header;
-use super::walk::{Task, slot_of, window_batches};
+use super::task::{Task, slot_of, window_batches};
 use crate::against::block::{BLOCK_POINTS, Block};
 use crate::against::rules::Conversion;
 use crate::against::{self, Rules, Sink};

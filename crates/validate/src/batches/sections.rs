@@ -7,7 +7,7 @@ use pointmill_format::ReadError;
 use super::blocks::{self, Column};
 use super::bytes::{Bytes, u64_at};
 use super::description::Description;
-use super::formulas::BATCH;
+use super::extents::beyond;
 use super::header::{HEADER_BYTES, Header};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
@@ -102,13 +102,6 @@ fn originals(bytes: &Bytes, at: u64, points: u64, findings: &Findings) -> Result
     Ok(Some(count))
 }
 
-/// A section that the file is too short for.
-pub(crate) fn beyond(findings: &Findings, name: &str, offset: u64, bytes: u64, file: u64) {
-    let expected = format!("inside the {file} bytes of the file");
-    let found = format!("bytes {offset} to {}", offset.saturating_add(bytes));
-    findings.push(Finding::new(Check::Sections, name.to_owned(), expected, found));
-}
-
 /// Order, alignment, gaps and the end. False if something lies beyond the end.
 fn layout(bytes: &Bytes, places: &[Place], findings: &Findings) -> Result<bool, ReadError> {
     findings.checked(Check::Sections, places.len() as u64);
@@ -154,14 +147,4 @@ fn first_byte_not_zero(bytes: &Bytes, from: u64, to: u64) -> Result<Option<u64>,
         at += len;
     }
     Ok(None)
-}
-
-/// Raw bytes of all points at `stride` bytes each.
-pub(crate) fn raw_bytes(header: &Header, stride: u64) -> u64 {
-    header.points.saturating_mul(stride)
-}
-
-/// First raw byte of `slot`, relative to its section, and how many there are.
-pub(crate) fn slot_range(header: &Header, slot: u64, stride: u64) -> (u64, u64) {
-    (slot * BATCH * stride, header.points_in(slot) * stride)
 }

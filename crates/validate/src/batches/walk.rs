@@ -5,43 +5,19 @@ use pointmill_format::ReadError;
 use rayon::prelude::*;
 
 use super::batch::Raw;
-use super::batch_records::Box32;
-use super::blocks::{Cache, Column, Reported};
-use super::bytes::Bytes;
-use super::description::Description;
+use super::blocks::{Cache, Reported};
 use super::examine::{Seen, examine};
 use super::figures::Errors;
-use super::formulas::{BATCH, slot};
-use super::header::Header;
+use super::formulas::BATCH;
 use super::levels::Levels;
 use super::order::Key;
-use super::originals::Originals;
 use super::ranges::Ranges;
 use super::records::fill;
-use crate::against::Sums;
+use super::task::{Task, slot_of, window_batches};
 use crate::check::Check;
-use crate::finding::{Finding, Findings};
+use crate::finding::Finding;
+use crate::options::Progress;
 use crate::place::Place;
-use crate::{Progress, ProgressFn};
-
-/// What is walked, and where findings go.
-pub(crate) struct Task<'a> {
-    pub(crate) bytes: &'a Bytes,
-    pub(crate) header: &'a Header,
-    pub(crate) description: &'a Description,
-    /// In slot order.
-    pub(crate) boxes: &'a [Option<Box32>],
-    /// Planes, colour, extra attributes.
-    pub(crate) columns: &'a [&'a Column],
-    /// If they can be used.
-    pub(crate) originals: Option<&'a Originals>,
-    /// Lattice integers of all points in Morton order, from the sources, where the planes do not tell them.
-    pub(crate) known: Option<&'a [[i64; 3]]>,
-    pub(crate) findings: &'a Findings,
-    pub(crate) sums: Option<&'a Sums>,
-    pub(crate) progress: &'a ProgressFn<'a>,
-    pub(crate) memory_bytes: u64,
-}
 
 /// What all batches together say.
 #[derive(Debug, Default)]
@@ -94,19 +70,6 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
     }
     state.add(ready);
     Ok(state.finish())
-}
-
-/// Where Morton batch `number` is.
-pub(crate) fn slot_of(header: &Header, number: u64) -> u64 {
-    if header.swapped() { slot(number, header.batches) } else { number }
-}
-
-/// Batches examined at once: two windows are in memory, and what a batch takes is known.
-pub(crate) fn window_batches(task: &Task<'_>) -> u64 {
-    let stored: u64 = task.columns.iter().map(|c| c.stride).sum();
-    // lattice integers, positions, codes, distances, colours, flags
-    let point_bytes = 2 * stored + 160;
-    (task.memory_bytes / 4 / (BATCH * point_bytes)).clamp(1, 64)
 }
 
 fn look(task: &Task<'_>, cache: &Cache, number: u64, slot: u64) -> Result<Examined, ReadError> {

@@ -18,7 +18,6 @@ mod head;
 mod leaf;
 mod lenient;
 mod precision;
-mod quality;
 mod records;
 mod routes;
 mod scan;
@@ -29,14 +28,13 @@ mod tree;
 use std::path::Path;
 
 use pointmill_format::bintree::{Bintree, PACKED_FILE};
-use pointmill_format::{ErrorKind, ReadError};
+use pointmill_format::{DatasetKind, ErrorKind, ReadError};
 
-pub use quality::LeafQuality;
-
-use crate::against::{Against, AgainstSummary, Context};
+use crate::against::{Against, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::{DatasetKind, Options, Outcome, ProgressFn};
+use crate::options::{Options, ProgressFn};
+use crate::outcome::{AgainstSummary, Outcome};
 use lenient::Lenient;
 use records::Records;
 use routes::Routes;

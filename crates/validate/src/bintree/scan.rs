@@ -9,14 +9,14 @@ use pointmill_format::{ErrorKind, ReadError};
 use rayon::prelude::*;
 
 use super::leaf::{Exactness, Leaf, Points};
-use super::quality::LeafQuality;
 use super::records::Filler;
 use super::summary::Summary;
 use super::tree::Tree;
 use crate::against::Sums;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::{Progress, ProgressFn};
+use crate::options::{Progress, ProgressFn};
+use crate::outcome::LeafQuality;
 
 /// What to pass over, and how.
 pub(super) struct Scan<'a> {

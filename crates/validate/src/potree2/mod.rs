@@ -25,15 +25,14 @@ mod walk;
 use std::path::Path;
 
 use pointmill_format::potree2::{ByteSource, Dataset, DatasetFile, Encoding, Folder};
-use pointmill_format::{ErrorKind, ReadError};
+use pointmill_format::{DatasetKind, ErrorKind, ReadError};
 use serde_json::Value;
-
-pub use quality::LevelQuality;
 
 use crate::against::{Against, Context, Rules};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::{DatasetKind, Options, Outcome, ProgressFn};
+use crate::options::{Options, ProgressFn};
+use crate::outcome::{LevelQuality, Outcome};
 use checks::spacing::Sampling;
 use expect::Geometry;
 use records::Records;

@@ -2,39 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use serde::Serialize;
-
-/// Quality of one level of the octree. Distances are told over the spacing of the level.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LevelQuality {
-    /// 0 for the root.
-    pub level: u8,
-    /// Nodes of the level.
-    pub nodes: u64,
-    /// Those with children.
-    pub inner_nodes: u64,
-    /// Points of all its nodes.
-    pub points: u64,
-    /// Spacing of the level, world units.
-    pub spacing: f64,
-    /// Smallest distance from a point of an inner node to another point of that node, over the spacing.
-    pub nearest_min: Option<f64>,
-    /// Mean of the distance from each point of an inner node to the nearest other point of that node, over the
-    /// spacing; points without one within 8 spacings are left out (`isolated`).
-    pub nearest_mean: Option<f64>,
-    /// Points of inner nodes that have no other point of their node within 8 spacings.
-    pub isolated: u64,
-    /// The largest distance from any point of deeper levels to the nearest point drawn at this level and above, over
-    /// the spacing; 4 stands for 4 and more.
-    pub largest_hole: Option<f64>,
-    /// Smallest distance between points of different inner nodes of this level, over the spacing, where it is at
-    /// most 2.
-    pub seam_min: Option<f64>,
-    /// Points of inner nodes that have a point of another inner node of this level within 2 spacings.
-    pub seam_points: u64,
-    /// Of those, how many have it closer than the spacing (less one lattice step): what shows as a dense line.
-    pub seam_close: u64,
-}
+use crate::outcome::LevelQuality;
 
 /// Fixed point, so that sums do not depend on the order in which threads add: 2⁻²⁰ spacings.
 const FIXED: f64 = (1u64 << 20) as f64;

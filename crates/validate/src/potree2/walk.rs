@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use crate::against::Sums;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
+use crate::options::{Progress, ProgressFn};
 use crate::potree2::cache::{Cache, Positions};
 use crate::potree2::checks::spacing::Sampling;
 use crate::potree2::checks::{coverage, node_points, ranges, spacing};
@@ -23,7 +24,6 @@ use crate::potree2::grid::{Grid, Origin, Site};
 use crate::potree2::quality::Tally;
 use crate::potree2::records::fill_blocks;
 use crate::potree2::tree::{Tree, TreeNode};
-use crate::{Progress, ProgressFn};
 
 /// What to walk over, and how.
 pub(crate) struct Task<'a> {

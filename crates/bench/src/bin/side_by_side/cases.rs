@@ -3,32 +3,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
-
-use crate::Args;
-
-/// A comparison that can be asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Job {
-    /// Poisson-disk sampling, with PotreeConverter's and copc_converter
-    Poisson,
-    /// Random sampling, with PotreeConverter's
-    Random,
-    /// Grid sampling
-    Grid,
-    /// Poisson-disk sampling with BROTLI payloads, with PotreeConverter's
-    Brotli,
-    /// One thread and two
-    Threads,
-    /// Under the ceiling of --memory, compared with the job poisson
-    Memory,
-    /// The sizes of --growth
-    Growth,
-    /// Binary tree and batches, each alone and beside an octree, compared with the job poisson
-    Formats,
-    /// Binary trees by mean, median and midpoint
-    Splits,
-}
+use crate::args::{Args, Job};
 
 /// Who runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

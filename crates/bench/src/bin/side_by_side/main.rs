@@ -4,76 +4,22 @@
 //! What the numbers do not show: disks (inputs come from the page cache), other scans than the generated ones, and
 //! the quality of what was written (`pointmill validate` tells that).
 
+mod args;
 mod cases;
+mod outcome;
 mod table;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use std::{fs, io};
 
-use clap::{Parser, ValueEnum};
-use pointmill_bench::process::{self, Cost};
+use clap::Parser as _;
+use pointmill_bench::process;
 use pointmill_bench::{las_file, scene::Scene};
 
-use cases::{Case, Job, Program};
-
-#[derive(Parser)]
-#[command(about = "Measures pointmill beside PotreeConverter and copc_converter on generated scans")]
-struct Args {
-    /// Points of the scene
-    #[arg(long, default_value = "20000000", value_parser = parse_count)]
-    points: u64,
-    /// What is scanned
-    #[arg(long, value_enum, default_value = "aerial")]
-    scene: SceneArg,
-    /// How the scene is stored
-    #[arg(long, value_enum, default_value = "las")]
-    format: Format,
-    /// What is compared
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "poisson,random,grid,brotli,threads")]
-    jobs: Vec<Job>,
-    /// Ceiling of the job `memory`, bytes or with KiB, MiB, GiB
-    #[arg(long, default_value = "1GiB", value_parser = parse_size)]
-    memory: u64,
-    /// Two sizes of scene that the job `growth` compares, points
-    #[arg(long, value_delimiter = ',', default_value = "5000000,100000000", value_parser = parse_count)]
-    growth: Vec<u64>,
-    /// Runs of each program; the median is told
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
-    runs: u32,
-    /// Where scenes (kept and used again) and outputs (removed) go; the default is a folder for temporary files
-    #[arg(long)]
-    dir: Option<PathBuf>,
-    /// The pointmill to measure; the default is built and found beside this program
-    #[arg(long)]
-    pointmill: Option<PathBuf>,
-    /// A line to add under the machine, such as the version of a program that does not tell it
-    #[arg(long)]
-    note: Vec<String>,
-    /// Markdown file whose section of this scene is replaced or added; the default is standard output
-    #[arg(long)]
-    out: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum SceneArg {
-    Aerial,
-    Terrestrial,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Format {
-    Las,
-    Laz,
-}
-
-/// All runs of one case, or why they stopped.
-struct Outcome {
-    case: Case,
-    costs: Vec<Cost>,
-    output_bytes: u64,
-    fault: Option<String>,
-}
+use args::{Args, Format};
+use cases::Program;
+use outcome::Outcome;
 
 fn main() -> ExitCode {
     match measure(&Args::parse()) {
@@ -118,15 +64,6 @@ fn measure(args: &Args) -> io::Result<bool> {
         None => print!("{text}"),
     }
     Ok(outcomes.iter().all(|o| o.fault.is_none()))
-}
-
-impl Args {
-    fn scene(&self) -> Scene {
-        match self.scene {
-            SceneArg::Aerial => Scene::Aerial,
-            SceneArg::Terrestrial => Scene::Terrestrial,
-        }
-    }
 }
 
 fn run_once(outcome: &mut Outcome, pointmill: &Path, dir: &Path) -> io::Result<()> {
@@ -200,18 +137,4 @@ fn size_of(path: &Path) -> io::Result<u64> {
 fn remove(path: &Path) -> io::Result<()> {
     let result = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
     result.or_else(|e| if e.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(e) })
-}
-
-fn parse_count(text: &str) -> Result<u64, String> {
-    let count = text.replace('_', "").parse::<u64>().map_err(|e| e.to_string())?;
-    if count > 0 { Ok(count) } else { Err("at least one point".into()) }
-}
-
-fn parse_size(text: &str) -> Result<u64, String> {
-    let (digits, shift) = [("KiB", 10), ("MiB", 20), ("GiB", 30)]
-        .iter()
-        .find_map(|(unit, shift)| Some((text.strip_suffix(unit)?, *shift)))
-        .unwrap_or((text, 0));
-    let bytes = digits.trim().parse::<u64>().map_err(|e| e.to_string())?;
-    bytes.checked_mul(1 << shift).ok_or_else(|| "too large".into())
 }

@@ -7,8 +7,9 @@ use std::{fs, io};
 
 use pointmill_bench::process::Cost;
 
-use crate::cases::{Job, Program};
-use crate::{Args, Format, Outcome};
+use crate::args::{Args, Format, Job};
+use crate::cases::Program;
+use crate::outcome::Outcome;
 
 /// Heading of a scene's section, without the marks.
 pub(crate) fn title(args: &Args) -> String {

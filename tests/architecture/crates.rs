@@ -14,7 +14,8 @@ const ALLOWED: [(&str, &[&str]); 5] = [
     ("pointmill-testkit", &["pointmill-format"]),
 ];
 
-fn packages() -> Vec<Value> {
+/// The packages of the workspace, as cargo describes them.
+pub(crate) fn packages() -> Vec<Value> {
     let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
     let args = ["metadata", "--format-version", "1", "--no-deps", "--offline", "--manifest-path", manifest];
     let output = Command::new(env!("CARGO")).args(args).output().unwrap();

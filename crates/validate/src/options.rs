@@ -1,0 +1,49 @@
+//! What to check and how, and how far a validation is.
+
+use std::path::PathBuf;
+
+use pointmill_format::OpenOptions;
+
+/// What to check, and with what means.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// The scans that the dataset was made from, files only; empty: no comparison.
+    pub against: Vec<PathBuf>,
+    /// What text and E57 files do not say of themselves; as they were opened for the conversion.
+    pub open: OpenOptions,
+    /// Worker threads; 0: one for each core.
+    pub threads: usize,
+    /// What caches and the search for differing records may use, bytes. A guide, not a ceiling for the process.
+    pub memory_bytes: u64,
+    /// Problems listed for each check; all are counted.
+    pub max_problems: usize,
+    /// Check spacing and coverage and measure quality: the dearest part of a validation.
+    pub neighbourhoods: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            against: Vec::new(),
+            open: OpenOptions::default(),
+            threads: 0,
+            memory_bytes: 512 << 20,
+            max_problems: 20,
+            neighbourhoods: true,
+        }
+    }
+}
+
+/// How far a validation is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// `points` (of the dataset), `sources` (decoding the scans), `differences` (looking for what differs).
+    pub phase: &'static str,
+    /// Points done in this phase. Calls from several threads may overtake each other.
+    pub done: u64,
+    /// Points of the phase, as far as is known.
+    pub total: u64,
+}
+
+/// Receives progress, from worker threads.
+pub type ProgressFn<'a> = dyn Fn(Progress) + Sync + 'a;

@@ -1,0 +1,113 @@
+//! What a validation found: findings by check, and figures of quality by format.
+
+use pointmill_format::DatasetKind;
+use serde::Serialize;
+
+use crate::check::Check;
+use crate::finding::{CheckResult, Finding};
+
+/// What a validation found. Serialises to the object of `validate --json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// No check found an error.
+    pub ok: bool,
+    /// Which format was found.
+    pub format: DatasetKind,
+    /// Encoding of the payloads or layout of the files, if the metadata could be read.
+    pub encoding: Option<&'static str>,
+    /// Points by the metadata.
+    pub points: u64,
+    /// Nodes that were reached from the root; batches.
+    pub nodes: u64,
+    /// One entry for each of [`Check::of`], in that order.
+    pub checks: Vec<CheckResult>,
+    /// Findings, by check, at most [`crate::Options::max_problems`] each; errors before warnings, coarse or early places
+    /// before others.
+    pub problems: Vec<Finding>,
+    /// One entry a level of an octree; empty for other formats.
+    pub quality: Vec<LevelQuality>,
+    /// Of a binary tree whose index could be read.
+    pub leaves: Option<LeafQuality>,
+    /// The comparison with the sources, if there was one.
+    pub against: Option<AgainstSummary>,
+}
+
+impl Outcome {
+    /// The account of a check; `None` if the format does not have it.
+    pub fn check(&self, check: Check) -> Option<&CheckResult> {
+        self.checks.iter().find(|c| c.name == check)
+    }
+}
+
+/// What the comparison with the sources found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AgainstSummary {
+    /// Files compared with.
+    pub sources: usize,
+    /// Points that the sources hold after the filters recorded in the dataset.
+    pub points_expected: u64,
+    /// Points of the dataset.
+    pub points_found: u64,
+    /// Sum of the hashes of the expected records, hexadecimal; the set's under `duplicates: drop`.
+    pub sum_expected: String,
+    /// Sum of the hashes of the dataset's records, hexadecimal.
+    pub sum_found: String,
+    /// Attributes of the sources that the dataset does not have, so they were not compared.
+    pub attributes_not_in_dataset: Vec<String>,
+}
+
+/// Quality of one level of the octree. Distances are told over the spacing of the level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LevelQuality {
+    /// 0 for the root.
+    pub level: u8,
+    /// Nodes of the level.
+    pub nodes: u64,
+    /// Those with children.
+    pub inner_nodes: u64,
+    /// Points of all its nodes.
+    pub points: u64,
+    /// Spacing of the level, world units.
+    pub spacing: f64,
+    /// Smallest distance from a point of an inner node to another point of that node, over the spacing.
+    pub nearest_min: Option<f64>,
+    /// Mean of the distance from each point of an inner node to the nearest other point of that node, over the
+    /// spacing; points without one within 8 spacings are left out (`isolated`).
+    pub nearest_mean: Option<f64>,
+    /// Points of inner nodes that have no other point of their node within 8 spacings.
+    pub isolated: u64,
+    /// The largest distance from any point of deeper levels to the nearest point drawn at this level and above, over
+    /// the spacing; 4 stands for 4 and more.
+    pub largest_hole: Option<f64>,
+    /// Smallest distance between points of different inner nodes of this level, over the spacing, where it is at
+    /// most 2.
+    pub seam_min: Option<f64>,
+    /// Points of inner nodes that have a point of another inner node of this level within 2 spacings.
+    pub seam_points: u64,
+    /// Of those, how many have it closer than the spacing (less one lattice step): what shows as a dense line.
+    pub seam_close: u64,
+}
+
+/// How large the leaves of a binary tree are, and how exact.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct LeafQuality {
+    /// Leaves of the tree.
+    pub leaves: u64,
+    /// Points of the smallest leaf.
+    pub points_min: u64,
+    /// Points of a leaf on average.
+    pub points_mean: f64,
+    /// Points of the largest leaf.
+    pub points_max: u64,
+    /// Depth of the deepest leaf; the root is at 0.
+    pub depth: usize,
+    /// Volumes of the boxes of all leaves together, cubic world units.
+    pub volume: f64,
+    /// The largest distance on an axis between a decoded position and its lattice point, world units; over the leaves
+    /// whose integers are certain.
+    pub largest_error: f64,
+    /// The largest distance that single precision allows in any of these leaves, world units.
+    pub largest_bound: f64,
+    /// Leaves that are too long for the integers of their points to be certain.
+    pub uncertain: u64,
+}
