@@ -67,8 +67,8 @@ fn filters_keep_what_was_asked_for_and_account_for_the_rest() {
     let report = dir.report("out");
     let n = |name: &str| report["points"][name].as_u64().unwrap();
     assert_eq!(n("read"), 3000);
-    assert!(n("written") > 0 && n("outside_bounds") > 0 && n("other_class") > 0 && n("thinned") > 0, "{report}");
-    assert_eq!(n("written") + n("outside_bounds") + n("other_class") + n("thinned"), 3000);
+    assert!(n("kept") > 0 && n("outside_bounds") > 0 && n("other_class") > 0 && n("thinned") > 0, "{report}");
+    assert_eq!(n("kept") + n("outside_bounds") + n("other_class") + n("thinned"), 3000);
     dir.validate("out", &["a.las"]);
 }
 

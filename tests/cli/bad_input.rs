@@ -23,7 +23,7 @@ fn a_scan_that_was_cut_short_fails_or_is_accounted_for() {
 
     dir.succeed(["convert", "a.las", "-o", "out", "--unreadable", "skip"]);
     let report = dir.report("out");
-    assert_eq!((&report["points"]["written"], &report["points"]["unreadable"]), (&600.into(), &400.into()));
+    assert_eq!((&report["outputs"][0]["points"], &report["points"]["unreadable"]), (&600.into(), &400.into()));
     dir.write("header.las", &whole[..100]);
     dir.run(["convert", "header.las", "-o", "out2"]).failed_with(3, &["header.las"]);
 }
@@ -65,7 +65,7 @@ fn a_header_count_of_two_to_the_63_is_not_believed() {
     let ended = dir.run(["convert", "a.las", "-o", "out"]);
     assert!([0, 3].contains(&ended.code()), "{}", ended.stderr());
     dir.succeed(["convert", "a.las", "-o", "out", "--overwrite", "--unreadable", "skip"]);
-    assert_eq!(dir.report("out")["points"]["written"], 7);
+    assert_eq!(dir.report("out")["outputs"][0]["points"], 7);
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn odd_shapes_are_scans_like_any_other() {
         let count = points.len();
         dir.write("a.las", &Las::new(points).bytes());
         dir.succeed(["convert", "a.las", "-o", "out", "-q"]);
-        assert_eq!(dir.report("out")["points"]["written"], count, "{name}");
+        assert_eq!(dir.report("out")["outputs"][0]["points"], count, "{name}");
         dir.validate("out", &["a.las"]);
     }
 }

@@ -65,7 +65,7 @@ fn broken_scans_of_others_are_refused_or_read_whole() {
         match read_whole.iter().find(|(n, _)| *n == name) {
             Some((_, points)) => {
                 assert_eq!(ended.code(), 0, "{}", ended.stderr());
-                assert_eq!(dir.report("out")["points"]["written"], *points, "{name}");
+                assert_eq!(dir.report("out")["outputs"][0]["points"], *points, "{name}");
                 dir.validate("out", &[path.to_str().unwrap()]);
             }
             None => {

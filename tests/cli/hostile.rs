@@ -53,7 +53,7 @@ fn dropped_duplicates_are_not_counted_in_the_histogram_of_classes() {
     dir.write("scans/a.las", &bytes);
     dir.write("scans/b.las", &bytes);
     dir.succeed(["convert", "scans", "-o", "out", "-q", "--duplicates", "drop"]);
-    assert_eq!(dir.report("out")["points"]["duplicates_dropped"], 3000);
+    assert_eq!(dir.report("out")["outputs"][0]["duplicates_dropped"], 3000);
     dir.validate("out", &[]); // it counts the classes
 }
 

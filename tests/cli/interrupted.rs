@@ -47,5 +47,5 @@ fn a_killed_run_leaves_the_old_dataset_and_does_not_hinder_the_next() {
     assert_eq!(child.wait().unwrap().signal(), Some(9), "{lines:?}");
     assert_eq!(dataset_bytes(&dir.path("out")), before);
     dir.succeed(["convert", "big.las", "-o", "out", "--overwrite", "-q"]);
-    assert_eq!(dir.report("out")["points"]["written"], 1_500_000);
+    assert_eq!(dir.report("out")["outputs"][0]["points"], 1_500_000);
 }

@@ -149,8 +149,8 @@ fn las_e57_ply_pcd_and_text_with_the_same_points_give_the_same_bytes() {
         dir.succeed(["convert", name, "-o", "out", "--overwrite", "-q"].iter().chain(&options));
         dir.validate("out", &[name]);
         let report = dir.report("out");
-        assert_eq!(report["points"]["written"], 2500, "{name}");
-        assert!(report["tree"]["nodes"].as_u64().unwrap() > 20, "{name}");
+        assert_eq!(report["outputs"][0]["points"], 2500, "{name}");
+        assert!(report["outputs"][0]["tree"]["nodes"].as_u64().unwrap() > 20, "{name}");
         let bytes = dataset_bytes(&dir.path("out"));
         match &first {
             None => first = Some(bytes),
@@ -166,6 +166,6 @@ fn las_e57_ply_pcd_and_text_with_the_same_points_give_the_same_bytes() {
     let inputs =
         ["a.las", "a.e57", "ascii.ply", "little.ply", "big.ply", "ascii.pcd", "binary.pcd", "a.xyz", "a.csv", "a.pts"];
     dir.succeed(["convert", "-o", "all", "-q"].iter().chain(&inputs));
-    assert_eq!(dir.report("all")["points"]["written"], 25_000);
+    assert_eq!(dir.report("all")["outputs"][0]["points"], 25_000);
     dir.validate("all", &inputs);
 }
