@@ -1,4 +1,4 @@
-//! `pointmill convert`: what was typed becomes a `Plan`, a run and a summary.
+//! `pointmill convert`: from the options to a `Plan`, a run and a summary.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,23 +10,20 @@ use pointmill_converter::{
 use pointmill_format::bintree::{Layout, SplitRule};
 
 use crate::args::{
-    Attributes, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg, RgbDepthArg,
-    SamplingArg, SplitArg, TargetArg,
+    Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
+    RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
-use crate::exit::{Failure, emit, tell, to_json};
+use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::inputs::Inputs;
 use crate::interrupt::stop_flag;
 
-/// Brotli's knee for node payloads: above it the time grows several times over for a few per cent.
-const BROTLI_QUALITY: u8 = 5;
-
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let targets = targets(args)?;
     let inputs = args.inputs.expand()?;
     if !args.talk.quiet {
-        inputs.notes.iter().for_each(|note| tell(note));
+        inputs.notes.iter().for_each(|note| print_line(note));
     }
     let plan = plan(args, targets, inputs)?;
     if args.dry_run {
@@ -49,12 +46,12 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         emit(&to_json(&report)?)?;
     }
     if for_people {
-        conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| tell(line));
+        conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| print_line(line));
     }
     Ok(())
 }
 
-/// The formats with their settings; an option for a format that is not asked for is a mistake.
+/// The formats with their settings; an option of a format that was not requested is a usage error.
 fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
     let mut targets = Vec::new();
     for to in &args.to {
@@ -63,7 +60,8 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
             TargetArg::Bintree => Target::Bintree(bintree_settings(&args.bintree)),
             TargetArg::Batches => Target::Batches(batches_settings(&args.batches)),
             TargetArg::Potree1 => {
-                let line = "--to potree1 is not supported yet by this version; it writes potree2, bintree and batches";
+                let line =
+                    "--to potree1 is not supported by this version; the formats are potree2, bintree and batches";
                 return Err(Failure::Unsupported(line.to_owned()));
             }
         };
@@ -80,21 +78,21 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
         ("--no-originals", TargetArg::Batches, batches.no_originals),
     ];
     if let Some((option, to, _)) = given.iter().find(|(_, to, given)| *given && !args.to.contains(to)) {
-        return Err(Failure::Usage(format!("{option} is for --to {}", format!("{to:?}").to_lowercase())));
+        return Err(Failure::Usage(format!("{option} requires --to {}", format!("{to:?}").to_lowercase())));
     }
     Ok(targets)
 }
 
 fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
-    let usual = BintreeSettings::default();
+    let default = BintreeSettings::default();
     BintreeSettings {
-        capacity: args.capacity.unwrap_or(usual.capacity),
-        split: args.split.map_or(usual.split, |s| match s {
+        capacity: args.capacity.unwrap_or(default.capacity),
+        split: args.split.map_or(default.split, |s| match s {
             SplitArg::Mean => SplitRule::Mean,
             SplitArg::Median => SplitRule::Median,
             SplitArg::Midpoint => SplitRule::Midpoint,
         }),
-        layout: args.layout.map_or(usual.layout, |l| match l {
+        layout: args.layout.map_or(default.layout, |l| match l {
             LayoutArg::Files => Layout::Files,
             LayoutArg::Packed => Layout::Packed,
         }),
@@ -102,10 +100,10 @@ fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
 }
 
 fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
-    let usual = BatchesSettings::default();
+    let default = BatchesSettings::default();
     BatchesSettings {
-        lod_cell: args.lod_cell.as_ref().map_or(usual.lod_cell, |c| c.0),
-        planes: args.planes.map_or(usual.planes, |p| p.0),
+        lod_cell: args.lod_cell.as_ref().map_or(default.lod_cell, |c| c.0),
+        planes: args.planes.map_or(default.planes, |p| p.0),
         zstd_level: args.compress,
         originals: !args.no_originals,
     }
@@ -118,15 +116,15 @@ fn plan(args: &ConvertArgs, targets: Vec<Target>, inputs: Inputs) -> Result<Plan
     plan.name = name;
     plan.targets = targets;
     plan.sampling = match (args.sampling, args.seed) {
-        (SamplingArg::Random, seed) => Sampling::Random { seed: seed.unwrap_or(0) },
-        (_, Some(_)) => return Err(Failure::Usage("--seed is for --sampling random".to_owned())),
+        (SamplingArg::Random, seed) => Sampling::Random { seed: seed.unwrap_or(SEED) },
+        (_, Some(_)) => return Err(Failure::Usage("--seed requires --sampling random".to_owned())),
         (SamplingArg::Poisson, None) => Sampling::Poisson,
         (SamplingArg::Grid, None) => Sampling::Grid,
     };
     plan.encoding = match (args.encoding, args.brotli_quality) {
         (EncodingArg::Brotli, quality) => Encoding::Brotli { quality: quality.unwrap_or(BROTLI_QUALITY) },
         (EncodingArg::Default, Some(_)) => {
-            return Err(Failure::Usage("--brotli-quality is for --encoding brotli".to_owned()));
+            return Err(Failure::Usage("--brotli-quality requires --encoding brotli".to_owned()));
         }
         (EncodingArg::Default, None) => Encoding::Default,
     };
@@ -160,7 +158,7 @@ fn plan(args: &ConvertArgs, targets: Vec<Target>, inputs: Inputs) -> Result<Plan
     }
     if let Some(dir) = &args.temp_dir {
         if !dir.is_dir() {
-            return Err(Failure::Usage(format!("{}: --temp-dir is no folder", dir.display())));
+            return Err(Failure::Usage(format!("{}: --temp-dir is not a folder", dir.display())));
         }
         plan.temp_dir = Some(dir.clone());
     }
@@ -216,4 +214,26 @@ fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+    use crate::args::{Args, Command};
+
+    #[test]
+    fn the_defaults_of_the_command_line_are_those_of_the_plan() {
+        let args = Args::parse_from(["pointmill", "convert", "a.las", "-o", "out"]);
+        let Command::Convert(args) = args.command else { panic!() };
+        let files = vec![PathBuf::from("a.las")];
+        let inputs = Inputs { files: files.clone(), notes: Vec::new() };
+        let given = plan(&args, targets(&args).unwrap(), inputs).unwrap();
+        let mut usual = Plan::new(files, "out".into());
+        usual.name = "a".to_owned();
+        usual.filter.every = 1; // 0 and 1 both keep every point
+        usual.memory_bytes = given.memory_bytes; // memory in use changes between two calls
+        assert_eq!(format!("{given:?}"), format!("{usual:?}"));
+    }
 }
