@@ -41,7 +41,7 @@ fn boxes_tell_the_leaves_that_a_look_at_every_leaf_tells() {
         assert_eq!(tree.leaves_in_box(&wanted), expected);
         let mut told = Vec::new();
         tree.points_in_box(&wanted, &mut scratch, |leaf, points, i| {
-            told.push((leaf, i, points.column::<f32>("classification").unwrap()[i]))
+            told.push((leaf, i, points.column::<f32>("classification").unwrap()[i]));
         })
         .unwrap();
         let inside = all.iter().filter(|p| wanted.contains(p.0)).map(|p| (p.2, p.3 as usize, p.1));
