@@ -1,4 +1,4 @@
-//! From faults to exit codes, and the one line that tells of them.
+//! From errors to exit codes, and the one line that reports them.
 
 use std::io::{self, Write as _};
 use std::panic::PanicHookInfo;
@@ -13,21 +13,21 @@ use crate::flags;
 /// Why the program ends without success.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// 1: a promise of our own code did not hold.
+    /// 1: an error in this program.
     Internal(String),
-    /// 2: what was typed makes no sense.
+    /// 2: options or paths that cannot be used.
     Usage(String),
-    /// 3: an input is broken, or there is none.
+    /// 3: an input is broken, or none was found.
     Input(String),
-    /// 4: an input or a request that this version does not serve.
+    /// 4: an input or a request that this version does not support.
     Unsupported(String),
     /// 5: disk full, no permission, …
     Io(String),
-    /// 6: the memory ceiling is too small.
+    /// 6: the memory limit is too small.
     Memory(String),
-    /// 7: a dataset breaks its format's promises; the findings are on standard output.
+    /// 7: validation found errors in a dataset; the findings are on standard output.
     Faults(String),
-    /// 130: Ctrl-C, or asked to end.
+    /// 130: Ctrl-C or a request to terminate.
     Interrupted(String),
 }
 
@@ -46,8 +46,8 @@ impl Failure {
         }
     }
 
-    /// Prints the one line.
-    pub(crate) fn tell(&self) {
+    /// Prints the line on standard error.
+    pub(crate) fn print(&self) {
         let (Self::Internal(line)
         | Self::Usage(line)
         | Self::Input(line)
@@ -56,7 +56,7 @@ impl Failure {
         | Self::Memory(line)
         | Self::Faults(line)
         | Self::Interrupted(line)) = self;
-        tell(line);
+        print_line(line);
     }
 
     /// The operating system refused; `doing` names the attempt ("writing the report").
@@ -65,14 +65,14 @@ impl Failure {
     }
 }
 
-/// One line for people, on standard error. Line breaks inside (a file name may hold them) become spaces.
-pub(crate) fn tell(line: &str) {
+/// Prints one line on standard error. Line breaks inside it (a file name may hold them) become spaces.
+pub(crate) fn print_line(line: &str) {
     let line = line.replace(['\n', '\r'], " ");
-    // Nobody is left to tell when standard error is closed.
+    // Nothing can be reported when standard error is closed.
     let _ = writeln!(io::stderr().lock(), "pointmill: {line}");
 }
 
-/// Writes a result to standard output. A reader that has seen enough (`| head`) is no fault.
+/// Writes a result to standard output. A closed pipe (`| head`) is not an error.
 pub(crate) fn emit(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -84,7 +84,7 @@ pub(crate) fn emit(text: &str) -> Result<(), Failure> {
 
 /// Pretty JSON and a line break.
 pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Internal(format!("internal fault: {e}")))?;
+    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Internal(format!("internal error: {e}")))?;
     Ok(text + "\n")
 }
 
@@ -118,7 +118,7 @@ impl From<ConvertError> for Failure {
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
 
 /// Keeps panics silent and remembers the last one. A decompressor that panics on corrupt bytes is caught by the reader
-/// and told as a broken input, so nothing may be printed here; `main` tells of those that nobody caught.
+/// and reported as a broken input, so nothing may be printed here; `main` reports panics that were not caught.
 pub(crate) fn remember_panics() {
     let backtrace_wanted = std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0");
     let default_hook = std::panic::take_hook();
@@ -143,7 +143,7 @@ fn describe(panic: &PanicHookInfo<'_>) -> String {
 /// The panic that just ended a run.
 pub(crate) fn last_panic() -> Failure {
     let what = LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    Failure::Internal(format!("internal fault: {what}; please report it with the command line and the input"))
+    Failure::Internal(format!("internal error: {what}; please report it with the command line and the input"))
 }
 
 #[cfg(test)]
@@ -152,7 +152,7 @@ mod tests {
     use pointmill_converter::{MemoryNeed, OutputFault};
 
     #[test]
-    fn whose_fault_it_is_decides_the_code() {
+    fn the_kind_of_error_decides_the_code() {
         let io_error = || io::Error::from(io::ErrorKind::StorageFull);
         let exists = || ConvertError::Output(OutputFault::Exists("x".into()));
         let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error() };
@@ -177,7 +177,7 @@ mod tests {
     fn a_panic_becomes_one_line_with_its_place() {
         remember_panics();
         let caught = std::panic::catch_unwind(|| panic!("seven"));
-        drop(std::panic::take_hook()); // other tests shall be heard
+        drop(std::panic::take_hook()); // so that other tests print theirs
         assert!(caught.is_err());
         let Failure::Internal(line) = last_panic() else { unreachable!() };
         assert!(line.contains("seven") && line.contains("exit.rs:"), "{line}");

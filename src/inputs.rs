@@ -1,7 +1,7 @@
-//! Which scans are meant: files, folders, globs and lists become one sorted list of files.
+//! Finds the scans: files, folders, globs and lists become one sorted list of files.
 //!
-//! What a file is, its content says first and its ending second. A file that was named must be a scan; in a folder or
-//! a glob other files are left out, and said to be: nothing is skipped in silence.
+//! The file type is detected from the content, or from the extension if the content is not recognised. A file that was
+//! named must be a scan; other files in a folder or a glob are skipped and reported.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -17,31 +17,31 @@ use crate::args::InputArgs;
 use crate::exit::Failure;
 use crate::human::quantities::plural;
 
-/// The scans to read, and what the user should know about the search for them.
+/// The scans to read, and notes about the search for them.
 #[derive(Debug, Default)]
 pub(crate) struct Inputs {
     /// Sorted by path, each file once.
     pub(crate) files: Vec<PathBuf>,
-    /// A line each.
+    /// One line each.
     pub(crate) notes: Vec<String>,
 }
 
-/// What a file is, as far as this program is concerned.
+/// Whether a file is a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A scan, or a file that is called one: its reader will say what it is.
+    /// A scan, or a file with the extension of one: its reader decides.
     Scan,
     /// Anything else.
     NoScan,
 }
 
 impl InputArgs {
-    /// What the files do not say of themselves.
+    /// Facts about scans that their files do not state.
     pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
         self.reading.options()
     }
 
-    /// Finds the scans that are meant.
+    /// Finds the scans.
     pub(crate) fn expand(&self) -> Result<Inputs, Failure> {
         let options = self.options()?;
         let mut typed = self.inputs.clone();
@@ -56,7 +56,7 @@ impl InputArgs {
 /// named together with its columns is text, whatever it looks like.
 pub(crate) fn expand(typed: &[PathBuf], options: &OpenOptions) -> Result<Inputs, Failure> {
     if typed.is_empty() {
-        return Err(Failure::Usage("no input: name scans, folders or globs, or pass --files-from LIST".to_owned()));
+        return Err(Failure::Usage("no input: pass scans, folders or globs, or --files-from LIST".to_owned()));
     }
     let mut search = Search { options: options.clone(), ..Search::default() };
     for path in typed {
@@ -80,14 +80,14 @@ impl Search {
             Ok(meta) if meta.is_dir() => self.add_folder(path),
             Ok(_) => self.add_named_file(path),
             Err(e) if e.kind() == io::ErrorKind::NotFound => self.add_glob(path),
-            Err(e) => Err(Failure::io(path, "looking at the input", &e)),
+            Err(e) => Err(Failure::io(path, "reading the input", &e)),
         }
     }
 
     /// A file that was named must be a scan.
     fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
         if kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? == Kind::NoScan {
-            // the readers say why, unless columns were named that make it one
+            // the readers report why, unless the named columns make it a text scan
             pointmill_format::open_scan(path, &self.options)?;
         }
         self.add_scan(path);
@@ -96,7 +96,8 @@ impl Search {
 
     /// A file that a folder or a glob brought along.
     fn add_met_file(&mut self, path: &Path, kind: fn(&Path) -> io::Result<Kind>) {
-        // A file that cannot be opened but is called a scan goes on: the reader says why, and --unreadable decides.
+        // A file that cannot be opened but has the extension of a scan is kept: its reader reports why, and --unreadable
+        // decides.
         match kind(path).unwrap_or_else(|_| kind_by_ending(path)) {
             Kind::Scan => self.add_scan(path),
             Kind::NoScan => self.no_scans.push(path.to_path_buf()),
@@ -124,7 +125,7 @@ impl Search {
     fn add_glob(&mut self, path: &Path) -> Result<(), Failure> {
         let pattern = path.to_str().filter(|p| p.contains(['*', '?', '[']));
         let Some(pattern) = pattern else {
-            return Err(Failure::Usage(format!("{}: there is no such file or folder", path.display())));
+            return Err(Failure::Usage(format!("{}: no such file or folder", path.display())));
         };
         let matches = glob::glob(pattern).map_err(|e| Failure::Usage(format!("{pattern}: {e}")))?;
         let mut any = false;
@@ -133,7 +134,7 @@ impl Search {
             any = true;
             if found.is_dir() { self.add_folder(&found)? } else { self.add_met_file(&found, kind) }
         }
-        if any { Ok(()) } else { Err(Failure::Usage(format!("{pattern}: nothing matches"))) }
+        if any { Ok(()) } else { Err(Failure::Usage(format!("{pattern}: no file matches"))) }
     }
 
     fn add_scan(&mut self, path: &Path) {
@@ -159,16 +160,16 @@ impl Search {
         };
         let name = |path: &PathBuf| path.display().to_string();
         let examples = |paths: &[PathBuf]| paths.iter().take(3).map(name).collect();
-        note(self.no_scans.len(), "other file", "left out, no scans", examples(&self.no_scans));
+        note(self.no_scans.len(), "other file", "skipped, not scans", examples(&self.no_scans));
         note(self.repeated.len(), "input", "named more than once, read once", examples(&self.repeated));
 
         let mut files: Vec<PathBuf> = self.found.into_values().collect();
         files.sort();
         if files.is_empty() {
             let places: Vec<String> = typed.iter().take(3).map(name).collect();
-            let left_out = if notes.is_empty() { String::new() } else { format!("; {}", notes.join("; ")) };
+            let skipped = if notes.is_empty() { String::new() } else { format!("; {}", notes.join("; ")) };
             return Err(Failure::Input(format!(
-                "{}: no scan there ({}){left_out}",
+                "{}: no scan found (supported: {}){skipped}",
                 places.join(", "),
                 supported_scans()
             )));
@@ -208,14 +209,14 @@ fn content(path: &Path) -> io::Result<Option<ScanKind>> {
     })
 }
 
-/// Endings of scans whose content may be too damaged to tell.
+/// Extensions of scans whose content may be too damaged to be recognised.
 const SCAN_ENDINGS: [&str; 8] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "xyz"];
 
-/// Endings under which lines of numbers are a scan. `txt` is not among them: name such files, or use a glob.
+/// Extensions with which lines of numbers count as a scan. `txt` is not among them: name such files, or use a glob.
 const TEXT_ENDINGS: [&str; 7] = ["xyz", "asc", "csv", "xyzi", "xyzrgb", "pts", "ptx"];
 
 fn kind_by_ending(path: &Path) -> Kind {
-    // macOS leaves `._tile.laz` beside `tile.laz` on foreign disks: notes of the Finder, no points.
+    // macOS leaves `._tile.laz` beside `tile.laz` on foreign disks: metadata of the Finder, no points.
     if path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with("._")) {
         return Kind::NoScan;
     }
@@ -227,7 +228,7 @@ fn ends_with(path: &Path, endings: &[&str]) -> bool {
     ending.is_some_and(|e| endings.contains(&e.as_str()))
 }
 
-/// The paths in `list`, one a line; `-` is standard input.
+/// The paths in `list`, one per line; `-` is standard input.
 fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut bytes = Vec::new();
     let read = if list.as_os_str() == "-" {
@@ -237,7 +238,7 @@ fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
     };
     match read {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            return Err(Failure::Usage(format!("{}: there is no such list", list.display())));
+            return Err(Failure::Usage(format!("{}: no such list", list.display())));
         }
         Err(e) => return Err(Failure::io(list, "reading the list of inputs", &e)),
         Ok(()) => {}
@@ -295,7 +296,7 @@ mod tests {
         let inputs = find(&[dir.path().to_path_buf()]).unwrap();
         assert_eq!(names(&inputs), ["b.dat", "c.ply", "a.LAZ"]);
         let [note] = inputs.notes.as_slice() else { panic!("{:?}", inputs.notes) };
-        assert!(note.starts_with("4 other files left out, no scans"), "{note}");
+        assert!(note.starts_with("4 other files skipped, not scans"), "{note}");
         assert!(["._b.laz", "counted.log", "matrix.txt"].iter().all(|name| note.contains(name)), "{note}");
     }
 

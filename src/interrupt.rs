@@ -1,7 +1,7 @@
-//! Ctrl-C, and requests to end.
+//! Ctrl-C and requests to terminate.
 //!
-//! A command that can stop by itself, and tidy up, asks for the flag. Until one does, and the second time in any case,
-//! the process ends at once.
+//! A command that can stop by itself and clean up asks for the flag. Until one does, and on a second Ctrl-C, the process
+//! ends at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -17,13 +17,13 @@ pub(crate) fn watch() {
         let first = !STOP.swap(true, Ordering::Relaxed);
         if !(first && STOPS_BY_ITSELF.load(Ordering::Relaxed)) {
             let failure = Failure::Interrupted("interrupted".to_owned());
-            failure.tell();
+            failure.print();
             std::process::exit(i32::from(failure.code()));
         }
     });
 }
 
-/// The flag that Ctrl-C raises, for a command that looks at it often.
+/// The flag that Ctrl-C sets, for a command that checks it often.
 pub(crate) fn stop_flag() -> &'static AtomicBool {
     STOPS_BY_ITSELF.store(true, Ordering::Relaxed);
     &STOP

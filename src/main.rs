@@ -1,4 +1,4 @@
-//! The command line of pointmill: what was typed becomes a `Plan`, a run, and an exit code.
+//! The command line of pointmill: from options to a `Plan`, a run, and an exit code.
 //!
 //! Results go to standard output, everything else to standard error; a failure is one line there. `README.md` has the
 //! table of exit codes, `exit.rs` is where they come from.
@@ -22,12 +22,12 @@ use exit::Failure;
 fn main() -> ExitCode {
     exit::remember_panics();
     interrupt::watch();
-    let args = Args::parse(); // a mistake ends the process here, with exit code 2
+    let args = Args::parse(); // a usage error ends the process here, with exit code 2
     let result = std::panic::catch_unwind(|| run(&args)).unwrap_or_else(|_| Err(exit::last_panic()));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.tell();
+            failure.print();
             ExitCode::from(failure.code())
         }
     }

@@ -8,7 +8,7 @@ use pointmill_format::batches::{AlignedBytes, Batches};
 use pointmill_fuzz::check_error;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let opened = Batches::open_bytes(AlignedBytes::from(bytes), Path::new("points.qbatch"));
+    let opened = Batches::from_bytes(AlignedBytes::from(bytes), Path::new("points.qbatch"));
     if let Err(error) = opened.and_then(|batches| batches.read_everything()) {
         check_error(&error);
     }

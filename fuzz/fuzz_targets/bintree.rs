@@ -2,7 +2,10 @@
 
 #![no_main]
 
-use pointmill_format::bintree::exercise;
+#[path = "../../crates/format/tests/bintree/exercise.rs"]
+mod exercise;
+
+use exercise::exercise;
 use pointmill_fuzz::check_error;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

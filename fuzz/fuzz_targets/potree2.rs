@@ -7,7 +7,9 @@
 use std::path::Path;
 
 use pointmill_format::ReadError;
-use pointmill_format::potree2::{Dataset, DatasetFile, Hierarchy, Memory, Metadata, NodePoints};
+use pointmill_format::NodePoints;
+use pointmill_format::bytes::Memory;
+use pointmill_format::potree2::{Dataset, HIERARCHY_FILE, Hierarchy, METADATA_FILE, Metadata, OCTREE_FILE};
 use pointmill_fuzz::check_error;
 
 const METADATA: [&[u8]; 2] = [
@@ -41,10 +43,10 @@ fn read(metadata: &[u8], hierarchy: &[u8], octree: &[u8]) -> Result<(), ReadErro
             METADATA[usize::from(metadata.last().is_some_and(|b| b & 1 == 1))].to_vec()
         }
     };
-    let mut dataset =
-        Dataset::from_source(Box::new(Memory { metadata, hierarchy: hierarchy.to_vec(), octree: octree.to_vec() }))?;
+    let files = [(METADATA_FILE, metadata), (HIERARCHY_FILE, hierarchy.to_vec()), (OCTREE_FILE, octree.to_vec())];
+    let mut dataset = Dataset::from_source(Memory::from(files.map(|(name, bytes)| (name.to_owned(), bytes))))?;
     dataset.set_max_node_bytes(16 << 20);
-    let _ = dataset.locate(DatasetFile::Octree);
+    let _ = dataset.locate(OCTREE_FILE);
     let _ = Hierarchy::new(&dataset);
     let nodes = dataset.read_hierarchy()?;
     let mut points = NodePoints::default();
@@ -55,7 +57,7 @@ fn read(metadata: &[u8], hierarchy: &[u8], octree: &[u8]) -> Result<(), ReadErro
                 let is_empty = node.record.byte_size == 0 && points.is_empty();
                 assert!(is_empty || points.len() as u64 == u64::from(node.record.points));
                 let last = points.len().checked_sub(1);
-                assert!(last.is_none_or(|i| points.world(dataset.metadata(), i).is_some()));
+                assert!(last.is_none_or(|i| points.world(i).is_some()));
             }
             Err(error) => check_error(&error),
         }

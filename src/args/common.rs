@@ -1,4 +1,4 @@
-//! What several commands take: inputs, how they are read, and how much is told.
+//! Options of several commands: inputs, how scans are read, and reporting.
 
 use std::path::PathBuf;
 
@@ -8,42 +8,44 @@ use pointmill_format::OpenOptions;
 use super::values::parse_separator;
 use crate::exit::Failure;
 
-/// Where points come from.
+/// The scans to convert.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct InputArgs {
     /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF): files, folders (searched recursively) or globs
     #[arg(value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// Reads more inputs from LIST, one a line; empty lines and lines that begin with # are skipped
+    /// Reads more inputs from the file LIST, one per line (- for standard input); skips empty lines and lines that
+    /// start with #
     #[arg(long, value_name = "LIST")]
     pub(crate) files_from: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
 }
 
-/// What files do not say of themselves.
+/// Facts about scans that their files do not state.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct ReadingArgs {
-    /// Columns of text scans in file order, as in x,y,z,r,g,b,i: x y z, r g b, i (intensity), c (classification), nx ny
-    /// nz; - leaves one out, any other name makes an attribute, its type after a colon [default: found out]
+    /// Columns of text scans in file order, for example x,y,z,r,g,b,i. Names: x y z, r g b, i (intensity),
+    /// c (classification), nx ny nz; - skips a column; any other name becomes an attribute, with an optional type as in
+    /// quality:uint8 [default: detected]
     #[arg(
         long,
         value_name = "LIST",
         value_delimiter = ',',
         allow_hyphen_values = true,
-        help_heading = "How scans are read"
+        help_heading = "Reading scans"
     )]
     pub(crate) columns: Option<Vec<String>>,
-    /// What stands between the fields of text scans: one character, or tab, space, comma, semicolon [default: found out]
-    #[arg(long, value_name = "CHAR", value_parser = parse_separator, help_heading = "How scans are read")]
+    /// Field separator of text scans: one character, or tab, space, comma, semicolon [default: detected]
+    #[arg(long, value_name = "CHAR", value_parser = parse_separator, help_heading = "Reading scans")]
     pub(crate) separator: Option<char>,
     /// Keeps rowIndex and columnIndex of E57 scans as attributes
-    #[arg(long, help_heading = "How scans are read")]
+    #[arg(long, help_heading = "Reading scans")]
     pub(crate) row_column: bool,
 }
 
 impl ReadingArgs {
-    /// For the readers; columns that cannot be are told before any file is opened.
+    /// The options for the readers; invalid columns are reported before any file is opened.
     pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
         if let Some(columns) = &self.columns {
             pointmill_format::scan::text::check_columns(columns)
@@ -54,17 +56,17 @@ impl ReadingArgs {
     }
 }
 
-/// How much is told while the program works.
+/// How much is reported while a command runs.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct TalkArgs {
-    /// A bar, or one JSON object a line, on standard error; `auto`: a bar on a terminal
-    #[arg(long, value_enum, default_value = "auto", help_heading = "What is told")]
+    /// Progress on standard error: a bar, or one JSON object per line; auto shows a bar on a terminal
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Reporting")]
     pub(crate) progress: ProgressArg,
-    /// Tells more: phases, levels and inputs one by one
-    #[arg(short, long, conflicts_with = "quiet", help_heading = "What is told")]
+    /// Reports every phase, level and input
+    #[arg(short, long, conflicts_with = "quiet", help_heading = "Reporting")]
     pub(crate) verbose: bool,
-    /// Tells nothing but errors
-    #[arg(short, long, help_heading = "What is told")]
+    /// Reports errors only
+    #[arg(short, long, help_heading = "Reporting")]
     pub(crate) quiet: bool,
 }
 

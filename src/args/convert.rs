@@ -1,48 +1,55 @@
-//! What `pointmill convert` takes.
+//! Options of `pointmill convert`.
 
 use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
+use pointmill_converter::{BatchesSettings, BintreeSettings};
 use pointmill_format::Aabb;
 
 use super::common::{InputArgs, TalkArgs};
 use super::values::{
-    Attributes, Planes, Scale, parse_attributes, parse_bounds, parse_bytes, parse_compress, parse_planes, parse_scale,
+    Attributes, Planes, Scale, ZSTD_LEVEL, or_auto, parse_attributes, parse_bounds, parse_bytes, parse_compress,
+    parse_planes, parse_scale,
 };
+
+/// The Brotli quality for node payloads; above it the time grows several times over for a few per cent.
+pub(crate) const BROTLI_QUALITY: u8 = pointmill_converter::Encoding::BROTLI_QUALITY;
+
+/// The seed of random sampling.
+pub(crate) const SEED: u64 = 0;
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     pub(crate) inputs: InputArgs,
-    /// Folder to make
+    /// Output folder
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 
-    /// Output format; several, each with its own --to, are made from one read of the input and go into OUT/potree2,
-    /// OUT/bintree, OUT/batches
+    /// Output format; repeat --to to write several formats in one run, to OUT/potree2, OUT/bintree and OUT/batches
     #[arg(long, value_name = "FORMAT", default_value = "potree2", help_heading = "Output")]
     pub(crate) to: Vec<TargetArg>,
-    /// Replaces OUT if it is a dataset; the old one stays until the new one is complete
+    /// Replaces OUT if it is a dataset; the old dataset is kept until the new one is complete
     #[arg(long, help_heading = "Output")]
     pub(crate) overwrite: bool,
-    /// Name of the cloud in the metadata [default: name of the first input]
+    /// Name of the point cloud in the metadata [default: name of the first input]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     pub(crate) name: Option<String>,
     /// Encoding of node payloads
     #[arg(long, value_enum, default_value = "default", help_heading = "Output")]
     pub(crate) encoding: EncodingArg,
-    /// 0 (fast) to 11 (small), with --encoding brotli [default: 4]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=11), help_heading = "Output")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=11), help_heading = "Output",
+          help = format!("Brotli quality, 0 (fast) to 11 (small), for --encoding brotli [default: {BROTLI_QUALITY}]"))]
     pub(crate) brotli_quality: Option<u8>,
-    /// How inner nodes choose their points: a maximal Poisson-disk sample, the point nearest to the centre of each
-    /// cell of a 128³ grid, or one pseudo-random point of each cell
+    /// How inner nodes select their points: poisson (maximal Poisson-disk sample), grid (the point nearest to the
+    /// centre of each cell of a 128³ grid), or random (one pseudo-random point per cell)
     #[arg(long, value_enum, default_value = "poisson", help_heading = "Output")]
     pub(crate) sampling: SamplingArg,
-    /// Seed of --sampling random; the same seed gives the same bytes [default: 0]
-    #[arg(long, value_name = "N", help_heading = "Output")]
+    #[arg(long, value_name = "N", help_heading = "Output",
+          help = format!("Seed for --sampling random; the same seed gives the same bytes [default: {SEED}]"))]
     pub(crate) seed: Option<u64>,
-    /// A node with more points than this is split
+    /// Maximum points per leaf node
     #[arg(long, value_name = "POINTS", default_value = "10000",
           value_parser = clap::value_parser!(u32).range(1..=1_000_000), help_heading = "Output")]
     pub(crate) leaf_capacity: u32,
@@ -50,60 +57,60 @@ pub(crate) struct ConvertArgs {
     pub(crate) bintree: BintreeArgs,
     #[command(flatten)]
     pub(crate) batches: BatchesArgs,
-    /// Coordinate step in units of the CRS, or `auto`: the sources' own, so that no coordinate changes; for scans
-    /// without one, what the extent and the precision of the scan allow
+    /// Coordinate step in units of the CRS; auto uses the step of the scans, so that no coordinate changes, or, for
+    /// scans without a step, one chosen from their extent and precision
     #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale, help_heading = "Output")]
     pub(crate) scale: Scale,
-    /// Overrides the coordinate reference system: a proj4 string, EPSG:n or WKT [default: from the inputs]
+    /// Coordinate reference system: a proj4 string, EPSG:n or WKT [default: from the inputs]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     pub(crate) crs: Option<String>,
 
-    /// `all`; `scene`: without those that are constant; or a list, as in intensity,rgb [default: all for potree2, the
-    /// class for bintree, the colour for batches]
-    #[arg(long, value_name = "all|scene|LIST", value_parser = parse_attributes, help_heading = "What goes in")]
+    /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
+    /// [default: all for potree2, classification for bintree, colour for batches]
+    #[arg(long, value_name = "all|scene|LIST", value_parser = parse_attributes, help_heading = "Selecting data")]
     pub(crate) attributes: Option<Attributes>,
-    /// Keeps the points inside this box, in world coordinates
+    /// Keeps only points inside this box, in world coordinates
     #[arg(long, value_name = "X,Y,Z..X,Y,Z", value_parser = parse_bounds, allow_hyphen_values = true,
-          help_heading = "What goes in")]
+          help_heading = "Selecting data")]
     pub(crate) bounds: Option<Aabb>,
-    /// Keeps these classes, as in 2,6 [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "What goes in")]
+    /// Keeps only points of these classes, for example 2,6 [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Selecting data")]
     pub(crate) class: Option<Vec<u8>>,
-    /// Keeps one of N points, by their index in the file
+    /// Keeps every Nth point, by index in the file
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..),
-          help_heading = "What goes in")]
+          help_heading = "Selecting data")]
     pub(crate) every: u64,
-    /// Points whose position and attributes all repeat
-    #[arg(long, value_enum, default_value = "keep", help_heading = "What goes in")]
+    /// What to do with points whose position and attributes all repeat those of another point
+    #[arg(long, value_enum, default_value = "keep", help_heading = "Selecting data")]
     pub(crate) duplicates: DuplicatesArg,
-    /// Points without a valid position
-    #[arg(long, value_enum, default_value = "skip", help_heading = "What goes in")]
+    /// What to do with points without a valid position
+    #[arg(long, value_enum, default_value = "skip", help_heading = "Selecting data")]
     pub(crate) invalid: FaultArg,
-    /// Inputs, or parts of them, that cannot be decoded
-    #[arg(long, value_enum, default_value = "fail", help_heading = "What goes in")]
+    /// What to do with inputs, or parts of inputs, that cannot be decoded
+    #[arg(long, value_enum, default_value = "fail", help_heading = "Selecting data")]
     pub(crate) unreadable: FaultArg,
-    /// Meaning of colour values: 0–255, 0–65535, or found out by reading them all
-    #[arg(long, value_enum, default_value = "auto", help_heading = "What goes in")]
+    /// Depth of colour values: 8 (0–255), 16 (0–65535), or auto (detected from all values of a file)
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Selecting data")]
     pub(crate) rgb_depth: RgbDepthArg,
 
-    /// Ceiling for the memory of the whole process, as in 2GiB [default: 60 % of what the machine allows]
+    /// Memory limit of the whole process, for example 2GiB [default: 60 % of the available memory]
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes, help_heading = "Resources")]
     pub(crate) memory: Option<u64>,
-    /// Worker threads [default: all cores]
+    /// Number of worker threads [default: all cores]
     #[arg(long, value_name = "N", help_heading = "Resources")]
     pub(crate) threads: Option<NonZero<u16>>,
-    /// Folder for temporary files, used when the points do not fit the ceiling [default: beside OUT]
+    /// Folder for temporary files, used when the points do not fit in memory [default: beside OUT]
     #[arg(long, value_name = "DIR", help_heading = "Resources")]
     pub(crate) temp_dir: Option<PathBuf>,
 
-    /// Writes the run report (JSON) here too; it is always in OUT/report.json
-    #[arg(long, value_name = "FILE", help_heading = "What is told")]
+    /// Writes a copy of the run report OUT/report.json to FILE
+    #[arg(long, value_name = "FILE", help_heading = "Reporting")]
     pub(crate) report: Option<PathBuf>,
-    /// Says from the headers alone what would be done: points, bounds, CRS, grid, memory, disk; writes nothing
-    #[arg(long, help_heading = "What is told")]
+    /// Reports points, bounds, CRS, grid, memory and disk use, estimated from the headers; writes nothing
+    #[arg(long, help_heading = "Reporting")]
     pub(crate) dry_run: bool,
     /// Prints the run report, or the estimate of --dry-run, as JSON on standard output
-    #[arg(long, help_heading = "What is told")]
+    #[arg(long, help_heading = "Reporting")]
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) talk: TalkArgs,
@@ -112,31 +119,36 @@ pub(crate) struct ConvertArgs {
 /// Settings of a mean-split binary tree.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BintreeArgs {
-    /// A leaf of a binary tree has at most so many points [default: 65000]
-    #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Output: bintree")]
+    #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(1..),
+          help_heading = "Output: bintree",
+          help = format!("Maximum points per leaf [default: {}]", BintreeSettings::default().capacity))]
     pub(crate) capacity: Option<u32>,
-    /// Where nodes are split; anything but the mean is for comparison [default: mean]
-    #[arg(long, value_enum, value_name = "RULE", help_heading = "Output: bintree")]
+    #[arg(long, value_enum, value_name = "RULE", help_heading = "Output: bintree",
+          help = format!("Where nodes are split; median and midpoint are for comparisons [default: {}]",
+                         BintreeSettings::default().split.name()))]
     pub(crate) split: Option<SplitArg>,
-    /// One file a leaf, or all leaves in one file [default: files]
-    #[arg(long, value_enum, value_name = "LAYOUT", help_heading = "Output: bintree")]
+    #[arg(long, value_enum, value_name = "LAYOUT", help_heading = "Output: bintree",
+          help = format!("One file per leaf, or all leaves packed in one file [default: {}]",
+                         BintreeSettings::default().layout.name()))]
     pub(crate) layout: Option<LayoutArg>,
 }
 
 /// Settings of quantised batches.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BatchesArgs {
-    /// Side of the cells of the coarsest level of detail, in units of the CRS, or `auto`: from extent and density
-    /// [default: 1]
-    #[arg(long, value_name = "STEP|auto", value_parser = parse_scale, help_heading = "Output: batches")]
+    #[arg(long, value_name = "STEP|auto", value_parser = parse_scale, help_heading = "Output: batches",
+          help = format!("Cell size of the coarsest level of detail, in units of the CRS; auto derives it from extent \
+                          and density [default: {}]", or_auto(BatchesSettings::default().lod_cell)))]
     pub(crate) lod_cell: Option<Scale>,
-    /// Bits of a coordinate: 10, 20 or 30, or `auto`: what the step of the scans needs [default: auto]
-    #[arg(long, value_name = "BITS", value_parser = parse_planes, help_heading = "Output: batches")]
+    #[arg(long, value_name = "BITS", value_parser = parse_planes, help_heading = "Output: batches",
+          help = format!("Bits per coordinate: 10, 20 or 30; auto uses as many as the step of the scans needs \
+                          [default: {}]", or_auto(BatchesSettings::default().planes.map(|p| 10 * p))))]
     pub(crate) planes: Option<Planes>,
-    /// Compresses the sections in blocks that decode on their own; they cannot be mapped then [default: none]
-    #[arg(long, value_name = "zstd[:LEVEL]", value_parser = parse_compress, help_heading = "Output: batches")]
+    #[arg(long, value_name = "zstd[:LEVEL]", value_parser = parse_compress, help_heading = "Output: batches",
+          help = format!("Compresses the sections in independent blocks; LEVEL is 1 to 19 (default {ZSTD_LEVEL}); a \
+                          compressed file cannot be memory-mapped [default: not compressed]"))]
     pub(crate) compress: Option<i32>,
-    /// Does not keep the colours that averaging replaces
+    /// Discards the original colours of points whose colour is replaced by an average
     #[arg(long, help_heading = "Output: batches")]
     pub(crate) no_originals: bool,
 }
@@ -156,16 +168,16 @@ pub(crate) enum LayoutArg {
     Packed,
 }
 
-/// The formats that pointmill knows of.
+/// The output formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TargetArg {
-    /// Octree with levels of detail, for Potree and its relatives
+    /// Octree with levels of detail, for Potree and compatible viewers
     Potree2,
     #[value(hide = true)]
     Potree1,
-    /// Mean-split binary tree with tight boxes: every point at every distance
+    /// Mean-split binary tree with tight boxes, which draws every point at every distance
     Bintree,
-    /// Morton-sorted quantised batches with CLOD levels, for compute-shader renderers
+    /// Morton-sorted quantised batches with continuous levels of detail, for compute-shader renderers
     Batches,
 }
 

@@ -1,4 +1,4 @@
-//! What can be typed. Values are parsed here and judged in the commands.
+//! The command-line options. Values are parsed here and checked against each other in the commands.
 
 mod common;
 mod convert;
@@ -11,16 +11,18 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 
 pub(crate) use common::{InputArgs, ProgressArg, ReadingArgs, TalkArgs};
 pub(crate) use convert::{
-    BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg, RgbDepthArg, SamplingArg,
-    SplitArg, TargetArg,
+    BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
+    RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use values::Attributes;
 
-/// Turns raw scans into data that renderers stream, without losing a point.
+/// Converts laser scans to datasets that renderers stream, without losing a point.
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 110, arg_required_else_help = true)]
-#[command(after_help = "Exit codes: 0 done · 1 a fault of ours · 2 usage · 3 an input is broken · 4 not supported · \
-    5 disk full or I/O · 6 memory ceiling too small · 7 validation found faults · 130 interrupted")]
+#[command(
+    after_help = "Exit codes: 0 success · 1 internal error · 2 usage error · 3 broken input · 4 not supported · \
+    5 I/O error or disk full · 6 memory limit too small · 7 validation found errors · 130 interrupted"
+)]
 pub(crate) struct Args {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -28,27 +30,27 @@ pub(crate) struct Args {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Converts scans to a dataset that a renderer can stream
+    /// Converts scans to a dataset
     Convert(Box<ConvertArgs>),
-    /// Checks whether a dataset keeps the promises of its format
+    /// Checks whether a dataset conforms to its format and matches its scans
     Validate(ValidateArgs),
-    /// Says what a scan or a dataset is; decodes nothing that need not be
+    /// Describes scans and datasets, from their headers unless --deep is given
     Info(InfoArgs),
 }
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ValidateArgs {
-    /// Folder of a dataset of any format, or a .qbatch file; its content tells which
+    /// Folder of a dataset, or a .qbatch file; the format is detected from the content
     pub(crate) dataset: PathBuf,
-    /// Proves that every point of these scans is in the dataset exactly once: files, folders or globs
+    /// Checks that the dataset holds every point of these scans exactly once: files, folders or globs
     #[arg(long, value_name = "INPUT", num_args = 1..)]
     pub(crate) against: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
-    /// Leaves out spacing, coverage and quality figures, which take most of the time
+    /// Skips spacing, coverage and quality figures, which take most of the time
     #[arg(long)]
     pub(crate) fast: bool,
-    /// Worker threads [default: all cores]
+    /// Number of worker threads [default: all cores]
     #[arg(long, value_name = "N")]
     pub(crate) threads: Option<NonZero<u16>>,
     /// Prints one JSON object on standard output
@@ -60,15 +62,15 @@ pub(crate) struct ValidateArgs {
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct InfoArgs {
-    /// Scans, folders of scans, globs, or Potree 2.0 datasets
+    /// Scans, folders of scans, globs, or datasets of any format
     #[arg(required = true, value_name = "PATH")]
     pub(crate) paths: Vec<PathBuf>,
-    /// Decodes every point: counts them and measures bounds and the range of each attribute
+    /// Decodes every point to report the true count, bounds and range of each attribute
     #[arg(long)]
     pub(crate) deep: bool,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
-    /// Prints one JSON array on standard output, an object for each scan or dataset
+    /// Prints a JSON array on standard output, one object per scan or dataset
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -76,6 +78,7 @@ pub(crate) struct InfoArgs {
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory as _;
+    use pointmill_converter::{BatchesSettings, BintreeSettings};
 
     use super::values::Scale;
     use super::*;
@@ -91,6 +94,28 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Args::command().debug_assert();
+    }
+
+    #[test]
+    fn the_help_states_the_defaults_that_the_code_uses() {
+        let mut command = Args::command();
+        let help = command.find_subcommand_mut("convert").unwrap().render_long_help().to_string();
+        let (tree, batches) = (BintreeSettings::default(), BatchesSettings::default());
+        let table = [
+            ("--brotli-quality", BROTLI_QUALITY.to_string()),
+            ("--seed", SEED.to_string()),
+            ("--capacity", tree.capacity.to_string()),
+            ("--split", tree.split.name().to_owned()),
+            ("--layout", tree.layout.name().to_owned()),
+            ("--lod-cell", batches.lod_cell.unwrap().to_string()),
+            ("--planes", "auto".to_owned()),
+        ];
+        assert_eq!(batches.planes, None);
+        for (option, default) in table {
+            let text = help.split(&format!("      {option} <")).nth(1).unwrap().split("\n      -").next().unwrap();
+            let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(words.contains(&format!("[default: {default}]")), "{option}: {words}");
+        }
     }
 
     #[test]

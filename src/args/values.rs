@@ -1,4 +1,4 @@
-//! Values of options: parsed here and judged in the commands.
+//! Values of options: parsed here and checked against each other in the commands.
 
 use pointmill_format::Aabb;
 
@@ -10,12 +10,12 @@ pub(super) fn parse_separator(text: &str) -> Result<char, String> {
         "semicolon" => Ok(';'),
         _ => {
             let mut chars = text.chars();
-            chars.next().filter(|_| chars.next().is_none()).ok_or_else(|| "one character is expected".to_owned())
+            chars.next().filter(|_| chars.next().is_none()).ok_or_else(|| "expected one character".to_owned())
         }
     }
 }
 
-/// Planes of ten bits, or as many as are needed.
+/// `--planes`, parsed, in planes of ten bits; `None` is `auto`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Planes(pub(crate) Option<u8>);
 
@@ -25,18 +25,20 @@ pub(super) fn parse_planes(text: &str) -> Result<Planes, String> {
         "10" => Ok(Planes(Some(1))),
         "20" => Ok(Planes(Some(2))),
         "30" => Ok(Planes(Some(3))),
-        _ => Err("10, 20, 30 or auto is expected".to_owned()),
+        _ => Err("expected 10, 20, 30 or auto".to_owned()),
     }
 }
 
-/// Zstandard's own default.
-const ZSTD_LEVEL: i32 = 3;
+/// The default level of Zstandard.
+pub(super) const ZSTD_LEVEL: i32 = 3;
 
 pub(super) fn parse_compress(text: &str) -> Result<i32, String> {
     match text.split_once(':').unwrap_or((text, "")) {
         ("zstd", "") => Ok(ZSTD_LEVEL),
-        ("zstd", level) => level.parse().ok().filter(|l| (1..=19).contains(l)).ok_or("levels are 1 to 19".to_owned()),
-        _ => Err("zstd or zstd:LEVEL is expected".to_owned()),
+        ("zstd", level) => {
+            level.parse().ok().filter(|l| (1..=19).contains(l)).ok_or("expected a level from 1 to 19".to_owned())
+        }
+        _ => Err("expected zstd or zstd:LEVEL".to_owned()),
     }
 }
 
@@ -48,8 +50,13 @@ pub(super) fn parse_scale(text: &str) -> Result<Scale, String> {
     match (text, text.parse::<f64>()) {
         ("auto", _) => Ok(Scale(None)),
         (_, Ok(step)) if step.is_finite() && step > 0.0 => Ok(Scale(Some(step))),
-        _ => Err("write a number above 0, as in 0.001, or auto".to_owned()),
+        _ => Err("expected a number above 0, for example 0.001, or auto".to_owned()),
     }
+}
+
+/// A default value in the help.
+pub(super) fn or_auto(value: Option<impl ToString>) -> String {
+    value.map_or_else(|| "auto".to_owned(), |value| value.to_string())
 }
 
 /// `--attributes`, parsed.
@@ -73,7 +80,7 @@ pub(super) fn parse_attributes(text: &str) -> Result<Attributes, String> {
 /// Parses `1GiB`, `512MB`, `1.5g`, `4096`: bytes. `K`, `M`, `G`, `T` alone and with `iB` are powers of 1024, with `B`
 /// powers of 1000.
 pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
-    let advice = || format!("`{text}` is no size; write it like 2GiB, 512MiB or 1500MB");
+    let advice = || format!("`{text}` is not a size; use a form like 2GiB, 512MiB or 1500MB");
     let text = text.trim();
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
     let number: f64 = text[..digits].parse().map_err(|_| advice())?;
@@ -91,13 +98,13 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
         _ => return Err(advice()),
     };
     let bytes = number * base.powi(power);
-    // 2^60: no machine has it, and arithmetic on it does not overflow.
+    // Below 2^60, so that arithmetic on sizes does not overflow.
     if bytes >= 1.0 && bytes < (1u64 << 60) as f64 { Ok(bytes as u64) } else { Err(advice()) }
 }
 
 /// Parses `xmin,ymin,zmin..xmax,ymax,zmax`, world coordinates.
 pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
-    let advice = || format!("`{text}` is no box; write it as xmin,ymin,zmin..xmax,ymax,zmax");
+    let advice = || format!("`{text}` is not a box; use the form xmin,ymin,zmin..xmax,ymax,zmax");
     let (min, max) = text.split_once("..").ok_or_else(advice)?;
     let corner = |text: &str| {
         let numbers: Option<Vec<f64>> =
@@ -106,7 +113,7 @@ pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
     };
     let bounds = Aabb { min: corner(min).ok_or_else(advice)?, max: corner(max).ok_or_else(advice)? };
     if bounds.is_empty() {
-        return Err(format!("`{text}` is empty: a minimum lies above its maximum"));
+        return Err(format!("`{text}` is empty: a minimum is above its maximum"));
     }
     Ok(bounds)
 }

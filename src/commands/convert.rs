@@ -1,4 +1,4 @@
-//! `pointmill convert`: what was typed becomes a `Plan`, a run and a summary.
+//! `pointmill convert`: from the options to a `Plan`, a run and a summary.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use pointmill_converter::{
 use pointmill_format::bintree::{Layout, SplitRule};
 
 use crate::args::{
-    Attributes, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg, RgbDepthArg,
-    SamplingArg, SplitArg, TargetArg,
+    Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
+    RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
-use crate::exit::{Failure, emit, tell, to_json};
+use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::inputs::Inputs;
@@ -23,7 +23,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let targets = targets(args)?;
     let inputs = args.inputs.expand()?;
     if !args.talk.quiet {
-        inputs.notes.iter().for_each(|note| tell(note));
+        inputs.notes.iter().for_each(|note| print_line(note));
     }
     let plan = plan(args, inputs)?;
     if args.dry_run {
@@ -46,18 +46,18 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         emit(&to_json(&report)?)?;
     }
     if for_people {
-        conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| tell(line));
+        conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| print_line(line));
     }
     Ok(())
 }
 
-/// The formats with their settings; an option for a format that is not asked for is a mistake.
+/// The formats with their settings; an option of a format that was not requested is a usage error.
 fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
     if args.seed.is_some() && args.sampling != SamplingArg::Random {
-        return Err(Failure::Usage("--seed is for --sampling random".to_owned()));
+        return Err(Failure::Usage("--seed requires --sampling random".to_owned()));
     }
     if args.brotli_quality.is_some() && args.encoding != EncodingArg::Brotli {
-        return Err(Failure::Usage("--brotli-quality is for --encoding brotli".to_owned()));
+        return Err(Failure::Usage("--brotli-quality requires --encoding brotli".to_owned()));
     }
     let mut targets = Vec::new();
     for to in &args.to {
@@ -66,7 +66,8 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
             TargetArg::Bintree => bintree_settings(&args.bintree).into(),
             TargetArg::Batches => batches_settings(&args.batches).into(),
             TargetArg::Potree1 => {
-                let line = "--to potree1 is not supported yet by this version; it writes potree2, bintree and batches";
+                let line =
+                    "--to potree1 is not supported by this version; the formats are potree2, bintree and batches";
                 return Err(Failure::Unsupported(line.to_owned()));
             }
         };
@@ -83,34 +84,34 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
         ("--no-originals", TargetArg::Batches, batches.no_originals),
     ];
     if let Some((option, to, _)) = given.iter().find(|(_, to, given)| *given && !args.to.contains(to)) {
-        return Err(Failure::Usage(format!("{option} is for --to {}", format!("{to:?}").to_lowercase())));
+        return Err(Failure::Usage(format!("{option} requires --to {}", format!("{to:?}").to_lowercase())));
     }
     Ok(targets)
 }
 
 fn potree2_settings(args: &ConvertArgs) -> Potree2Settings {
     let sampling = match args.sampling {
-        SamplingArg::Random => Sampling::Random { seed: args.seed.unwrap_or(0) },
+        SamplingArg::Random => Sampling::Random { seed: args.seed.unwrap_or(SEED) },
         SamplingArg::Poisson => Sampling::Poisson,
         SamplingArg::Grid => Sampling::Grid,
     };
     let encoding = match args.encoding {
-        EncodingArg::Brotli => Encoding::Brotli { quality: args.brotli_quality.unwrap_or(Encoding::BROTLI_QUALITY) },
+        EncodingArg::Brotli => Encoding::Brotli { quality: args.brotli_quality.unwrap_or(BROTLI_QUALITY) },
         EncodingArg::Default => Encoding::Default,
     };
     Potree2Settings { sampling, encoding, leaf_capacity: args.leaf_capacity }
 }
 
 fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
-    let usual = BintreeSettings::default();
+    let default = BintreeSettings::default();
     BintreeSettings {
-        capacity: args.capacity.unwrap_or(usual.capacity),
-        split: args.split.map_or(usual.split, |s| match s {
+        capacity: args.capacity.unwrap_or(default.capacity),
+        split: args.split.map_or(default.split, |s| match s {
             SplitArg::Mean => SplitRule::Mean,
             SplitArg::Median => SplitRule::Median,
             SplitArg::Midpoint => SplitRule::Midpoint,
         }),
-        layout: args.layout.map_or(usual.layout, |l| match l {
+        layout: args.layout.map_or(default.layout, |l| match l {
             LayoutArg::Files => Layout::Files,
             LayoutArg::Packed => Layout::Packed,
         }),
@@ -118,10 +119,10 @@ fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
 }
 
 fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
-    let usual = BatchesSettings::default();
+    let default = BatchesSettings::default();
     BatchesSettings {
-        lod_cell: args.lod_cell.as_ref().map_or(usual.lod_cell, |c| c.0),
-        planes: args.planes.map_or(usual.planes, |p| p.0),
+        lod_cell: args.lod_cell.as_ref().map_or(default.lod_cell, |c| c.0),
+        planes: args.planes.map_or(default.planes, |p| p.0),
         zstd_level: args.compress,
         originals: !args.no_originals,
     }
@@ -161,7 +162,7 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     }
     if let Some(dir) = &args.temp_dir {
         if !dir.is_dir() {
-            return Err(Failure::Usage(format!("{}: --temp-dir is no folder", dir.display())));
+            return Err(Failure::Usage(format!("{}: --temp-dir is not a folder", dir.display())));
         }
         plan.temp_dir = Some(dir.clone());
     }
@@ -217,4 +218,28 @@ fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+    use crate::args::{Args, Command};
+
+    #[test]
+    fn the_defaults_of_the_command_line_are_those_of_the_plan() {
+        let args = Args::parse_from(["pointmill", "convert", "a.las", "-o", "out"]);
+        let Command::Convert(args) = args.command else { panic!() };
+        let files = vec![PathBuf::from("a.las")];
+        let inputs = Inputs { files: files.clone(), notes: Vec::new() };
+        let given = plan(&args, inputs).unwrap();
+        let octree: Target = Potree2Settings::default().into();
+        assert_eq!(format!("{:?}", targets(&args).unwrap()), format!("{:?}", [octree]));
+        let mut usual = Plan::new(files, "out".into());
+        usual.name = "a".to_owned();
+        usual.filter.every = 1; // 0 and 1 both keep every point
+        usual.memory_bytes = given.memory_bytes; // memory in use changes between two calls
+        assert_eq!(format!("{given:?}"), format!("{usual:?}"));
+    }
 }

@@ -1,4 +1,4 @@
-//! `pointmill validate`: does a dataset keep the promises of its format?
+//! `pointmill validate`: checks a dataset against its format and its scans.
 
 use std::path::{Path, PathBuf};
 
@@ -7,14 +7,14 @@ use pointmill_validate::{Options, Outcome, locate};
 
 use crate::args::ValidateArgs;
 use crate::datasets;
-use crate::exit::{Failure, emit, tell, to_json};
+use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::progress::Progress;
 use crate::human::quantities::plural;
 use crate::human::validation;
 use crate::inputs;
 
-/// A folder with the outputs of one conversion to several formats is validated one after the other; all are told of,
-/// and the first failure gives the exit code.
+/// A folder with the outputs of one conversion to several formats is validated one after the other; all are
+/// reported, and the first failure gives the exit code.
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
     let datasets = several(&args.dataset);
     if datasets.is_empty() {
@@ -23,13 +23,13 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
     }
     if args.json {
         let names = datasets.iter().map(|d| d.display().to_string()).collect::<Vec<_>>().join(", ");
-        let line = format!("{}: holds several datasets; with --json name one: {names}", args.dataset.display());
+        let line = format!("{}: several datasets; with --json, name one of them: {names}", args.dataset.display());
         return Err(Failure::Usage(line));
     }
     let mut first = None;
     for dataset in &datasets {
         match require_dataset(dataset).and_then(|()| one(dataset, args)) {
-            Err(failure) if first.is_some() => failure.tell(),
+            Err(failure) if first.is_some() => failure.print(),
             Err(failure) => first = Some(failure),
             Ok(()) => {}
         }
@@ -50,7 +50,7 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(), Failure> {
     if !args.against.is_empty() {
         let found = inputs::expand(&args.against, &options.open)?;
         if !args.talk.quiet {
-            found.notes.iter().for_each(|note| tell(note));
+            found.notes.iter().for_each(|note| print_line(note));
         }
         options.against = found.files;
     }
@@ -76,15 +76,15 @@ fn verdict(dataset: &Path, outcome: &Outcome) -> Result<(), Failure> {
         return Ok(());
     }
     let broken: Vec<&str> = outcome.checks.iter().filter(|check| !check.ok).map(|check| check.name.name()).collect();
-    let faults = plural(outcome.checks.iter().map(|check| check.found).sum(), "fault");
-    Err(Failure::Faults(format!("{}: {faults} found by: {}", dataset.display(), broken.join(", "))))
+    let faults = plural(outcome.checks.iter().map(|check| check.found).sum(), "error");
+    Err(Failure::Faults(format!("{}: {faults} found by {}", dataset.display(), broken.join(", "))))
 }
 
-/// A path that leads to no dataset at all was mistyped; a file that is missing from one is a fault of the dataset.
+/// A path without a dataset is a usage error; a file that is missing from a dataset is an error of the dataset.
 fn require_dataset(dataset: &Path) -> Result<(), Failure> {
     let path = dataset.display();
     if !dataset.exists() {
-        return Err(Failure::Usage(format!("{path}: there is no such dataset")));
+        return Err(Failure::Usage(format!("{path}: no such dataset")));
     }
     let located = locate(dataset).map_err(|error| match error.kind {
         ErrorKind::Io(_) => Failure::from(error),
@@ -96,7 +96,7 @@ fn require_dataset(dataset: &Path) -> Result<(), Failure> {
     }
 }
 
-/// What is broken in the dataset itself is what a validation looks for, however it comes to light.
+/// A broken dataset is a result of the validation, also when a reader reports it.
 fn failure(error: ReadError, dataset: &Path) -> Failure {
     let in_dataset = error.path.starts_with(dataset);
     match Failure::from(error) {

@@ -1,4 +1,4 @@
-//! How reports of runs and estimates look to people. No figure is worked out here.
+//! Reports of runs and estimates as text. No figure is computed here.
 
 use pointmill_converter::{DropReason, Estimate, OutputReport, Plan, Report};
 use serde_json::Value;
@@ -29,7 +29,7 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
     lines
 }
 
-/// What was made.
+/// What was written.
 fn output_line(output: &OutputReport, plan: &Plan) -> String {
     let parts = match output.details.get("batches").and_then(Value::as_u64) {
         Some(n) => batches(n),
@@ -55,39 +55,43 @@ fn dropped_line(output: &OutputReport, name_it: bool) -> Option<String> {
     }
     let of = if name_it { format!(" of {}", output.format) } else { String::new() };
     let each = reasons.iter().map(|(why, names)| format!("{} ({})", names.join(", "), flags::drop_reason(why)));
-    (!reasons.is_empty()).then(|| format!("attributes left out{of}: {}", each.collect::<Vec<_>>().join("; ")))
+    (!reasons.is_empty()).then(|| format!("attributes not written{of}: {}", each.collect::<Vec<_>>().join("; ")))
 }
 
 fn points_lines(report: &Report) -> Vec<String> {
     let p = &report.points;
     let duplicates = duplicates_dropped(report);
     let from = plural(report.inputs.len() as u64, "scan");
-    if points_left_out(report) == 0 {
-        return vec![format!("all {} of {from} are in the dataset", plural(p.read, "point"))];
+    if points_not_written(report) == 0 {
+        return vec![format!("all {} of {from} written", plural(p.read, "point"))];
     }
     let causes = [
-        (p.outside_bounds, "outside --bounds"),
-        (p.other_class, "of other classes than --class"),
-        (p.thinned, "thinned out by --every"),
-        (duplicates, "duplicates, dropped"),
+        (p.outside_bounds, "outside the bounds"),
+        (p.other_class, "by class"),
+        (p.thinned, "by thinning"),
+        (duplicates, "as duplicates"),
         (p.invalid, "without a valid position"),
-        (p.unreadable, "lost, because parts of the inputs cannot be decoded"),
+        (p.unreadable, "unreadable"),
     ];
     let causes = causes.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n)));
-    vec![format!("of {} in {from}, left out: {}", plural(p.read, "point"), causes.collect::<Vec<_>>().join(", "))]
+    vec![format!(
+        "points not written, of {} in {from}: {}",
+        plural(p.read, "point"),
+        causes.collect::<Vec<_>>().join(", ")
+    )]
 }
 
 fn coordinates_line(report: &Report) -> String {
     let change = &report.coordinate_change;
     let step = numbers(&report.grid.scale);
     if change.max.iter().all(|v| *v == 0.0) {
-        return format!("coordinates are unchanged, step {step}");
+        return format!("coordinates unchanged, step {step}");
     }
     // 0.07 read as a double and 7 steps of 0.01 differ in the last bits
     let farthest =
         report.inputs.iter().filter_map(|i| i.bounds_measured).flatten().fold(0.0f64, |far, v| far.max(v.abs()));
     if change.max.iter().zip(&report.grid.scale).all(|(max, step)| *max <= (step * 1e-6).min(farthest * 1e-15)) {
-        return format!("coordinates are unchanged but for the rounding of doubles, step {step}");
+        return format!("coordinates unchanged except for the rounding of doubles, step {step}");
     }
     format!(
         "coordinates moved by at most {} (root mean square {}), step {step}",
@@ -117,30 +121,30 @@ fn details(report: &Report) -> Vec<String> {
     lines
 }
 
-/// What a run would do.
+/// The estimate of a run.
 pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
     let mut t = Table::default();
     t.row("inputs", plural(estimate.inputs.len() as u64, "scan"));
-    t.row("points", format!("{} (as the headers say)", count(estimate.points)));
+    t.row("points", format!("{} (from the headers)", count(estimate.points)));
     t.row("bounds", estimate.bounds.map_or_else(|| "unknown".to_owned(), |b| corners(&b[..3], &b[3..])));
     t.row("CRS", or_none(&estimate.crs));
     t.row("step", format!("{}, {}", numbers(&estimate.grid.scale), estimate.grid.why));
     t.row("cube side", number(estimate.grid.cube_side));
     t.row("attributes", estimate.attributes.join(", "));
-    t.row("bytes a point", estimate.bytes_per_point.to_string());
-    t.row("memory", format!("{} of {} allowed", bytes(estimate.memory_bytes), bytes(plan.memory_bytes)));
+    t.row("bytes/point", estimate.bytes_per_point.to_string());
+    t.row("memory", format!("{}, limit {}", bytes(estimate.memory_bytes), bytes(plan.memory_bytes)));
     t.row("temporary", bytes(estimate.temp_bytes));
     t.row("output", format!("{} in {}", bytes(estimate.output_bytes), plan.output.display()));
     if plan.output.exists() {
-        let advice = if plan.overwrite { "will be replaced" } else { "needs --overwrite to be replaced" };
+        let advice = if plan.overwrite { "will be replaced" } else { "requires --overwrite" };
         t.row("exists", advice);
     }
     estimate.warnings.iter().for_each(|w| t.row("warning", flags::warning_line(w)));
     t.0
 }
 
-/// Points that are not in the datasets, whatever the cause.
-fn points_left_out(report: &Report) -> u64 {
+/// Points read that are not in the dataset.
+fn points_not_written(report: &Report) -> u64 {
     let p = &report.points;
     p.outside_bounds + p.other_class + p.thinned + duplicates_dropped(report) + p.invalid + p.unreadable
 }

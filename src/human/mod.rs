@@ -1,4 +1,4 @@
-//! How results look to people: JSON is made in the commands.
+//! Text for people; JSON is made in the commands.
 
 pub(crate) mod conversion;
 pub(crate) mod progress;

@@ -1,4 +1,4 @@
-//! What a run tells while it works, and how it hears that it shall stop.
+//! Progress and warnings of a run on standard error, and the request to stop.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -11,12 +11,12 @@ use serde_json::json;
 
 use super::quantities::{count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
-use crate::exit::tell;
+use crate::exit::print_line;
 use crate::flags;
 
-/// No program needs JSON lines more often, and a line a batch would be thousands.
+/// Interval of JSON lines; one per batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);
-/// More lines than this hide what matters; the report has them all.
+/// Maximum warnings printed; the report has all of them.
 const MAX_WARNINGS: u64 = 20;
 
 enum Face {
@@ -25,7 +25,7 @@ enum Face {
     Silent,
 }
 
-/// Tells of phases, rates and warnings on standard error; standard output is for results.
+/// Reports phases, rates and warnings on standard error; standard output is for results.
 pub(crate) struct Progress {
     face: Face,
     quiet: bool,
@@ -39,11 +39,11 @@ struct State {
     phase: &'static str,
     total: u64,
     began: Instant,
-    told: Instant,
+    last_json: Instant,
 }
 
 impl Progress {
-    /// `stop`: what says that the run shall end, if it can.
+    /// `stop`: the flag that asks the run to stop, if it can.
     pub(crate) fn new(talk: &TalkArgs, stop: Option<&'static AtomicBool>) -> Self {
         let bar = || Face::Bar(ProgressBar::no_length());
         let face = match talk.progress {
@@ -60,7 +60,7 @@ impl Progress {
             warnings: AtomicU64::new(0),
             stop,
             done: AtomicU64::new(0),
-            state: Mutex::new(State { phase: "start", total: 0, began: now, told: now }),
+            state: Mutex::new(State { phase: "start", total: 0, began: now, last_json: now }),
         }
     }
 
@@ -68,12 +68,12 @@ impl Progress {
     pub(crate) fn begin(&self, phase: &'static str, total: u64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.phase != "start" {
-            self.tell_json(&mut state); // the last figures of the phase that ends
+            self.write_json(&mut state); // the last figures of the phase that ends
         }
         self.done.store(0, Ordering::Relaxed);
         let now = Instant::now();
-        *state = State { phase, total, began: now, told: now };
-        self.tell_json(&mut state);
+        *state = State { phase, total, began: now, last_json: now };
+        self.write_json(&mut state);
         if let Face::Bar(bar) = &self.face {
             bar.reset();
             bar.set_style(style(total));
@@ -88,19 +88,19 @@ impl Progress {
         self.done.fetch_add(points, Ordering::Relaxed);
         match &self.face {
             Face::Bar(bar) => bar.inc(points),
-            // Whoever finds the lock taken leaves the telling to its holder.
+            // If the lock is taken, its holder writes the line.
             Face::Json => {
                 if let Ok(mut state) = self.state.try_lock()
-                    && state.told.elapsed() >= JSON_INTERVAL
+                    && state.last_json.elapsed() >= JSON_INTERVAL
                 {
-                    self.tell_json(&mut state);
+                    self.write_json(&mut state);
                 }
             }
             Face::Silent => {}
         }
     }
 
-    /// `done` of `total` points of a phase are done; for those who count by themselves, and may be overtaken.
+    /// `done` of `total` points of a phase are done; for callers that count themselves, whose calls may overtake each other.
     pub(crate) fn at(&self, phase: &'static str, done: u64, total: u64) {
         let (same_phase, same_total) = {
             let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -117,15 +117,15 @@ impl Progress {
         self.step(done.saturating_sub(self.done.load(Ordering::Relaxed)));
     }
 
-    /// One line that the user should know.
+    /// Reports a warning.
     pub(crate) fn note(&self, line: &str) {
         if self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
             return;
         }
         match &self.face {
-            Face::Bar(bar) => bar.suspend(|| tell(&format!("warning: {line}"))),
+            Face::Bar(bar) => bar.suspend(|| print_line(&format!("warning: {line}"))),
             Face::Json => write_line(&json!({ "warning": line })),
-            Face::Silent => tell(&format!("warning: {line}")),
+            Face::Silent => print_line(&format!("warning: {line}")),
         }
     }
 
@@ -134,26 +134,26 @@ impl Progress {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
-    /// Clears the bar, so that other lines can follow; true if people are to be told of the result.
+    /// Clears the bar, so that other lines can follow; true if the result is to be printed as text.
     pub(crate) fn end(&self) -> bool {
         match &self.face {
             Face::Bar(bar) => bar.finish_and_clear(),
-            Face::Json => self.tell_json(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner)),
+            Face::Json => self.write_json(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner)),
             Face::Silent => {}
         }
         let hidden = self.warnings.load(Ordering::Relaxed).saturating_sub(MAX_WARNINGS);
         let for_people = !self.quiet && !matches!(self.face, Face::Json);
         if for_people && hidden > 0 {
-            tell(&format!("warning: {hidden} more warnings; the report has them all"));
+            print_line(&format!("warning: {hidden} more warnings; see the report"));
         }
         for_people
     }
 
-    fn tell_json(&self, state: &mut State) {
+    fn write_json(&self, state: &mut State) {
         if !matches!(self.face, Face::Json) {
             return;
         }
-        state.told = Instant::now();
+        state.last_json = Instant::now();
         let done = self.done.load(Ordering::Relaxed);
         let elapsed = state.began.elapsed().as_secs_f64();
         let per_second = if elapsed > 0.0 { done as f64 / elapsed } else { 0.0 };
@@ -187,7 +187,7 @@ impl Events for Progress {
 }
 
 fn write_line(object: &serde_json::Value) {
-    // Nobody is left to tell when standard error is closed.
+    // Nothing can be reported when standard error is closed.
     let _ = writeln!(io::stderr().lock(), "{object}");
 }
 

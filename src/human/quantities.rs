@@ -54,7 +54,7 @@ pub(crate) fn seconds(s: f64) -> String {
     }
 }
 
-/// A number for people: at most nine decimals, none that say nothing. JSON has all of them.
+/// A number for people: at most nine decimals, without trailing zeros. JSON has all of them.
 pub(crate) fn number(v: f64) -> String {
     if v != 0.0 && !(1e-6..1e15).contains(&v.abs()) {
         return format!("{v:e}");

@@ -20,7 +20,7 @@ pub(crate) fn attribute_line(attribute: &Attribute, ranges: Option<&[[f64; 2]]>)
         let _ = write!(line, " · {} + {}", numbers(&attribute.scale), numbers(&attribute.offset));
     }
     if let Some(no_data) = &attribute.no_data {
-        let _ = write!(line, ", {} is unknown", numbers(no_data));
+        let _ = write!(line, ", {} means no data", numbers(no_data));
     }
     for [min, max] in ranges.unwrap_or_default().iter().filter(|r| r[0] <= r[1]) {
         let _ = write!(line, ", {} to {}", number(*min), number(*max));
@@ -49,7 +49,7 @@ pub(crate) fn or_none(text: &str) -> &str {
     if text.is_empty() { "no CRS" } else { text }
 }
 
-/// Lines of a word and what there is to say about it.
+/// Lines of a label and a text.
 #[derive(Default)]
 pub(crate) struct Table(pub(crate) String);
 
@@ -65,7 +65,7 @@ impl Table {
     }
 }
 
-/// Control characters out of a file (a CRS, an attribute's name) never reach the terminal.
+/// Replaces control characters from a file (a CRS, an attribute name), so that they never reach the terminal.
 pub(super) fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

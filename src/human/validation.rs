@@ -1,4 +1,4 @@
-//! How the outcome of a validation looks to people. No figure is worked out here.
+//! The outcome of a validation as text. No figure is computed here.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -38,7 +38,7 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
         let _ = writeln!(out, "  {sources}: {expected} points expected, {found} found");
         if !against.attributes_not_in_dataset.is_empty() {
             let names = against.attributes_not_in_dataset.join(", ");
-            let _ = writeln!(out, "  not compared, for the dataset does not have them: {}", printable(&names));
+            let _ = writeln!(out, "  not compared, because the dataset does not have them: {}", printable(&names));
         }
     }
     out.push_str(&quality(&outcome.quality, verbose));
@@ -46,7 +46,7 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
     out + &problems(outcome)
 }
 
-/// Distances over the spacing of the level; `–` where there is nothing to measure.
+/// Distances relative to the spacing of the level; `–` where there is nothing to measure.
 fn quality(levels: &[LevelQuality], verbose: bool) -> String {
     let mut out = String::new();
     if levels.is_empty() {
@@ -74,7 +74,7 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
     }
     if verbose {
         out.push_str(
-            "  Distances are over the spacing of the level. Nearest: from a point of an inner node to the next of that\n  \
+            "  Distances are relative to the spacing of the level. Nearest: from a point of an inner node to the next of that\n  \
              node. Largest hole: from a point of a deeper level to the next one drawn. Seam: between inner nodes; close:\n  \
              points that have one of another node nearer than the spacing.\n",
         );
@@ -90,7 +90,7 @@ fn leaves(leaves: &LeafQuality) -> String {
     let LeafQuality { points_min, points_mean, points_max, depth, volume, largest_error, largest_bound, .. } = leaves;
     format!(
         "  {} of {} to {} points, {} on average, down to depth {depth}; volume of their boxes {volume:.0}\n  \
-         positions are off by {largest_error:.1e} at most, {largest_bound:.1e} is allowed\n",
+         maximum position error {largest_error:.1e}, allowed {largest_bound:.1e}\n",
         if leaves.leaves == 1 { "1 leaf".to_owned() } else { format!("{} leaves", count(leaves.leaves)) },
         count(*points_min),
         count(*points_max),
@@ -98,7 +98,7 @@ fn leaves(leaves: &LeafQuality) -> String {
     )
 }
 
-/// One problem a line.
+/// One problem per line.
 pub(crate) fn problems(outcome: &Outcome) -> String {
     let mut out = String::new();
     outcome.problems.iter().for_each(|problem| out += &(printable(&problem.to_string()) + "\n"));

@@ -7,11 +7,11 @@ use crate::imports::Imports;
 /// A text for each circle: its files, and the imports that tie them. Empty: there is none.
 pub(crate) fn circles(imports: &Imports) -> Vec<String> {
     let reachable: Vec<BTreeSet<usize>> = (0..imports.files.len()).map(|file| reachable(imports, file)).collect();
-    let mut told = BTreeSet::new();
+    let mut listed = BTreeSet::new();
     let mut out = Vec::new();
     for file in 0..imports.files.len() {
         let circle: Vec<usize> = reachable[file].iter().copied().filter(|f| reachable[*f].contains(&file)).collect();
-        if circle.len() < 2 || !told.insert(circle[0]) {
+        if circle.len() < 2 || !listed.insert(circle[0]) {
             continue;
         }
         let inside = |edge: &&(usize, usize)| circle.contains(&edge.0) && circle.contains(&edge.1);
@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn a_parent_and_a_child_that_need_each_other_are_a_circle() {
-        let parent = "mod child; pub struct Shared; pub fn run() { child::run() }";
+        let parent = "mod child; pub struct Shared; pub fn child() { child::run() }";
         let crate_ = planted(&[("lib.rs", parent), ("child.rs", "use super::Shared; pub fn run() {}")]);
         assert_eq!(circles(&crate_.imports()).len(), 1);
     }

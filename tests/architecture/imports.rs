@@ -41,8 +41,7 @@ impl Imports {
             }
             for path in &module.paths {
                 // a name that an import brought here was counted there
-                let first = resolve(&tree, number, &path.segments[..1], MAX_STEPS);
-                if matches!(first, Some(Target::Module(_)))
+                if leads_through_a_module(&tree, number, &path.segments[..1])
                     && let Some(target) = resolve(&tree, number, &path.segments, MAX_STEPS)
                 {
                     imports.add(&tree, number, path, "", target, false);
@@ -74,6 +73,12 @@ impl Imports {
         let some = lines.iter().take(3).map(|l| format!("line {l}")).collect::<Vec<_>>().join(", ");
         format!("  {} needs {} ({some}{more})", self.files[edge.0], self.files[edge.1])
     }
+}
+
+/// A module and a function may share a name; in front of `::` it is the module.
+fn leads_through_a_module(tree: &Tree, module: usize, first: &[String]) -> bool {
+    tree.modules[module].children.contains_key(&first[0])
+        || matches!(resolve(tree, module, first, MAX_STEPS), Some(Target::Module(_)))
 }
 
 /// A re-export is a signboard; its file needs the name if its code uses it.

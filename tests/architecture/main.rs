@@ -3,6 +3,7 @@
 
 mod circles;
 mod crates;
+mod documents;
 mod imports;
 mod layers;
 mod modules;

@@ -24,9 +24,7 @@ fn all_tokens(source: &str) -> Vec<Token> {
             '/' if at(i + 1) == '/' => i = (i..chars.len()).find(|i| chars[*i] == '\n').unwrap_or(chars.len()),
             '/' if at(i + 1) == '*' => i = end_of_comment(&chars, i),
             '"' => i = end_of_string(&chars, i),
-            '\'' if at(i + 1) == '\\' => {
-                i = (i + 3..chars.len()).find(|i| chars[*i] == '\'').map_or(chars.len(), |i| i + 1)
-            }
+            '\'' if at(i + 1) == '\\' => i = after_quote(&chars, i + 3),
             '\'' if at(i + 2) == '\'' => i += 3,
             '\'' => i += 1 + (i + 1..chars.len()).take_while(|i| is_word(chars[*i])).count(), // a lifetime
             'r' | 'b' | 'c' if end_of_prefixed(&chars, i).is_some() => {
@@ -76,6 +74,11 @@ fn end_of_string(chars: &[char], quote: usize) -> usize {
     (i + 1).min(chars.len())
 }
 
+/// Behind the next single quote.
+fn after_quote(chars: &[char], from: usize) -> usize {
+    (from..chars.len()).find(|i| chars[*i] == '\'').map_or(chars.len(), |i| i + 1)
+}
+
 /// The end of `b"…"`, `r#"…"#`, `b'…'` and their like at `start`; `None` for a word that begins with such a letter.
 fn end_of_prefixed(chars: &[char], start: usize) -> Option<usize> {
     let prefix: String = chars[start..].iter().take_while(|c| "rbc".contains(**c)).collect();
@@ -96,7 +99,7 @@ fn end_of_prefixed(chars: &[char], start: usize) -> Option<usize> {
         ("b" | "c", Some('"')) if hashes == 0 => Some(end_of_string(chars, after)),
         ("b", Some('\'')) if hashes == 0 => {
             let body = if chars.get(after + 1) == Some(&'\\') { after + 3 } else { after + 2 };
-            Some((body..chars.len()).find(|i| chars[*i] == '\'').map_or(chars.len(), |i| i + 1))
+            Some(after_quote(chars, body))
         }
         _ => None,
     }

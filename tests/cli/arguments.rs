@@ -46,7 +46,7 @@ fn formats_to_come_are_not_supported_yet() {
 }
 
 #[test]
-fn a_dry_run_tells_and_writes_nothing() {
+fn a_dry_run_reports_and_writes_nothing() {
     let dir = Dir::new();
     dir.write("a.las", &Las::terrain(12_345, 1).bytes());
     let text = dir.succeed(["convert", "a.las", "-o", "out", "--dry-run"]).stdout();

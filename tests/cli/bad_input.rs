@@ -50,12 +50,12 @@ fn a_file_that_was_named_and_is_no_scan_is_not_supported() {
 }
 
 #[test]
-fn files_that_a_folder_brings_along_are_left_out_aloud() {
+fn files_that_a_folder_brings_along_are_skipped_and_reported() {
     let dir = Dir::new();
     dir.write("scans/a.las", &Las::terrain(100, 1).bytes());
     dir.write("scans/readme.txt", b"hello");
     let ended = dir.succeed(["convert", "scans", "-o", "out"]);
-    assert!(ended.stderr().contains("1 other file left out, no scans (scans/readme.txt)"), "{}", ended.stderr());
+    assert!(ended.stderr().contains("1 other file skipped, not scans (scans/readme.txt)"), "{}", ended.stderr());
 }
 
 #[test]

@@ -12,7 +12,7 @@ fn with_dataset() -> Dir {
 }
 
 #[test]
-fn an_output_that_exists_is_left_alone_unless_told_otherwise() {
+fn an_output_that_exists_is_left_alone_unless_overwriting() {
     let dir = with_dataset();
     let before = dataset_bytes(&dir.path("out"));
     dir.write("b.las", &Las::terrain(3000, 2).bytes());

@@ -1,4 +1,4 @@
-//! Quantised batches from the command line: the same bytes whatever the machine has to offer, and what is told of them.
+//! Quantised batches from the command line: the same bytes whatever the machine, and how they are described.
 
 use std::fs;
 
@@ -55,7 +55,7 @@ fn beside_an_octree_of_the_same_read() {
 }
 
 #[test]
-fn the_report_tells_levels_planes_errors_and_what_would_be_drawn() {
+fn the_report_has_levels_planes_errors_and_what_would_be_drawn() {
     let dir = two_scans(30_000);
     let file = bytes(&dir, &["scans", "--lod-cell", "auto"]);
     let report = dir.report("out");

@@ -31,7 +31,7 @@ fn a_header_that_declares_a_thousand_light_seconds_costs_no_precision() {
 }
 
 #[test]
-fn the_depth_of_colours_is_told_by_points_that_are_left_out_too() {
+fn the_depth_of_colours_is_detected_from_filtered_points_too() {
     let dir = Dir::new();
     let mut bytes = Las::terrain(3000, 1).bytes();
     for i in 0..3000 {
@@ -81,7 +81,7 @@ fn infinite_times_do_not_enter_the_range_of_times() {
 }
 
 #[test]
-fn an_unknown_attribute_is_told_before_a_point_is_read() {
+fn an_unknown_attribute_is_reported_before_a_point_is_read() {
     let dir = Dir::new();
     dir.write("scan.las", &Las::terrain(3000, 1).bytes());
     let ended = dir.run(["convert", "scan.las", "-o", "out", "--attributes", "colour", "--progress", "json"]);

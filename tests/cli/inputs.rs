@@ -1,4 +1,4 @@
-//! Scans of every kind: converted, told of, mixed; what files do not say and what they say wrongly.
+//! Scans of every kind: converted, described, mixed; files that state too little or state it wrongly.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -58,8 +58,8 @@ fn mixed_inputs_have_the_union_of_their_attributes() {
         fs::copy(fixture(name), to).unwrap();
     }
     dir.write("in/readme.txt", b"no scan");
-    let told = dir.succeed(["convert", "in", "-o", "out"]);
-    assert!(told.stderr().contains("1 other file left out"), "{}", told.stderr());
+    let ended = dir.succeed(["convert", "in", "-o", "out"]);
+    assert!(ended.stderr().contains("1 other file skipped"), "{}", ended.stderr());
     let report = dir.report("out");
     let names: Vec<&str> =
         report["outputs"][0]["attributes"].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect();
@@ -87,8 +87,8 @@ fn a_far_point_is_named_with_the_bounds_that_leave_it_out() {
     let mut text: String = (0..4000).map(|i| format!("{}.25 {}.5 {}\n", i % 61, i % 67, i % 7)).collect();
     text += "9000000 0 0\n";
     dir.write("a.xyz", text.as_bytes());
-    let told = dir.succeed(["convert", "a.xyz", "-o", "out"]).stderr();
-    let line = told.lines().find(|l| l.contains("--bounds")).unwrap_or_else(|| panic!("{told}"));
+    let ended = dir.succeed(["convert", "a.xyz", "-o", "out"]).stderr();
+    let line = ended.lines().find(|l| l.contains("--bounds")).unwrap_or_else(|| panic!("{ended}"));
     assert!(line.contains("1 point is far from all others"), "{line}");
     let bounds = line.split("--bounds ").nth(1).unwrap().split(' ').next().unwrap();
     let step = |out: &str| dir.report(out)["grid"]["scale"][0].as_f64().unwrap();
@@ -115,7 +115,7 @@ fn points_without_a_position_are_counted_or_refused() {
 }
 
 #[test]
-fn columns_that_cannot_be_are_told_with_what_to_do() {
+fn invalid_columns_are_reported_with_advice() {
     let dir = Dir::new();
     dir.write("a.xyz", b"1 2 3 4\n2 3 4 5\n");
     let convert = |columns: &str| dir.run(["convert", "a.xyz", "-o", "out", "--columns", columns]);

@@ -1,4 +1,4 @@
-//! The same points give the same bytes, whatever the machine has to offer and in whatever order they come.
+//! The same points give the same bytes, whatever the machine and in whatever order they come.
 
 use crate::support::{Dir, Las, dataset_bytes};
 

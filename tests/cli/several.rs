@@ -11,15 +11,18 @@ fn each_format_has_its_folder_and_one_command_validates_and_tells_of_all() {
     for file in ["potree2/metadata.json", "bintree/index.json", "batches/points.qbatch", "report.json"] {
         assert!(dir.path("out").join(file).is_file(), "{file}");
     }
-    let told = dir.succeed(["validate", "out", "--against", "a.las"]).stdout();
+    let ended = dir.succeed(["validate", "out", "--against", "a.las"]).stdout();
     for format in ["potree2", "bintree", "batches"] {
-        assert!(told.contains(&format!("out/{format}")), "{told}");
+        assert!(ended.contains(&format!("out/{format}")), "{ended}");
     }
-    let told = dir.succeed(["info", "out"]).stdout();
-    assert!(told.contains("Potree 2.0") && told.contains("mean-split") && told.contains("quantised batches"), "{told}");
+    let ended = dir.succeed(["info", "out"]).stdout();
+    assert!(
+        ended.contains("Potree 2.0") && ended.contains("mean-split") && ended.contains("quantised batches"),
+        "{ended}"
+    );
     dir.run(["validate", "out", "--json"]).failed_with(2, &["several", "out/bintree"]);
 
-    // A fault in one of them is found, and the others are told of all the same.
+    // A fault in one of them is found, and the others are reported all the same.
     std::fs::remove_file(dir.path("out").join("bintree/n.bin")).unwrap();
     let ended = dir.run(["validate", "out"]);
     assert!(ended.stdout().contains("out/batches"));

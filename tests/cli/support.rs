@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// A folder of its own for each test, gone afterwards.
+/// One temporary folder per test.
 pub(crate) struct Dir(tempfile::TempDir);
 
 impl Dir {

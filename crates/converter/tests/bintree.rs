@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use pointmill_converter::{
     AttributeChoice, BintreeSettings, ConvertError, Plan, Potree2Settings, Report, ScaleChoice, Silent, convert,
 };
-use pointmill_format::OpenOptions;
-use pointmill_format::bintree::{Bintree, Layout, LeafPoints, NodeKind, SplitRule};
+use pointmill_format::bintree::{Bintree, Layout, NodeKind, SplitRule};
+use pointmill_format::{NodePoints, OpenOptions};
 
 /// Lattice integers (steps of 0.01) and classes.
 type Points = Vec<([i64; 3], u8)>;
@@ -107,7 +107,7 @@ fn cut(points: &[([i64; 3], u8)], leaves: usize, out: &mut Vec<Expected>) {
 fn read(folder: &Path) -> Vec<Expected> {
     let tree = Bintree::open(folder).unwrap();
     let lattice = tree.header().lattice;
-    let mut leaf = LeafPoints::default();
+    let mut leaf = NodePoints::default();
     let mut nodes = Vec::new();
     for (i, node) in tree.nodes().iter().enumerate() {
         let count = node.count as usize;
@@ -120,8 +120,9 @@ fn read(folder: &Path) -> Vec<Expected> {
             NodeKind::Degenerate { .. } => Expected::Degenerate { count },
             NodeKind::Leaf { .. } => {
                 tree.read_leaf(i as u32, &mut leaf).unwrap();
-                let at = |k: usize| [0, 1, 2].map(|a| lattice.quantize(a, leaf.positions[a][k]));
-                let mut points: Points = (0..leaf.len()).map(|k| (at(k), leaf.classes[k] as u8)).collect();
+                let at = |k: usize| [0, 1, 2].map(|a| lattice.quantize(a, leaf.world(k).unwrap()[a]));
+                let mut points: Points =
+                    (0..leaf.len()).map(|k| (at(k), leaf.column::<f32>("classification").unwrap()[k] as u8)).collect();
                 points.sort_unstable();
                 Expected::Leaf(points)
             }

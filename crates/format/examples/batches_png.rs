@@ -10,13 +10,13 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-use pointmill_format::ReadError;
 #[cfg(not(feature = "mmap"))]
 use pointmill_format::batches::AlignedBytes;
 use pointmill_format::batches::{
-    BatchPoints, BatchRecord, Batches, Precision, distance_to_box, focal_pixels, keeps, lod_of, projected_diagonal,
-    rgb_of, target_spacing, weight,
+    BATCH_POINTS, BatchRecord, BatchScratch, Batches, Precision, distance_to_box, focal_pixels, keeps, lod_of,
+    projected_diagonal, rgb_of, target_spacing, weight,
 };
+use pointmill_format::{NodePoints, ReadError};
 
 const USAGE: &str = "usage: batches_png FILE OUT.png [options]
   --size WxH             picture in pixels (1280x720)
@@ -56,7 +56,7 @@ fn open(path: &Path) -> Result<Batches<impl AsRef<[u8]> + use<>>, ReadError> {
 
 #[cfg(not(feature = "mmap"))]
 fn open(path: &Path) -> Result<Batches<AlignedBytes>, ReadError> {
-    Batches::read(path)
+    Batches::open(path)
 }
 
 /// The three passes. Batches by precision, and the picture: r, g, b, row by row from the top.
@@ -68,18 +68,21 @@ fn draw<B: AsRef<[u8]>>(
     let [width, height] = camera.size;
     let mut nearest = vec![f32::INFINITY; width * height];
     let mut sums = vec![[0u32; 4]; width * height];
-    let cell = batches.header().grid.cell as f32;
+    let grid = &batches.header().grid;
+    let cell = grid.cell as f32;
     let mut chosen = [0; 3];
-    let mut points = BatchPoints::default();
+    let (mut scratch, mut points) = (BatchScratch::default(), NodePoints::default());
     for colour_pass in [false, true] {
         for (slot, record) in (0..).zip(batches.records()).filter(|(_, r)| camera.sees(r)) {
             let precision = camera.precision(record, options.bits).min(batches.header().precision());
             if !colour_pass {
                 chosen[precision.planes() as usize - 1] += 1;
             }
-            batches.read_batch(slot, precision, &mut points)?;
-            for ((i, relative), word) in (points.first_point..).zip(&points.relative).zip(&points.colours) {
-                let Some(at) = camera.project(*relative) else { continue };
+            batches.read_batch(slot, precision, &mut scratch, &mut points)?;
+            let colours = points.column::<u32>("colour").unwrap_or_default();
+            for ((k, i), word) in (0..points.len()).zip(slot * BATCH_POINTS..).zip(colours) {
+                let relative = points.world(k).map(|world| grid.relative(world));
+                let Some(at) = relative.and_then(|relative| camera.project(relative)) else { continue };
                 let lod = lod_of(*word);
                 let fine_enough = options
                     .clod

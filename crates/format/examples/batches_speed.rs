@@ -8,29 +8,31 @@
 use std::io::Cursor;
 use std::time::Instant;
 
+use pointmill_format::NodePoints;
 use pointmill_format::batches::{
-    AlignedBytes, BatchPoints, Batches, BlockScratch, DEFAULT_BATCHES_PER_BLOCK, EncodedBatch, Part, Precision,
+    AlignedBytes, BatchScratch, Batches, BlockScratch, DEFAULT_BATCHES_PER_BLOCK, EncodedBatch, Part, Precision,
     compress, encode_batch,
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).ok_or("usage: batches_speed FILE")?;
-    let batches = Batches::read(path.as_ref())?;
+    let batches = Batches::open(&path)?;
     let header = batches.header();
     let millions = header.points as f64 / 1e6;
     println!("{} points, {} batches, {} bits", header.points, header.batches, header.precision().bits());
 
-    let mut points = BatchPoints::default();
+    let (mut scratch, mut points) = (BatchScratch::default(), NodePoints::default());
     for precision in Precision::ALL.into_iter().filter(|p| *p <= header.precision()) {
-        let seconds =
-            best_of_3(|| (0..header.batches).try_for_each(|s| batches.read_batch(s, precision, &mut points)))?;
+        let mut read = |slot| batches.read_batch(slot, precision, &mut scratch, &mut points);
+        let seconds = best_of_3(|| (0..header.batches).try_for_each(&mut read))?;
         println!("decode {} bits: {:.0} M points/s", precision.bits(), millions / seconds);
     }
 
     let mut axes: Vec<[Vec<f64>; 3]> = Vec::new();
     for slot in 0..header.batches {
-        batches.read_batch(slot, header.precision(), &mut points)?;
-        axes.push(std::array::from_fn(|a| points.relative.iter().map(|p| p[a]).collect()));
+        batches.read_batch(slot, header.precision(), &mut scratch, &mut points)?;
+        let relative = (0..points.len()).filter_map(|i| Some(header.grid.relative(points.world(i)?)));
+        axes.push(std::array::from_fn(|a| relative.clone().map(|p| p[a]).collect()));
     }
     let mut encoded = EncodedBatch::default();
     let seconds = best_of_3(|| axes.iter().try_for_each(|[x, y, z]| encode_batch(0, [x, y, z], &mut encoded)))?;
@@ -45,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let start = Instant::now();
         compress(&batches, &mut file, level, DEFAULT_BATCHES_PER_BLOCK)?;
         let packing = millions / start.elapsed().as_secs_f64();
-        let packed = Batches::open_bytes(AlignedBytes::from(file.get_ref().as_slice()), path.as_ref())?;
+        let packed = Batches::from_bytes(AlignedBytes::from(file.get_ref().as_slice()), &path)?;
         let mut scratch = BlockScratch::default();
         let seconds = best_of_3(|| {
             let mut all = parts.iter().flat_map(|(_, part)| (0..header.batches).map(move |slot| (*part, slot)));

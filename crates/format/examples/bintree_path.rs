@@ -121,7 +121,7 @@ fn from_file(text: &str) -> Result<Vec<Step>, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse()?;
-    let tree = Bintree::open(options.folder.as_ref())?;
+    let tree = Bintree::open(&options.folder)?;
     let root = tree.node(0).ok_or("the cloud is empty")?;
     let steps = match std::fs::read_to_string(&options.path) {
         Ok(text) => from_file(&text)?,

@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             generate((millions * 1e6) as u32, folder.path())?;
             Bintree::open(folder.path())?
         }
-        Err(_) => Bintree::open(what.as_ref())?,
+        Err(_) => Bintree::open(what)?,
     };
     let bounds = tree.node(0).ok_or("the cloud is empty")?.bounds;
     println!("{} points in {} leaves", tree.header().points, tree.leaves().count());

@@ -8,8 +8,8 @@
 use std::collections::{BinaryHeap, HashMap};
 use std::error::Error;
 
-use pointmill_format::potree2::{Dataset, Hierarchy, Node, NodePoints};
-use pointmill_format::{Aabb, NodeKey};
+use pointmill_format::potree2::{Dataset, Hierarchy, Node};
+use pointmill_format::{Aabb, NodeKey, NodePoints};
 
 struct Camera {
     position: [f64; 3],
@@ -69,7 +69,7 @@ impl Cache {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
-    let dataset = Dataset::open(args.next().ok_or("usage: pick_nodes FOLDER [BUDGET]")?.as_ref())?;
+    let dataset = Dataset::open(args.next().ok_or("usage: pick_nodes FOLDER [BUDGET]")?)?;
     let budget: u64 = args.next().map_or(Ok(1_000_000), |text| text.parse())?;
     let (mut tree, mut cache) = (Hierarchy::new(&dataset)?, Cache::default());
     let (cube, direction) = (dataset.metadata().cube, [0.48, 0.64, -0.6]);

@@ -8,12 +8,12 @@
 
 use std::time::Instant;
 
-use pointmill_format::potree2::{BrotliScratch, Dataset, NodePoints, encode_brotli};
-use pointmill_format::{Attribute, Column, ReadError, with_column};
+use pointmill_format::potree2::{BrotliScratch, Dataset, encode_brotli};
+use pointmill_format::{Attribute, Column, NodePoints, ReadError, with_column};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args().nth(1).ok_or("usage: potree2_speed FOLDER")?;
-    let dataset = Dataset::open(folder.as_ref())?;
+    let dataset = Dataset::open(folder)?;
     let nodes = dataset.read_hierarchy()?;
     let mut points = NodePoints::default();
     let mut count = 0;
@@ -70,8 +70,8 @@ fn cpu_seconds() -> Option<f64> {
 fn to_records(points: &NodePoints, attributes: &[Attribute]) -> Vec<u8> {
     let mut records = Vec::new();
     for i in 0..points.len() {
-        records.extend(points.positions.iter().flat_map(|axis| axis[i].to_le_bytes()));
-        for (column, attribute) in points.columns.iter().zip(&attributes[1..]) {
+        records.extend(points.quantized().unwrap_or_default().into_iter().flat_map(|axis| axis[i].to_le_bytes()));
+        for (column, attribute) in points.columns().iter().zip(&attributes[1..]) {
             append_value(column, i * attribute.elements..(i + 1) * attribute.elements, &mut records);
         }
     }

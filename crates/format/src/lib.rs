@@ -28,7 +28,7 @@ pub mod scan;
 pub use dataset_kind::{DatasetKind, Located, UnknownDatasetKind, locate};
 pub use error::{ErrorKind, ReadError};
 pub use geometry::{Aabb, Lattice, NodeKey};
-pub use points::{Attribute, AttributeType, Column, PointBatch, Positions};
+pub use points::{Attribute, AttributeType, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart, Scratch, Sink, Wanted,
     open_scan, supported_scans,

@@ -1,4 +1,4 @@
-//! What a file of quantised batches is: its header and description.
+//! Describes a file of quantised batches: its header and description.
 
 use std::path::Path;
 
@@ -6,16 +6,16 @@ use pointmill_format::Attribute;
 use pointmill_format::batches::{BatchRecord, Batches};
 use serde_json::{Value, json};
 
-use super::description::{Told, attribute_json, corners};
+use super::description::{Description, attribute_json, corners};
 use crate::exit::Failure;
 use crate::human::quantities::{bytes, count, number, numbers, plural};
 use crate::human::text::{self, Table, attribute_line, or_none};
 
-/// Tells of the file `points.qbatch`, however it is called.
-pub(super) fn tell(file: &Path) -> Result<Told, Failure> {
+/// Describes the file `points.qbatch`; its name does not matter.
+pub(super) fn describe(file: &Path) -> Result<Description, Failure> {
     let batches = Batches::map(file)?;
-    let size = file.metadata().map_err(|e| Failure::io(file, "looking at its size", &e))?.len();
-    Ok(Told { text: text(file, &batches, size), json: json(file, &batches, size), fault: None })
+    let size = file.metadata().map_err(|e| Failure::io(file, "reading its size", &e))?.len();
+    Ok(Description { text: text(file, &batches, size), json: json(file, &batches, size), fault: None })
 }
 
 /// Longest side of the largest box, world units.
@@ -32,7 +32,7 @@ fn text<B: AsRef<[u8]>>(file: &Path, batches: &Batches<B>, size: u64) -> String 
     let (header, description) = (batches.header(), batches.description());
     let mut t = Table::about(file);
     let sections = if batches.is_compressed() { ", sections compressed" } else { "" };
-    t.row("format", format!("quantised batches, {} bits a coordinate{sections}", header.precision().bits()));
+    t.row("format", format!("quantised batches, {} bits per coordinate{sections}", header.precision().bits()));
     t.row("name", &description.name);
     t.row("points", format!("{} in {}", count(header.points), text::batches(u64::from(header.batches))));
     if header.points > 0 {

@@ -1,4 +1,4 @@
-//! What a mean-split binary tree is: its header, and its leaves.
+//! Describes a mean-split binary tree: its header and leaves.
 
 use std::path::Path;
 
@@ -6,18 +6,18 @@ use pointmill_format::bintree::{Bintree, Header};
 use pointmill_format::{Aabb, Attribute};
 use serde_json::{Value, json};
 
-use super::description::{Told, attribute_json, corners};
+use super::description::{Description, attribute_json, corners};
 use crate::exit::Failure;
 use crate::human::quantities::{bytes, count, number, numbers, plural};
 use crate::human::text::{self, Table, attribute_line, or_none};
 
-/// Tells of the dataset that `index` (its `index.json`) belongs to.
-pub(super) fn tell(index: &Path) -> Result<Told, Failure> {
+/// Describes the dataset that `index` (its `index.json`) belongs to.
+pub(super) fn describe(index: &Path) -> Result<Description, Failure> {
     let folder = index.parent().unwrap_or(index);
     let tree = Bintree::open(folder)?;
     let facts = Facts::of(&tree);
     let header = tree.header();
-    Ok(Told { text: text(folder, header, &facts), json: json(folder, header, &facts), fault: None })
+    Ok(Description { text: text(folder, header, &facts), json: json(folder, header, &facts), fault: None })
 }
 
 /// Figures of the nodes.
@@ -72,9 +72,9 @@ fn text(folder: &Path, header: &Header, facts: &Facts) -> String {
         let (least, most) = (count(facts.smallest), plural(facts.largest, "point"));
         let mean = number((header.points as f64 / facts.leaves as f64).round());
         let allowed = count(header.capacity);
-        t.row("leaves", format!("{} of {least} to {most}, {mean} on average, {allowed} allowed", count(facts.leaves)));
+        t.row("leaves", format!("{} of {least} to {most}, {mean} on average, maximum {allowed}", count(facts.leaves)));
     }
-    t.row("size", format!("{} in leaves, {} bytes a point", bytes(leaf_bytes(header)), header.record.stride()));
+    t.row("size", format!("{} in leaves, {} bytes per point", bytes(leaf_bytes(header)), header.record.stride()));
     for (i, attribute) in attributes(header).iter().enumerate() {
         t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, None));
     }

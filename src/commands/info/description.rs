@@ -5,11 +5,11 @@ use serde_json::{Value, json};
 
 use crate::exit::Failure;
 
-/// What there is to say about a scan or a dataset.
-pub(super) struct Told {
+/// What is printed about a scan or a dataset.
+pub(super) struct Description {
     pub(super) text: String,
     pub(super) json: Value,
-    /// What kept the rest from being told; the other two hold what could be.
+    /// The error that ended the description early; the other two fields hold what was read before it.
     pub(super) fault: Option<Failure>,
 }
 

@@ -1,4 +1,4 @@
-//! What decoding every point tells: the true count, bounds, and range of each attribute.
+//! The true point count, bounds, and range of each attribute, from decoding every point.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;

@@ -1,4 +1,4 @@
-//! `pointmill info`: what scans and datasets are.
+//! `pointmill info`: describes scans and datasets.
 
 mod batches;
 mod bintree;
@@ -9,22 +9,22 @@ mod scan;
 
 use std::path::Path;
 
-use description::Told;
+use description::Description;
 use pointmill_format::{DatasetKind, Located, locate};
 use serde_json::Value;
 
 use crate::args::InfoArgs;
 use crate::datasets;
-use crate::exit::{Failure, emit, tell};
+use crate::exit::{Failure, emit, print_line};
 use crate::inputs;
 
-/// Tells of a dataset; each kind has a file here.
-fn tell_dataset(dataset: &Located) -> Result<Told, Failure> {
+/// Describes a dataset; each kind has a file here.
+fn describe_dataset(dataset: &Located) -> Result<Description, Failure> {
     let marker = dataset.marker_path();
     match dataset.kind {
-        DatasetKind::Potree2 => potree2::tell(&marker),
-        DatasetKind::Bintree => bintree::tell(&marker),
-        DatasetKind::Batches => batches::tell(&marker),
+        DatasetKind::Potree2 => potree2::describe(&marker),
+        DatasetKind::Bintree => bintree::describe(&marker),
+        DatasetKind::Batches => batches::describe(&marker),
         other => Err(Failure::Usage(format!("{}: info does not read datasets of kind {other}", marker.display()))),
     }
 }
@@ -34,14 +34,14 @@ fn datasets(path: &Path) -> Vec<Located> {
     locate(path).map_or_else(|_| datasets::inside(path), |one| vec![one])
 }
 
-/// Every path is told of; the exit code is that of the first that could not be.
+/// Describes every path; the exit code is that of the first failure.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let options = args.reading.options()?;
     let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };
     for path in &args.paths {
         let datasets = datasets(path);
         for dataset in &datasets {
-            out.show(tell_dataset(dataset))?;
+            out.show(describe_dataset(dataset))?;
         }
         if !datasets.is_empty() {
             continue;
@@ -49,9 +49,9 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         match inputs::expand(std::slice::from_ref(path), &options) {
             Err(failure) => out.fail(failure),
             Ok(found) => {
-                found.notes.iter().for_each(|note| tell(note));
+                found.notes.iter().for_each(|note| print_line(note));
                 for file in &found.files {
-                    out.show(scan::tell(file, &options, args.deep))?;
+                    out.show(scan::describe(file, &options, args.deep))?;
                 }
             }
         }
@@ -62,7 +62,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     out.first_failure.map_or(Ok(()), Err)
 }
 
-/// What was told so far.
+/// The output so far.
 struct Output {
     json: bool,
     objects: Vec<Value>,
@@ -70,9 +70,9 @@ struct Output {
 }
 
 impl Output {
-    fn show(&mut self, told: Result<Told, Failure>) -> Result<(), Failure> {
-        match told {
-            Ok(Told { text, json, fault }) => {
+    fn show(&mut self, description: Result<Description, Failure>) -> Result<(), Failure> {
+        match description {
+            Ok(Description { text, json, fault }) => {
                 if self.json {
                     self.objects.push(json);
                 } else {
@@ -85,11 +85,11 @@ impl Output {
         Ok(())
     }
 
-    /// Failures are told as they are met, save the first, which is left to `main` and gives the exit code.
+    /// Reports failures as they occur, except the first, which `main` reports and which gives the exit code.
     fn fail(&mut self, failure: Failure) {
         match self.first_failure {
             None => self.first_failure = Some(failure),
-            Some(_) => failure.tell(),
+            Some(_) => failure.print(),
         }
     }
 }

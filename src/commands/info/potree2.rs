@@ -1,4 +1,4 @@
-//! What a Potree 2.0 dataset is: its metadata, and its hierarchy by level.
+//! Describes a Potree 2.0 dataset: its metadata, and its hierarchy per level.
 
 use std::path::Path;
 
@@ -6,20 +6,20 @@ use pointmill_format::ReadError;
 use pointmill_format::potree2::{Dataset, Metadata, Node};
 use serde_json::{Value, json};
 
-use super::description::{Told, attribute_json, corners};
+use super::description::{Description, attribute_json, corners};
 use crate::exit::Failure;
 use crate::human::quantities::{bytes, count, number, numbers, plural};
 use crate::human::text::{self, Table, attribute_line, or_none};
 
-/// Tells of the dataset that `metadata` (its `metadata.json`) belongs to.
-pub(super) fn tell(metadata: &Path) -> Result<Told, Failure> {
+/// Describes the dataset that `metadata` (its `metadata.json`) belongs to.
+pub(super) fn describe(metadata: &Path) -> Result<Description, Failure> {
     let folder = metadata.parent().unwrap_or(metadata);
     let dataset = Dataset::open(folder)?;
     let metadata = dataset.metadata();
     let levels = levels(&dataset.read_hierarchy()?);
     let size_bytes = size_of_files(folder)?;
     let text = text(folder, metadata, &levels, size_bytes);
-    Ok(Told { text, json: json(folder, metadata, &levels, size_bytes), fault: None })
+    Ok(Description { text, json: json(folder, metadata, &levels, size_bytes), fault: None })
 }
 
 /// Nodes and points of each level.
@@ -37,7 +37,7 @@ fn levels(nodes: &[Node]) -> Vec<[u64; 2]> {
 fn size_of_files(folder: &Path) -> Result<u64, Failure> {
     let size = |name: &str| {
         let path = folder.join(name);
-        path.metadata().map(|m| m.len()).map_err(|e| ReadError::io(&path, "looking at its size", e).into())
+        path.metadata().map(|m| m.len()).map_err(|e| ReadError::io(&path, "reading its size", e).into())
     };
     ["metadata.json", "hierarchy.bin", "octree.bin"].into_iter().map(size).sum()
 }
@@ -55,7 +55,7 @@ fn text(folder: &Path, metadata: &Metadata, levels: &[[u64; 2]], size_bytes: u64
     t.row("cube", text::corners(&metadata.cube.min, &metadata.cube.max));
     let lattice = &metadata.lattice;
     t.row("lattice", format!("step {}, offset {}", numbers(&lattice.scale), numbers(&lattice.offset)));
-    t.row("spacing", format!("{} at the root, half of it at each level below", number(metadata.spacing)));
+    t.row("spacing", format!("{} at the root, halved per level", number(metadata.spacing)));
     t.row("CRS", or_none(&metadata.projection));
     t.row("size", bytes(size_bytes));
     for (level, [nodes, points]) in levels.iter().enumerate() {

@@ -1,28 +1,28 @@
-//! What a scan is: what its header says and, if its points are decoded, what they say.
+//! Describes a scan: its header and, if its points are decoded, their count, bounds and ranges.
 
 use std::path::Path;
 
 use pointmill_format::{OpenOptions, Resolution, Scan, ScanInfo, ScanPart};
 use serde_json::{Map, Value, json};
 
-use super::description::{Told, attribute_json, corners};
+use super::description::{Description, attribute_json, corners};
 use super::measure::{Measured, measure};
 use crate::exit::Failure;
 use crate::human::quantities::{bytes, count, number, numbers, plural};
 use crate::human::text::{self, Table, attribute_line};
 
-/// Scans of a file that are named one by one for people; JSON names all.
+/// Maximum scans of a file that are listed as text; JSON lists all.
 const MAX_PARTS: usize = 30;
 
-/// Tells of a scan; `deep`: decodes its points, too.
-pub(super) fn tell(file: &Path, options: &OpenOptions, deep: bool) -> Result<Told, Failure> {
+/// Describes a scan, with `deep` also its points.
+pub(super) fn describe(file: &Path, options: &OpenOptions, deep: bool) -> Result<Description, Failure> {
     let scan = pointmill_format::open_scan(file, options)?;
     let (measured, fault) = match deep.then(|| measure(&*scan)) {
         Some((measured, fault)) => (Some(measured), fault.map(Failure::from)),
         None => (None, None),
     };
     let measured = measured.as_ref();
-    Ok(Told { text: text(&*scan, measured), json: json(&*scan, measured), fault })
+    Ok(Description { text: text(&*scan, measured), json: json(&*scan, measured), fault })
 }
 
 fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
@@ -30,7 +30,7 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
     let mut t = Table::about(&info.path);
     t.row("format", &info.format);
     t.row("points", count(info.points_declared));
-    let declared = info.bounds_declared.map_or_else(|| "not told".to_owned(), |b| text::corners(&b.min, &b.max));
+    let declared = info.bounds_declared.map_or_else(|| "not declared".to_owned(), |b| text::corners(&b.min, &b.max));
     t.row("bounds", declared);
     if let Some(measured) = measured {
         let invalid = match measured.invalid {
@@ -52,7 +52,7 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
         t.row(if i == 0 { "scans" } else { "" }, part_line(i, part));
     }
     if let Some(more @ 1..) = info.parts.len().checked_sub(MAX_PARTS) {
-        t.row("", format!("and {}; --json names all", plural(more as u64, "more scan")));
+        t.row("", format!("and {}; --json lists all", plural(more as u64, "more scan")));
     }
     for (i, attribute) in info.attributes.iter().enumerate() {
         let ranges = measured.map(|m| m.ranges[i].as_slice());
@@ -62,7 +62,7 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
     t.0
 }
 
-/// How finely coordinates are stored, and what that means where the points are.
+/// The precision of stored coordinates, as the step at the far ends of the bounds.
 fn resolution(info: &ScanInfo, measured: Option<&Measured>) -> String {
     match info.resolution {
         Resolution::Step(step) => format!("stored in steps of {}", number(step)),
@@ -70,7 +70,7 @@ fn resolution(info: &ScanInfo, measured: Option<&Measured>) -> String {
         Resolution::Single => {
             let measured = measured.map(|m| m.bounds).filter(|b| !b.is_empty());
             match measured.or(info.bounds_declared) {
-                None => "stored in single precision; --deep tells what that means where the points are".to_owned(),
+                None => "stored in single precision; --deep reports the step at the far ends".to_owned(),
                 Some(b) => {
                     let steps = [0, 1, 2].map(|a| single_step(b.min[a].abs().max(b.max[a].abs())));
                     format!("stored in single precision: steps of {} at the far ends", numbers(&steps))
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rotations_are_told_by_angle_and_axis() {
+    fn rotations_are_described_by_angle_and_axis() {
         assert_eq!(turn(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), "");
         assert_eq!(turn(&[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), ", turned by 90° about 0 0 1");
         assert_eq!(turn(&[[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]), ", turned by 180° about 0 0 1");
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn single_precision_is_told_as_steps() {
+    fn single_precision_is_described_as_steps() {
         assert_eq!(
             [single_step(0.6), single_step(500_000.0), single_step(5_400_000.0)],
             [2f64.powi(-24), 0.03125, 0.5]

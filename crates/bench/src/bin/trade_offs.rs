@@ -94,12 +94,12 @@ fn batch_rows(scene: Scene, file: &Path, dir: &Path) -> Result<String, Box<dyn s
     let mut rows = String::new();
     let settings = |planes, originals| BatchesSettings { lod_cell: None, planes, originals, ..Default::default() };
     let (_, out) = make(file, dir, settings(None, true).into())?;
-    let auto = Batches::read(&out.join("points.qbatch"))?.header().precision().planes();
+    let auto = Batches::open(out.join("points.qbatch"))?.header().precision().planes();
     for planes in 1..=3u8 {
         eprintln!("{}: {planes} planes", scene.name());
         let (bare, _) = make(file, dir, settings(Some(planes), false).into())?;
         let (full, out) = make(file, dir, settings(Some(planes), true).into())?;
-        let batches = Batches::read(&out.join("points.qbatch"))?;
+        let batches = Batches::open(out.join("points.qbatch"))?;
         let errors = batches.description().errors;
         let figures = [errors.ten, errors.twenty, errors.thirty][usize::from(planes) - 1].unwrap_or_default();
         let worst = |pick: fn(&ErrorFigures) -> [f64; 3]| pick(&figures).into_iter().fold(0.0, f64::max);

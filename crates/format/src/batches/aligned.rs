@@ -17,16 +17,23 @@ impl AlignedBytes {
     ///
     /// # Errors
     /// The file cannot be read, or does not fit memory.
-    pub fn read(path: &Path) -> Result<Self, ReadError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let path = path.as_ref();
         let io = |doing: &'static str| move |e| ReadError::io(path, doing, e);
         let mut file = std::fs::File::open(path).map_err(io("opening"))?;
         let size = file.metadata().map_err(io("asking for the size"))?.len();
+        let mut bytes = Self::with_size(size, path)?;
+        file.read_exact(bytes.as_mut()).map_err(io("reading"))?;
+        Ok(bytes)
+    }
+
+    /// Zeros of that size; `path` is for messages.
+    pub(crate) fn with_size(size: u64, path: &Path) -> Result<Self, ReadError> {
         let mut bytes = Self::default();
         usize::try_from(size).ok().and_then(|len| bytes.try_resize(len).ok()).ok_or_else(|| {
             let what = format!("{size} bytes do not fit memory");
             ReadError::unsupported(path, what).advise("map the file instead of reading it (feature mmap)")
         })?;
-        file.read_exact(bytes.as_mut()).map_err(io("reading"))?;
         Ok(bytes)
     }
 

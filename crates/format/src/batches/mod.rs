@@ -3,11 +3,12 @@
 //! Points stand in Morton order in batches of 10,240, every second batch swapped with its mirror; positions are three
 //! planes of 10 bits an axis inside the batch's box; colours carry a level of detail.
 //!
-//! ```no_run
+//! ```
 //! use pointmill_format::batches::{Batches, Precision};
 //!
 //! # fn main() -> Result<(), pointmill_format::ReadError> {
-//! let batches = Batches::read("city/points.qbatch".as_ref())?; // `Batches::map` with the feature `mmap`
+//! let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/batches/example.qbatch");
+//! let batches = Batches::open(file)?; // `Batches::map` with the feature `mmap`
 //! for record in batches.records() {
 //!     println!("{} points from {}, box {:?} to {:?}", record.points, record.first_point, record.min, record.max);
 //! }
@@ -63,10 +64,12 @@ pub use error::WriteError;
 pub use grid::{Grid, LOD_LEVELS, f32_above, f32_below};
 pub use header::{Flags, Header, Sections};
 pub use layout::{Finish, Layout, Section};
+#[cfg(feature = "mmap")]
+pub use map::MappedFile;
 pub use order::{batch_count, batch_points, swap_slot};
-pub use points::{BatchPoints, Point, PointsInMortonOrder};
+pub use points::{BatchScratch, Point, PointsInMortonOrder};
 pub use precision::{Precision, distance_to_box, focal_pixels, projected_diagonal};
-pub use read::{AttributeValue, Batches, Original, Part};
+pub use read::{Batches, Original, Part};
 pub use record::{BatchRecord, Decoder, planes, quantized};
 pub use write::{Cloud, WriteOptions, Written, write};
 
@@ -92,3 +95,6 @@ pub const MAX_POINTS: u64 = u32::MAX as u64;
 pub(crate) const fn align(offset: u64) -> u64 {
     offset.saturating_add(SECTION_ALIGNMENT - 1) / SECTION_ALIGNMENT * SECTION_ALIGNMENT
 }
+
+/// The file in the folder of a dataset.
+pub const BATCHES_FILE: &str = "points.qbatch";

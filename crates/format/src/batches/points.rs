@@ -1,6 +1,7 @@
 //! Points one by one and batch by batch, decoded.
 
-use crate::ReadError;
+use crate::points::column_bytes;
+use crate::{AttributeType, NodePoints, Positions, ReadError};
 
 use super::{BATCH_POINTS, Batches, BlockScratch, Part, Precision, lod_of, rgb_of};
 
@@ -17,51 +18,101 @@ pub struct Point {
     pub lod: u8,
 }
 
-/// The points of one batch, decoded; reuse one.
+/// Memory that is reused from batch to batch: words of the planes, and blocks of compressed sections.
 #[derive(Debug, Default)]
-pub struct BatchPoints {
-    /// Storage index of the first.
-    pub first_point: u32,
-    /// Positions relative to the grid's origin.
-    pub relative: Vec<[f64; 3]>,
-    /// Colour words.
-    pub colours: Vec<u32>,
+pub struct BatchScratch {
     words: [Vec<u32>; 3],
-    scratch: [BlockScratch; 4],
+    /// Of the three planes, the colours, and then the extra attributes.
+    blocks: Vec<BlockScratch>,
 }
 
 impl<B: AsRef<[u8]>> Batches<B> {
-    /// Decodes one slot into `out`, with the planes of `precision` or as many of them as the file has.
+    /// Decodes one slot, with the planes of `precision` or as many of them as the file has; replaces the contents of
+    /// `out`. Positions are world coordinates. The columns are `colour` (u32: colour words, [`rgb_of`] and [`lod_of`]),
+    /// then [`Self::attributes`].
+    ///
+    /// ```
+    /// use pointmill_format::{NodePoints, batches::{BatchScratch, Batches, Precision, lod_of}};
+    ///
+    /// # fn main() -> Result<(), pointmill_format::ReadError> {
+    /// let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/batches/example.qbatch");
+    /// let batches = Batches::open(file)?;
+    /// let (mut scratch, mut points) = (BatchScratch::default(), NodePoints::default());
+    /// for slot in 0..batches.header().batches {
+    ///     batches.read_batch(slot, Precision::Thirty, &mut scratch, &mut points)?;
+    ///     let colours = points.column::<u32>("colour").unwrap_or(&[]);
+    ///     let coarse = colours.iter().filter(|word| lod_of(**word) == 0).count();
+    ///     println!("{} points, {coarse} of the coarsest level, the first at {:?}", points.len(), points.world(0));
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// As [`Self::batch`].
-    pub fn read_batch(&self, slot: u32, precision: Precision, out: &mut BatchPoints) -> Result<(), ReadError> {
+    pub fn read_batch(
+        &self,
+        slot: u32,
+        precision: Precision,
+        scratch: &mut BatchScratch,
+        out: &mut NodePoints,
+    ) -> Result<(), ReadError> {
+        let colour = std::iter::once(("colour", AttributeType::UInt32));
+        out.reset(colour.chain(self.attributes().map(|a| (a.name.as_str(), a.ty))));
+        out.stored.clear();
+        let mut positions = out.take_world();
+        let decoded = self.decode_positions(slot, precision, scratch, &mut positions);
+        out.positions = Positions::World(positions);
+        decoded?;
+        let attributes = self.attributes().enumerate().map(|(i, a)| (Part::Attribute(i), a.elements, a.size()));
+        let parts = std::iter::once((Part::Colour, 1, 4)).chain(attributes);
+        for ((column, (part, elements, size)), block) in out.columns.iter_mut().zip(parts).zip(&mut scratch.blocks[3..])
+        {
+            column_bytes::append(column, self.batch(part, slot, block)?, size, 0, elements);
+        }
+        Ok(())
+    }
+
+    fn decode_positions(
+        &self,
+        slot: u32,
+        precision: Precision,
+        scratch: &mut BatchScratch,
+        positions: &mut [Vec<f64>; 3],
+    ) -> Result<(), ReadError> {
         let precision = precision.min(self.header().precision());
         let planes = [Part::Hi10, Part::Mid10, Part::Lo10].into_iter().take(precision.planes() as usize);
-        let [scratch @ .., colour_scratch] = &mut out.scratch;
-        out.colours.clear();
-        out.colours.extend_from_slice(self.batch_words(Part::Colour, slot, colour_scratch)?);
-        for words in &mut out.words {
-            words.clear();
+        scratch.blocks.resize_with(4 + self.attributes().len(), BlockScratch::default);
+        scratch.words.iter_mut().for_each(Vec::clear);
+        for ((part, words), block) in planes.zip(&mut scratch.words).zip(&mut scratch.blocks) {
+            words.extend_from_slice(self.batch_words(part, slot, block)?);
         }
-        for ((part, words), scratch) in planes.zip(&mut out.words).zip(scratch) {
-            words.extend_from_slice(self.batch_words(part, slot, scratch)?);
-        }
-        for words in &mut out.words {
-            words.resize(out.colours.len(), 0);
-        }
-        out.first_point = slot * BATCH_POINTS;
-        out.relative.clear();
+        let points = scratch.words[0].len();
+        scratch.words.iter_mut().for_each(|words| words.resize(points, 0));
         let Some(decoder) = self.decoder(slot, precision) else { return Ok(()) };
-        let [hi, mid, lo] = &out.words;
+        let [hi, mid, lo] = &scratch.words;
+        let [xs, ys, zs] = positions;
+        for values in [&mut *xs, &mut *ys, &mut *zs] {
+            values.resize(points, 0.0);
+        }
         let words = hi.iter().zip(mid).zip(lo);
-        out.relative.extend(words.map(|((hi, mid), lo)| decoder.position_of_words(*hi, *mid, *lo)));
+        for (((((hi, mid), lo), x), y), z) in words.zip(xs).zip(ys).zip(zs) {
+            [*x, *y, *z] = self.world(decoder.position_of_words(*hi, *mid, *lo));
+        }
         Ok(())
     }
 
     /// All points in Morton order: swaps undone.
     pub fn points_in_morton_order(&self, precision: Precision) -> PointsInMortonOrder<'_, B> {
-        PointsInMortonOrder { batches: self, precision, next_batch: 0, next_point: 0, points: BatchPoints::default() }
+        PointsInMortonOrder {
+            batches: self,
+            precision,
+            next_batch: 0,
+            next_point: 0,
+            first_point: 0,
+            scratch: BatchScratch::default(),
+            points: NodePoints::default(),
+        }
     }
 
     /// Reads every value of the file and checks what opening does not: originals ascend and belong to points, blocks
@@ -98,7 +149,10 @@ pub struct PointsInMortonOrder<'a, B> {
     /// In Morton order; the one before is in `points`.
     next_batch: u32,
     next_point: usize,
-    points: BatchPoints,
+    /// Storage index of the first of `points`.
+    first_point: u32,
+    scratch: BatchScratch,
+    points: NodePoints,
 }
 
 impl<B: AsRef<[u8]>> Iterator for PointsInMortonOrder<'_, B> {
@@ -106,22 +160,23 @@ impl<B: AsRef<[u8]>> Iterator for PointsInMortonOrder<'_, B> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let batches = self.batches;
-        while self.next_point >= self.points.relative.len() {
+        while self.next_point >= self.points.len() {
             if self.next_batch >= batches.header().batches {
                 return None;
             }
             let slot = batches.swap(self.next_batch);
-            if let Err(e) = batches.read_batch(slot, self.precision, &mut self.points) {
+            if let Err(e) = batches.read_batch(slot, self.precision, &mut self.scratch, &mut self.points) {
                 self.next_batch = u32::MAX;
-                self.points.relative.clear();
+                self.next_point = usize::MAX;
                 return Some(Err(e));
             }
             (self.next_batch, self.next_point) = (self.next_batch + 1, 0);
+            self.first_point = slot * BATCH_POINTS;
         }
         let i = self.next_point;
         self.next_point += 1;
-        let (relative, word) = (self.points.relative[i], self.points.colours[i]);
-        let index = self.points.first_point + i as u32;
-        Some(Ok(Point { index, world: batches.world(relative), rgb: rgb_of(word), lod: lod_of(word) }))
+        let word = self.points.columns().first()?.values::<u32>()?.get(i).copied()?;
+        let (index, world) = (self.first_point + i as u32, self.points.world(i)?);
+        Some(Ok(Point { index, world, rgb: rgb_of(word), lod: lod_of(word) }))
     }
 }

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use bytemuck::{AnyBitPattern, Pod, Zeroable};
 
-use crate::{Attribute, AttributeType, ReadError};
+use crate::bytes::ByteSource;
+use crate::{Attribute, Element, ReadError};
 
 use super::check::{Check, Places};
 use super::header::CORRUPT;
 use super::{
-    AlignedBytes, BATCH_POINTS, BatchRecord, BlockScratch, Decoder, Description, Flags, Header, Precision, Section,
-    rgb_of, swap_slot,
+    AlignedBytes, BATCH_POINTS, BATCHES_FILE, BatchRecord, BlockScratch, Decoder, Description, Flags, Header,
+    Precision, Section, rgb_of, swap_slot,
 };
 
 /// A section with one entry a point.
@@ -35,30 +36,6 @@ pub struct Original {
     pub colour: u32,
 }
 
-/// A type that the values of an attribute can be looked at as.
-pub trait AttributeValue: AnyBitPattern {
-    /// The type of the file.
-    const TYPE: AttributeType;
-}
-
-macro_rules! attribute_values {
-    ($($rust:ty = $stored:ident),*) => {
-        $(impl AttributeValue for $rust { const TYPE: AttributeType = AttributeType::$stored; })*
-    };
-}
-attribute_values!(
-    i8 = Int8,
-    u8 = UInt8,
-    i16 = Int16,
-    u16 = UInt16,
-    i32 = Int32,
-    u32 = UInt32,
-    i64 = Int64,
-    u64 = UInt64,
-    f32 = Float32,
-    f64 = Float64
-);
-
 /// An open file of quantised batches: any bytes that are aligned to 8, a map ([`Batches::map`]) or memory.
 ///
 /// Places and lengths were checked when it was opened. Threads may share it.
@@ -72,13 +49,31 @@ pub struct Batches<B> {
 }
 
 impl Batches<AlignedBytes> {
-    /// Reads a whole file into memory.
+    /// Reads the whole file `path`, or `points.qbatch` in the folder `path`, into memory.
     ///
     /// # Errors
-    /// As [`Self::open_bytes`], and the disk.
-    pub fn read(path: &Path) -> Result<Self, ReadError> {
-        Self::open_bytes(AlignedBytes::read(path)?, path)
+    /// As [`Self::from_bytes`], and those of the operating system.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let path = file_at(path.as_ref());
+        Self::from_bytes(AlignedBytes::read(&path)?, path)
     }
+
+    /// Reads all of `points.qbatch` of a source into memory.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_source(source: impl ByteSource) -> Result<Self, ReadError> {
+        let path = source.locate(BATCHES_FILE);
+        let size = source.size(BATCHES_FILE).map_err(|e| ReadError::io(&path, "opening", e))?;
+        let mut bytes = AlignedBytes::with_size(size, &path)?;
+        source.read_at(BATCHES_FILE, 0, bytes.as_mut()).map_err(|e| ReadError::io(&path, "reading", e))?;
+        Self::from_bytes(bytes, path)
+    }
+}
+
+/// The file that `path` is, or that is in the folder.
+pub(super) fn file_at(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join(BATCHES_FILE) } else { path.to_path_buf() }
 }
 
 impl<B: AsRef<[u8]>> Batches<B> {
@@ -89,7 +84,8 @@ impl<B: AsRef<[u8]>> Batches<B> {
     /// # Errors
     /// What §11 of the format page lists; [`crate::ErrorKind::Unsupported`] on a big-endian host, or if the bytes are not
     /// aligned to 8 ([`AlignedBytes`] and maps are).
-    pub fn open_bytes(bytes: B, path: &Path) -> Result<Self, ReadError> {
+    pub fn from_bytes(bytes: B, path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let path = path.as_ref();
         if cfg!(target_endian = "big") {
             let what = "holds little-endian words, which this big-endian machine cannot use as they stand";
             return Err(ReadError::unsupported(path, what));
@@ -123,7 +119,7 @@ impl<B: AsRef<[u8]>> Batches<B> {
     }
 
     /// Extra attributes, in the order of their sections.
-    pub fn attributes(&self) -> impl ExactSizeIterator<Item = &Attribute> {
+    pub fn attributes(&self) -> impl ExactSizeIterator<Item = &Attribute> + Clone {
         self.places.attributes.iter().map(|(attribute, _)| attribute)
     }
 
@@ -160,7 +156,7 @@ impl<B: AsRef<[u8]>> Batches<B> {
 
     /// The values of attribute `i`, N · elements of them. `None` if there is no such attribute, it is of another type, or
     /// compressed.
-    pub fn attribute<T: AttributeValue>(&self, i: usize) -> Option<&[T]> {
+    pub fn attribute<T: Element>(&self, i: usize) -> Option<&[T]> {
         let (attribute, section) = self.places.attributes.get(i)?;
         (attribute.ty == T::TYPE && !self.is_compressed()).then(|| cast(self.range(*section)))
     }

@@ -70,7 +70,7 @@ pub struct Written {
 /// let mut file = std::io::Cursor::new(Vec::new());
 /// write(&mut file, &cloud, &WriteOptions::new(lattice))?;
 ///
-/// let batches = Batches::open_bytes(AlignedBytes::from(file.get_ref().as_slice()), "points.qbatch".as_ref())?;
+/// let batches = Batches::from_bytes(AlignedBytes::from(file.get_ref().as_slice()), "points.qbatch")?;
 /// assert_eq!((batches.header().points, batches.records()[0].points), (3, 3));
 /// # Ok(())
 /// # }

@@ -1,18 +1,21 @@
 //! Mean-split binary trees: all points in leaves, tight boxes at every node (`docs/formats/bintree.md`).
 //!
-//! [`Bintree`] opens a dataset from a folder or from any [`ByteSource`] and keeps its nodes in memory, about 100 bytes
-//! each; leaves are read one by one into [`LeafPoints`].
+//! [`Bintree`] opens a dataset from a folder or from any [`ByteSource`](crate::bytes::ByteSource) and keeps its nodes in
+//! memory, about 100 bytes each; leaves are read one by one into [`NodePoints`](crate::NodePoints).
 //!
-//! ```no_run
-//! use pointmill_format::bintree::{Bintree, LeafPoints};
+//! ```
+//! use pointmill_format::{NodePoints, bintree::Bintree};
 //!
 //! # fn main() -> Result<(), pointmill_format::ReadError> {
-//! let tree = Bintree::open("clouds/line 12".as_ref())?;
-//! let mut points = LeafPoints::default();
+//! let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/bintree/files");
+//! let tree = Bintree::open(folder)?;
+//! let (mut points, mut total) = (NodePoints::default(), 0);
 //! for leaf in tree.leaves() {
 //!     tree.read_leaf(leaf, &mut points)?;
 //!     println!("{}: {} points, the first at {:?}", tree.leaf_name(leaf), points.len(), points.world(0));
+//!     total += points.len() as u64;
 //! }
+//! assert_eq!(total, tree.header().points);
 //! # Ok(())
 //! # }
 //! ```
@@ -23,7 +26,6 @@
 
 mod camera;
 mod encode;
-mod exercise;
 mod header;
 mod json;
 mod leaf_cache;
@@ -37,21 +39,16 @@ mod query;
 mod read_header;
 mod read_index;
 mod record_layout;
-mod source;
 mod tree;
 mod write_index;
 
 pub use camera::{Frustum, Material, distance_range, switch_distance};
 pub use encode::{LeafEncoder, class_value, leaf_center};
-#[doc(hidden)]
-pub use exercise::exercise;
 pub use header::{Header, Layout, SplitRule};
-pub use leaf_points::LeafPoints;
 #[cfg(feature = "rstar")]
 pub use nearest::{LeafBox, NearestPoints, Neighbour};
 pub use node::{INDEX_FILE, MAX_DEPTH, Node, NodeKind, PACKED_FILE, leaf_file_name};
 pub use pick::{Hit, Picker, Ray};
 pub use record_layout::{CORE_BYTES, PlacedAttribute, RecordLayout};
-pub use source::{ByteSource, Folder, Memory};
 pub use tree::Bintree;
 pub use write_index::IndexWriter;

@@ -102,17 +102,21 @@ pub struct Hit {
 
 /// Finds the points that rays meet, and keeps leaves in memory from pick to pick.
 ///
-/// ```no_run
-/// use pointmill_format::bintree::{Bintree, Picker, Ray};
+/// ```
+/// use pointmill_format::{NodePoints, bintree::{Bintree, Picker, Ray}};
 /// use std::sync::Arc;
 ///
-/// # fn main() -> Result<(), pointmill_format::ReadError> {
-/// let tree = Arc::new(Bintree::open("clouds/line 12".as_ref())?);
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let tree = Arc::new(Bintree::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/bintree/packed"))?);
+/// let (mut points, leaf) = (NodePoints::default(), tree.leaves().next().ok_or("no leaves")?);
+/// tree.read_leaf(leaf, &mut points)?;
+/// let [x, y, z] = points.world(0).ok_or("no points")?;
+///
 /// let mut picker = Picker::new(tree, 512 << 20);
-/// let ray = Ray::new([0.0, 0.0, 100.0], [0.3, 0.1, -1.0], 0.05);
-/// if let Some(hit) = ray.map(|ray| picker.pick(&ray)).transpose()?.flatten() {
-///     println!("{:?} of class {}", hit.position, hit.class);
-/// }
+/// let from_above = Ray::new([x, y, z + 100.0], [0.0, 0.0, -1.0], 0.05).ok_or("not a ray")?;
+/// let hit = picker.pick(&from_above)?.ok_or("nothing under the cursor")?;
+/// assert!(hit.distance <= 100.0 && hit.off_ray <= 0.05);
+/// println!("{:?} of class {}", hit.position, hit.class);
 /// # Ok(())
 /// # }
 /// ```

@@ -1,10 +1,10 @@
 //! Which leaves a renderer or a tool wants. All of it relies on boxes being what the format promises: unions of those
 //! below.
 
-use crate::{Aabb, ReadError};
+use crate::{Aabb, NodePoints, ReadError};
 
 use super::camera::{Frustum, Material, distance_range};
-use super::{Bintree, LeafPoints, Node};
+use super::{Bintree, Node};
 
 impl Bintree {
     /// The leaves of which something may be in sight, in preorder.
@@ -41,8 +41,8 @@ impl Bintree {
     pub fn points_in_box(
         &self,
         bounds: &Aabb,
-        scratch: &mut LeafPoints,
-        mut tell: impl FnMut(u32, &LeafPoints, usize),
+        scratch: &mut NodePoints,
+        mut tell: impl FnMut(u32, &NodePoints, usize),
     ) -> Result<(), ReadError> {
         for leaf in self.leaves_in_box(bounds) {
             self.read_leaf(leaf, scratch)?;

@@ -4,7 +4,8 @@ use super::json::{Fault, Json};
 use super::node::{INDEX_FILE, MAX_DEPTH};
 use super::preorder::Preorder;
 use super::read_header::{HeaderText, known_key};
-use super::{ByteSource, Header, Layout, Node, NodeKind};
+use super::{Header, Layout, Node, NodeKind};
+use crate::bytes::ByteSource;
 use crate::{Aabb, ReadError};
 
 /// The header and all nodes in preorder. Memory: that of the nodes; the text is not kept.

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::ReadError;
+use crate::bytes::{ByteSource, Folder};
+use crate::{NodePoints, ReadError};
 
 use super::read_index::read_index;
-use super::{ByteSource, Folder, Header, LeafPoints, Node, NodeKind, PACKED_FILE, leaf_file_name};
+use super::{Header, INDEX_FILE, Node, NodeKind, PACKED_FILE, leaf_file_name, leaf_points};
 
 /// A mean-split binary tree: its index in memory, its leaves where they are. Threads may share it; reading a leaf keeps
 /// nothing.
@@ -18,22 +19,22 @@ pub struct Bintree {
 }
 
 impl Bintree {
-    /// Opens the dataset in `folder` (or beside the `index.json` that is named) and reads its index, flat or nested.
+    /// Opens the dataset in the folder `path` (or beside the `index.json` that is named) and reads its index, flat or nested.
     ///
     /// # Errors
     /// A missing file; an index that section 9 of `docs/formats/bintree.md` refuses, with the byte; byte ranges that
     /// leave `leaves.bin` or overlap.
-    pub fn open(folder: &Path) -> Result<Self, ReadError> {
-        Self::from_source(Box::new(Folder::new(folder)))
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        Self::from_source(Folder::with_marker(path.as_ref(), INDEX_FILE))
     }
 
     /// Opens a dataset wherever its bytes are.
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub fn from_source(source: Box<dyn ByteSource>) -> Result<Self, ReadError> {
-        let (header, nodes) = read_index(source.as_ref())?;
-        let tree = Self { source, header, nodes };
+    pub fn from_source(source: impl ByteSource + 'static) -> Result<Self, ReadError> {
+        let (header, nodes) = read_index(&source)?;
+        let tree = Self { source: Box::new(source), header, nodes };
         tree.check_ranges()?;
         Ok(tree)
     }
@@ -92,7 +93,7 @@ impl Bintree {
     pub fn read_leaf_bytes(&self, index: u32, out: &mut Vec<u8>) -> Result<(), ReadError> {
         let Some(&Node { kind: NodeKind::Leaf { start, .. }, count, .. }) = self.node(index) else {
             let what = format!("node {index} is no leaf: it has no points of its own");
-            return Err(ReadError::unsupported(self.locate(super::INDEX_FILE), what));
+            return Err(ReadError::unsupported(self.locate(INDEX_FILE), what));
         };
         out.clear();
         let file = if start.is_some() { PACKED_FILE.to_owned() } else { self.leaf_name(index) };
@@ -116,15 +117,18 @@ impl Bintree {
         self.source.read_at(&file, start, out).map_err(io)
     }
 
-    /// Reads the points of a leaf; replaces the contents of `out`.
+    /// Reads the points of a leaf; replaces the contents of `out`. Positions are world coordinates in double, as the
+    /// index's boxes are, which contain them exactly. The columns are `classification` (float: whole numbers, if
+    /// pointmill wrote them), then those of [`super::RecordLayout::extras`].
     ///
     /// # Errors
     /// As [`Self::read_leaf_bytes`].
-    pub fn read_leaf(&self, index: u32, out: &mut LeafPoints) -> Result<(), ReadError> {
-        out.reset(&self.header.record);
-        self.read_leaf_bytes(index, &mut out.bytes)?;
+    pub fn read_leaf(&self, index: u32, out: &mut NodePoints) -> Result<(), ReadError> {
+        let record = &self.header.record;
+        leaf_points::reset(out, record);
+        self.read_leaf_bytes(index, &mut out.stored)?;
         if let Some(Node { kind: NodeKind::Leaf { center, .. }, .. }) = self.node(index) {
-            out.fill(&self.header.record, *center);
+            leaf_points::fill(out, record, *center);
         }
         Ok(())
     }
@@ -168,7 +172,7 @@ const COPY_AGAIN: &str = "the file was cut short or belongs to another dataset; 
 
 impl std::fmt::Debug for Bintree {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let at = self.locate(super::INDEX_FILE);
+        let at = self.locate(INDEX_FILE);
         f.debug_struct("Bintree").field("at", &at).field("nodes", &self.nodes.len()).finish_non_exhaustive()
     }
 }

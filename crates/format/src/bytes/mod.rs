@@ -1,7 +1,12 @@
-//! Positioned reads and writes: any number of threads share one open file without a cursor.
+//! Where bytes come from: sources of a dataset's files, and positioned reads and writes of open files, which any number
+//! of threads share without a cursor.
+
+mod source;
 
 use std::fs::File;
 use std::io;
+
+pub use source::{ByteSource, Folder, Memory};
 
 /// Fills `buf` with the bytes of `file` from `offset` on.
 ///

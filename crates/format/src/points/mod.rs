@@ -3,7 +3,12 @@
 mod attribute;
 mod batch;
 mod column;
+pub(crate) mod column_bytes;
+mod element;
+mod node_points;
 
 pub use attribute::{Attribute, AttributeType};
 pub use batch::{PointBatch, Positions};
 pub use column::Column;
+pub use element::Element;
+pub use node_points::NodePoints;

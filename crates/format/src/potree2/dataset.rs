@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
-use crate::{NodeKey, ReadError};
+use crate::bytes::{ByteSource, Folder};
+use crate::{NodeKey, NodePoints, Positions, ReadError};
 
 use super::brotli::{self, Fault};
 use super::chunk::{self, ChunkRanges};
 use super::morton::breadth_first_rank;
-use super::{ByteSource, DatasetFile, Encoding, Folder, Metadata, Node, NodePoints, NodeRecord};
+use super::{Encoding, HIERARCHY_FILE, METADATA_FILE, Metadata, Node, NodeRecord, OCTREE_FILE, node_points};
 
 /// More JSON than this is not metadata.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
@@ -30,32 +31,36 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Opens the dataset in `folder` (or beside the `metadata.json` that is named) and reads its metadata.
+    /// Opens the dataset in the folder `path` (or beside the `metadata.json` that is named) and reads its metadata.
     ///
     /// # Errors
-    /// A missing file, or what [`Metadata::from_json`] has to say.
-    pub fn open(folder: &Path) -> Result<Self, ReadError> {
-        let named_metadata = folder.file_name().is_some_and(|n| n == "metadata.json");
-        let folder = if named_metadata { folder.parent().unwrap_or(folder) } else { folder };
-        Self::from_source(Box::new(Folder::open(folder)?))
+    /// A missing file, or those of [`Metadata::from_json`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        Self::from_source(Folder::with_marker(path.as_ref(), METADATA_FILE))
     }
 
     /// Opens a dataset wherever its bytes are.
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub fn from_source(source: Box<dyn ByteSource>) -> Result<Self, ReadError> {
-        let size = |file| source.size(file).map_err(|e| ReadError::io(source.locate(file), "asking for the size", e));
-        let path = source.locate(DatasetFile::Metadata);
-        let metadata_bytes = size(DatasetFile::Metadata)?;
+    pub fn from_source(source: impl ByteSource + 'static) -> Result<Self, ReadError> {
+        let size = |file| {
+            source.size(file).map_err(|e| {
+                ReadError::io(source.locate(file), "opening", e)
+                    .advise("a Potree 2.0 dataset is a folder with metadata.json, hierarchy.bin and octree.bin")
+            })
+        };
+        let path = source.locate(METADATA_FILE);
+        let metadata_bytes = size(METADATA_FILE)?;
+        let (hierarchy_bytes, octree_bytes) = (size(HIERARCHY_FILE)?, size(OCTREE_FILE)?);
         if metadata_bytes > MAX_METADATA_BYTES {
             let what = format!("{metadata_bytes} bytes are too many for metadata (at most {MAX_METADATA_BYTES})");
             return Err(ReadError::broken(path, None, what));
         }
-        let (hierarchy_bytes, octree_bytes) = (size(DatasetFile::Hierarchy)?, size(DatasetFile::Octree)?);
         let mut bytes = vec![0; metadata_bytes as usize];
-        source.read_at(DatasetFile::Metadata, 0, &mut bytes).map_err(|e| ReadError::io(&path, "reading", e))?;
+        source.read_at(METADATA_FILE, 0, &mut bytes).map_err(|e| ReadError::io(&path, "reading", e))?;
         let metadata = Metadata::from_json(&bytes, &path)?;
+        let source = Box::new(source);
         Ok(Self { source, metadata, hierarchy_bytes, octree_bytes, max_node_bytes: MAX_NODE_BYTES })
     }
 
@@ -75,7 +80,7 @@ impl Dataset {
     }
 
     /// What a file of the dataset is called in messages.
-    pub fn locate(&self, file: DatasetFile) -> PathBuf {
+    pub fn locate(&self, file: &str) -> PathBuf {
         self.source.locate(file)
     }
 
@@ -92,7 +97,7 @@ impl Dataset {
     /// # Errors
     /// A range outside the file, or records that do not form a tree.
     pub fn read_chunk(&self, root: NodeKey, byte_offset: u64, byte_size: u64) -> Result<Vec<Node>, ReadError> {
-        let file = DatasetFile::Hierarchy;
+        let file = HIERARCHY_FILE;
         self.check_range(file, byte_offset, byte_size, || format!("the hierarchy chunk of {root}"))?;
         let path = self.locate(file);
         let mut bytes = vec![0; as_len(byte_size, &path)?];
@@ -113,7 +118,7 @@ impl Dataset {
     /// # Errors
     /// As [`Self::read_chunk`]; chunks that overlap (and so also proxies that go round in circles).
     pub fn read_hierarchy(&self) -> Result<Vec<Node>, ReadError> {
-        let path = self.locate(DatasetFile::Hierarchy);
+        let path = self.locate(HIERARCHY_FILE);
         let mut ranges = ChunkRanges::default();
         let mut nodes = Vec::new();
         let mut queue = VecDeque::from([(NodeKey::ROOT, 0, self.metadata.first_chunk_size)]);
@@ -140,7 +145,7 @@ impl Dataset {
     /// A proxy (load its chunk first), or a range outside `octree.bin`.
     pub fn read_payload(&self, node: &Node, out: &mut Vec<u8>) -> Result<(), ReadError> {
         let Node { key, record } = *node;
-        let path = self.locate(DatasetFile::Octree);
+        let path = self.locate(OCTREE_FILE);
         if record.is_proxy() {
             let what = format!("node {key} is a proxy: its payload is told by its own hierarchy chunk");
             return Err(ReadError::unsupported(path, what));
@@ -149,9 +154,9 @@ impl Dataset {
         if record.byte_size == 0 {
             return Ok(());
         }
-        self.check_range(DatasetFile::Octree, record.byte_offset, record.byte_size, || format!("node {key}"))?;
+        self.check_range(OCTREE_FILE, record.byte_offset, record.byte_size, || format!("node {key}"))?;
         out.resize(as_len(record.byte_size, &path)?, 0);
-        let read = self.source.read_at(DatasetFile::Octree, record.byte_offset, out);
+        let read = self.source.read_at(OCTREE_FILE, record.byte_offset, out);
         read.map_err(|e| ReadError::io(path, &format!("reading node {key}"), e))
     }
 
@@ -161,22 +166,29 @@ impl Dataset {
     /// # Errors
     /// As [`Self::read_payload`]; a payload that does not hold just as many points as the record says.
     pub fn read_points(&self, node: &Node, out: &mut NodePoints) -> Result<(), ReadError> {
-        out.reset(&self.metadata);
-        let mut stored = std::mem::take(&mut out.stored);
-        let read = self.read_payload(node, &mut stored);
-        out.stored = stored;
-        read?;
+        let columns = self.metadata.attributes.iter().map(|a| &a.attribute).filter(|a| a.name != "position");
+        out.reset(columns.map(|a| (a.name.as_str(), a.ty)));
+        let mut positions = out.take_quantized();
+        let filled = self.fill(node, &mut positions, out);
+        out.positions = Positions::Quantized(positions);
+        out.lattice = self.metadata.lattice;
+        filled
+    }
+
+    fn fill(&self, node: &Node, positions: &mut [Vec<i32>; 3], out: &mut NodePoints) -> Result<(), ReadError> {
+        self.read_payload(node, &mut out.stored)?;
         if out.stored.is_empty() {
             return Ok(());
         }
         match self.metadata.encoding {
             Encoding::Default => {
                 self.check_record_count(node)?;
-                out.fill_from_records(&self.metadata);
+                node_points::fill_from_records(&out.stored, &self.metadata, positions, &mut out.columns);
             }
             Encoding::Brotli => {
-                self.decompress(node, out)?;
-                out.fill_from_planes(&self.metadata, node.record.points as usize);
+                self.decompress(node, &out.stored, &mut out.unpacked)?;
+                let points = node.record.points as usize;
+                node_points::fill_from_planes(&out.unpacked, points, &self.metadata, positions, &mut out.columns);
             }
         }
         Ok(())
@@ -193,14 +205,14 @@ impl Dataset {
             node.key,
             self.metadata.record_len()
         );
-        Err(ReadError::broken(self.locate(DatasetFile::Octree), byte_offset, what))
+        Err(ReadError::broken(self.locate(OCTREE_FILE), byte_offset, what))
     }
 
-    fn decompress(&self, node: &Node, out: &mut NodePoints) -> Result<(), ReadError> {
+    fn decompress(&self, node: &Node, stored: &[u8], planes: &mut Vec<u8>) -> Result<(), ReadError> {
         let NodeRecord { points, byte_size, byte_offset, .. } = node.record;
         let broken = |what: String| {
             let what = format!("node {} {what}", node.key);
-            ReadError::broken(self.locate(DatasetFile::Octree), byte_offset, what)
+            ReadError::broken(self.locate(OCTREE_FILE), byte_offset, what)
         };
         let expected = u128::from(points) * self.metadata.planar_len() as u128;
         if expected > u128::from(byte_size) * u128::from(MAX_BROTLI_RATIO) {
@@ -211,28 +223,22 @@ impl Dataset {
             let what = format!("would take {expected} bytes of memory, {} are allowed", self.max_node_bytes);
             return Err(broken(what));
         };
-        brotli::decompress(&out.stored, len, &mut out.planar).map_err(|fault| match fault {
+        brotli::decompress(stored, len, planes).map_err(|fault| match fault {
             Fault::Corrupt => broken("is not a Brotli stream, or a damaged one".into()),
             Fault::Short(got) => broken(format!("decompresses to {got} bytes, its {points} points need {len}")),
             Fault::Long => broken(format!("decompresses to more than the {len} bytes of its {points} points")),
         })
     }
 
-    fn check_range(
-        &self,
-        file: DatasetFile,
-        offset: u64,
-        size: u64,
-        who: impl Fn() -> String,
-    ) -> Result<(), ReadError> {
+    fn check_range(&self, file: &str, offset: u64, size: u64, who: impl Fn() -> String) -> Result<(), ReadError> {
         let available = match file {
-            DatasetFile::Hierarchy => self.hierarchy_bytes,
+            HIERARCHY_FILE => self.hierarchy_bytes,
             _ => self.octree_bytes,
         };
         match offset.checked_add(size) {
             Some(end) if end <= available => Ok(()),
             _ => {
-                let what = format!("{} needs {size} bytes, but {} has {available}", who(), file.name());
+                let what = format!("{} needs {size} bytes, but {} has {available}", who(), file);
                 let advice = "the file was cut short or belongs to another dataset; copy or convert it again";
                 Err(ReadError::broken(self.locate(file), offset, what).advise(advice))
             }
@@ -242,7 +248,7 @@ impl Dataset {
 
 impl std::fmt::Debug for Dataset {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Dataset").field("at", &self.locate(DatasetFile::Metadata)).finish_non_exhaustive()
+        f.debug_struct("Dataset").field("at", &self.locate(METADATA_FILE)).finish_non_exhaustive()
     }
 }
 

@@ -5,20 +5,23 @@ use std::collections::HashMap;
 use crate::{NodeKey, ReadError};
 
 use super::chunk::ChunkRanges;
-use super::{Dataset, DatasetFile, Node, NodeRecord};
+use super::{Dataset, HIERARCHY_FILE, Node, NodeRecord};
 
 /// The part of the octree that is known, for renderers: it begins with the root's chunk and grows by a chunk whenever
 /// the renderer comes to a proxy that it wants to draw.
 ///
-/// ```no_run
-/// # use pointmill_format::{NodeKey, ReadError, potree2::{Dataset, Hierarchy}};
-/// # fn visit(dataset: &Dataset) -> Result<(), ReadError> {
-/// let mut tree = Hierarchy::new(dataset)?;
+/// ```
+/// use pointmill_format::{NodeKey, potree2::{Dataset, Hierarchy}};
+///
+/// # fn main() -> Result<(), pointmill_format::ReadError> {
+/// let dataset = Dataset::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/potree2/default"))?;
+/// let mut tree = Hierarchy::new(&dataset)?;
 /// let mut stack = vec![NodeKey::ROOT];
 /// while let Some(key) = stack.pop() {
-///     tree.load(dataset, key)?; // does nothing unless `key` is a proxy
+///     tree.load(&dataset, key)?; // does nothing unless `key` is a proxy
 ///     stack.extend(tree.children(key).map(|child| child.key));
 /// }
+/// assert_eq!(tree.len(), dataset.read_hierarchy()?.len());
 /// # Ok(())
 /// # }
 /// ```
@@ -90,7 +93,7 @@ impl Hierarchy {
     pub fn insert(&mut self, dataset: &Dataset, chunk: &[Node]) -> Result<usize, ReadError> {
         let Some(root) = chunk.first() else { return Ok(0) };
         let Some(proxy) = self.nodes.get(&root.key).filter(|r| r.is_proxy()) else { return Ok(0) };
-        let path = dataset.locate(DatasetFile::Hierarchy);
+        let path = dataset.locate(HIERARCHY_FILE);
         if root.record.is_proxy() {
             let what = format!("the hierarchy chunk of {} begins with a proxy", root.key);
             return Err(ReadError::broken(path, proxy.byte_offset, what));

@@ -1,18 +1,22 @@
 //! Potree 2.0 datasets: a folder of `metadata.json`, `hierarchy.bin` and `octree.bin` (`docs/formats/potree2.md`).
 //!
-//! [`Dataset`] opens one from a folder or from any [`ByteSource`]. A renderer walks the octree lazily with
-//! [`Hierarchy`] and reads nodes into [`NodePoints`]; a tool that wants everything calls [`Dataset::read_hierarchy`].
+//! [`Dataset`] opens one from a folder or from any [`ByteSource`](crate::bytes::ByteSource). A renderer walks the octree
+//! lazily with [`Hierarchy`] and reads nodes into [`NodePoints`](crate::NodePoints); a tool that wants everything calls
+//! [`Dataset::read_hierarchy`].
 //!
-//! ```no_run
-//! use pointmill_format::potree2::{Dataset, NodePoints};
+//! ```
+//! use pointmill_format::{NodePoints, potree2::Dataset};
 //!
 //! # fn main() -> Result<(), pointmill_format::ReadError> {
-//! let dataset = Dataset::open("clouds/city".as_ref())?;
-//! let mut points = NodePoints::default();
+//! let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/potree2/brotli");
+//! let dataset = Dataset::open(folder)?;
+//! let (mut points, mut total) = (NodePoints::default(), 0);
 //! for node in dataset.read_hierarchy()? {
 //!     dataset.read_points(&node, &mut points)?;
 //!     println!("{}: {} points in {:?}", node.key, points.len(), dataset.metadata().node_cube(node.key));
+//!     total += points.len() as u64;
 //! }
+//! assert_eq!(total, dataset.metadata().points);
 //! # Ok(())
 //! # }
 //! ```
@@ -25,7 +29,6 @@
 
 mod brotli;
 mod chunk;
-pub(crate) mod column_bytes;
 mod dataset;
 mod encode_brotli;
 mod encode_hierarchy;
@@ -36,13 +39,19 @@ mod metadata_parse;
 mod morton;
 mod node_points;
 mod record;
-mod source;
 
 pub use dataset::Dataset;
 pub use encode_brotli::{BrotliScratch, encode_brotli};
 pub use encode_hierarchy::{HierarchyBytes, NodeEntry, encode_hierarchy};
 pub use hierarchy::Hierarchy;
 pub use metadata::{AttributeStats, Encoding, Metadata};
-pub use node_points::NodePoints;
 pub use record::{Node, NodeRecord, NodeType};
-pub use source::{ByteSource, DatasetFile, Folder, Memory};
+
+/// The file of the metadata.
+pub const METADATA_FILE: &str = "metadata.json";
+
+/// The file of the nodes.
+pub const HIERARCHY_FILE: &str = "hierarchy.bin";
+
+/// The file of the points.
+pub const OCTREE_FILE: &str = "octree.bin";

@@ -72,7 +72,7 @@ fn coarse_far_and_empty_clouds_are_written_byte_for_byte() {
 /// The table of the format page.
 #[test]
 fn the_worked_example_is_read_as_the_page_tells_it() {
-    let batches = Batches::read(&golden("example.qbatch")).unwrap();
+    let batches = Batches::open(golden("example.qbatch")).unwrap();
     assert_eq!((batches.header().points, batches.header().grid.exponent), (6, 2));
     assert_eq!(batches.attribute::<u16>(0).unwrap(), [2, 259, 1, 65_535, 4, 5]);
     assert_eq!(batches.attribute::<u8>(1).unwrap(), [2, 5, 2, 1, 6, 6]);
@@ -96,7 +96,7 @@ fn the_worked_example_is_read_as_the_page_tells_it() {
 #[cfg(feature = "zstd")]
 #[test]
 fn frames_that_no_compressor_made_are_read() {
-    let (raw, packed) = ["example.qbatch", "blocks.qbatch"].map(|n| Batches::read(&golden(n)).unwrap()).into();
+    let (raw, packed) = ["example.qbatch", "blocks.qbatch"].map(|n| Batches::open(golden(n)).unwrap()).into();
     assert!(packed.is_compressed() && packed.read_everything().unwrap() == 6);
     let points = |b: &Batches<_>| b.points_in_morton_order(Precision::Thirty).map(Result::unwrap).collect::<Vec<_>>();
     assert_eq!(points(&packed), points(&raw));
@@ -107,7 +107,7 @@ fn every_golden_file_is_read_to_its_end() {
     for (name, points, precision) in
         [("coarse", 6, Precision::Ten), ("far", 3, Precision::Thirty), ("empty", 0, Precision::Thirty)]
     {
-        let batches = Batches::read(&golden(&format!("{name}.qbatch"))).unwrap();
+        let batches = Batches::open(golden(&format!("{name}.qbatch"))).unwrap();
         assert_eq!((batches.read_everything().unwrap(), batches.header().precision()), (points, precision));
     }
 }

@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use pointmill_format::Lattice;
 use pointmill_format::batches::{
-    AlignedBytes, BatchPoints, BatchRecord, Batches, Grid, LOD_LEVELS, Precision, WriteOptions, lod_of, rgb_of,
+    AlignedBytes, BATCH_POINTS, BatchRecord, BatchScratch, Batches, Grid, LOD_LEVELS, Precision, WriteOptions, lod_of,
+    rgb_of,
 };
+use pointmill_format::{Lattice, NodePoints};
 
 use crate::util::{Points, open};
 
@@ -31,14 +32,15 @@ fn assert_promises(cloud: &Points, cell: f64) -> Batches<AlignedBytes> {
     }
     let grid = batches.header().grid;
     let mut largest: BTreeMap<u32, [f64; 3]> = BTreeMap::new();
-    let (mut points, mut before, mut lods) = (BatchPoints::default(), 0, [0; 4]);
+    let (mut points, mut scratch) = (NodePoints::default(), BatchScratch::default());
+    let (mut before, mut lods) = (0, [0; 4]);
     for m in 0..batches.header().batches {
         let slot = batches.swap(m);
         let record = batches.records()[slot as usize];
-        batches.read_batch(slot, Precision::Thirty, &mut points).unwrap();
-        for (i, relative) in points.relative.iter().enumerate() {
-            let index = points.first_point + i as u32;
-            let world = batches.world(*relative);
+        batches.read_batch(slot, Precision::Thirty, &mut scratch, &mut points).unwrap();
+        for i in 0..points.len() {
+            let index = slot * BATCH_POINTS + i as u32;
+            let world = points.world(i).unwrap();
             let quantized = std::array::from_fn(|a| cloud.lattice.quantize(a, world[a]));
             let colours = left.get_mut(&quantized).unwrap_or_else(|| panic!("{quantized:?} is not of the source"));
             let original = batches.original_colour(index).unwrap();
@@ -61,7 +63,7 @@ fn assert_promises(cloud: &Points, cell: f64) -> Batches<AlignedBytes> {
                     most[a] = most[a].max(error);
                 }
             }
-            lods[usize::from(lod_of(points.colours[i]))] += 1;
+            lods[usize::from(lod_of(points.column::<u32>("colour").unwrap()[i]))] += 1;
         }
     }
     assert!(left.values().all(Vec::is_empty), "every point once");
@@ -257,7 +259,7 @@ fn a_mapped_file_is_the_file_that_was_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("points.qbatch");
     std::fs::write(&path, bytes).unwrap();
-    let (mapped, read) = (Batches::map(&path).unwrap(), Batches::read(&path).unwrap());
+    let (mapped, read) = (Batches::map(&path).unwrap(), Batches::open(&path).unwrap());
     assert_eq!((mapped.hi10(), mapped.colour(), mapped.records()), (read.hi10(), read.colour(), read.records()));
     assert_eq!(mapped.read_everything().unwrap(), 12_345);
     assert!(Batches::map(&folder.path().join("none")).unwrap_err().to_string().contains("none: opening"));
@@ -270,7 +272,7 @@ fn buffers_that_are_not_aligned_are_refused_with_advice() {
     let (bytes, _) =
         Points::random(16, 10, [9; 3], false, MILLIMETRES).write(&Points::empty(MILLIMETRES, false).options(1.0));
     let shifted = AlignedBytes::from([&[0][..], &bytes].concat().as_slice());
-    let error = Batches::open_bytes(&shifted.as_ref()[1..], "a".as_ref()).unwrap_err().to_string();
+    let error = Batches::from_bytes(&shifted.as_ref()[1..], "a").unwrap_err().to_string();
     assert!(error.contains("AlignedBytes"), "{error}");
 }
 

@@ -13,7 +13,7 @@ pub(crate) fn golden(name: &str) -> PathBuf {
 
 /// Opens a file in memory.
 pub(crate) fn open(bytes: &[u8]) -> Result<Batches<AlignedBytes>, ReadError> {
-    Batches::open_bytes(AlignedBytes::from(bytes), "points.qbatch".as_ref())
+    Batches::from_bytes(AlignedBytes::from(bytes), "points.qbatch")
 }
 
 /// The generator of `fixtures/generators/batches.py`.

@@ -3,9 +3,10 @@
 use std::cmp::Ordering;
 
 use pointmill_format::bintree::{
-    CORE_BYTES, Header, IndexWriter, Layout, LeafEncoder, Memory, Node, NodeKind, RecordLayout, SplitRule, leaf_center,
+    CORE_BYTES, Header, IndexWriter, Layout, LeafEncoder, Node, NodeKind, RecordLayout, SplitRule, leaf_center,
     leaf_file_name,
 };
+use pointmill_format::bytes::Memory;
 use pointmill_format::{Aabb, Lattice};
 
 /// A lattice point; `id` tells everything else of it.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use pointmill_format::bintree::{Bintree, Header, IndexWriter, Layout, LeafPoints, NodeKind, RecordLayout, SplitRule};
-use pointmill_format::{Attribute, AttributeType, Column, Lattice};
+use pointmill_format::bintree::{Bintree, Header, IndexWriter, Layout, NodeKind, RecordLayout, SplitRule};
+use pointmill_format::{Attribute, AttributeType, Column, Lattice, NodePoints};
 
 use crate::build::{Builder, Point};
 use crate::util::{golden, load, open};
@@ -82,7 +82,7 @@ fn the_writer_makes_the_files_of_the_script_byte_for_byte_whatever_the_order_of_
 #[test]
 fn an_index_that_was_read_is_written_back_byte_for_byte() {
     for name in ["files", "packed"] {
-        let tree = Bintree::open(&golden(name)).unwrap();
+        let tree = Bintree::open(golden(name)).unwrap();
         let mut index = IndexWriter::new(Vec::new(), tree.header()).unwrap();
         tree.nodes().iter().for_each(|node| index.node(node).unwrap());
         assert_eq!(index.finish().unwrap(), load(name)["index.json"]);
@@ -91,7 +91,7 @@ fn an_index_that_was_read_is_written_back_byte_for_byte() {
 
 #[test]
 fn the_nested_form_is_the_same_tree() {
-    let flat = Bintree::open(&golden("packed")).unwrap();
+    let flat = Bintree::open(golden("packed")).unwrap();
     let mut files = load("packed");
     files.insert("index.json".into(), std::fs::read(golden("nested").join("index.json")).unwrap());
     let nested = open(&files).unwrap();
@@ -102,9 +102,9 @@ fn the_nested_form_is_the_same_tree() {
 #[test]
 fn every_value_of_every_point_is_read_in_both_layouts() {
     for name in ["files", "packed"] {
-        let tree = Bintree::open(&golden(name).join("index.json")).unwrap();
+        let tree = Bintree::open(golden(name).join("index.json")).unwrap();
         assert_eq!(tree.header(), &header(if name == "files" { Layout::Files } else { Layout::Packed }));
-        let (mut points, mut rows) = (LeafPoints::default(), Vec::new());
+        let (mut points, mut rows) = (NodePoints::default(), Vec::new());
         for leaf in tree.leaves() {
             tree.read_leaf(leaf, &mut points).unwrap();
             rows.extend((0..points.len()).map(|i| row(&points, i)));
@@ -117,22 +117,27 @@ fn every_value_of_every_point_is_read_in_both_layouts() {
     }
 }
 
-fn row(points: &LeafPoints, i: usize) -> Row {
-    let [Column::UInt16(rgb), Column::UInt16(intensity), Column::Int16(amplitude), Column::Float64(time)] =
-        &points.columns[..]
+fn row(points: &NodePoints, i: usize) -> Row {
+    let [
+        Column::Float32(class),
+        Column::UInt16(rgb),
+        Column::UInt16(intensity),
+        Column::Int16(amplitude),
+        Column::Float64(time),
+    ] = points.columns()
     else {
-        panic!("columns of other types: {:?}", points.columns);
+        panic!("columns of other types: {:?}", points.columns());
     };
     let lattice = header(Layout::Files).lattice;
     let world = points.world(i).unwrap();
     let q = [0, 1, 2].map(|a| lattice.quantize(a, world[a]) as i32);
     let rgb = [0, 1, 2].map(|c| rgb[3 * i + c]);
-    (q, points.classes[i] as u8, rgb, intensity[i], amplitude[i], time[i])
+    (q, class[i] as u8, rgb, intensity[i], amplitude[i], time[i])
 }
 
 #[test]
 fn leaves_are_named_by_their_paths() {
-    let tree = Bintree::open(&golden("files")).unwrap();
+    let tree = Bintree::open(golden("files")).unwrap();
     let names: Vec<String> = tree.leaves().map(|leaf| tree.leaf_name(leaf)).collect();
     let expected = ["n00", "n0100", "n01010", "n01011", "n011", "n100", "n101", "n11"];
     assert_eq!(names, expected.map(|n| format!("{n}.bin")));

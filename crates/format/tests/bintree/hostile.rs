@@ -1,7 +1,9 @@
 //! Bytes that lie: an error that says what is wrong, never a panic, never memory without end.
 
-use pointmill_format::bintree::{Layout, Memory, exercise};
+use pointmill_format::bintree::Layout;
+use pointmill_format::bytes::Memory;
 
+use crate::exercise::exercise;
 use crate::util::{FAR, Random, corridor, files_of, golden, load, open, read_all};
 
 #[track_caller]

@@ -2,6 +2,7 @@
 //! points tells; bytes that lie are refused.
 
 mod build;
+mod exercise;
 mod golden;
 mod hostile;
 #[cfg(feature = "rstar")]

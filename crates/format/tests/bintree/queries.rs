@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use pointmill_format::Aabb;
 use pointmill_format::bintree::{
-    Bintree, Frustum, Hit, Layout, LeafPoints, Material, Picker, Ray, distance_range, switch_distance,
+    Bintree, Frustum, Hit, Layout, Material, Picker, Ray, distance_range, switch_distance,
 };
+use pointmill_format::{Aabb, NodePoints};
 
 use crate::util::{FAR, Random, Told, corridor, files_of, open, read_all};
 
@@ -30,7 +30,7 @@ fn direction(random: &mut Random) -> [f64; 3] {
 fn boxes_tell_the_leaves_that_a_look_at_every_leaf_tells() {
     let (tree, random) = (cloud(5000, 60, 1), &mut Random(1));
     let all = read_all(&tree).unwrap();
-    let (mut some, mut scratch) = (0, LeafPoints::default());
+    let (mut some, mut scratch) = (0, NodePoints::default());
     for _ in 0..200 {
         let mut wanted = Aabb::EMPTY;
         wanted.grow(somewhere(&tree, random));
@@ -40,7 +40,10 @@ fn boxes_tell_the_leaves_that_a_look_at_every_leaf_tells() {
         let expected: Vec<u32> = tree.leaves().filter(|l| touches(&tree.nodes()[*l as usize].bounds)).collect();
         assert_eq!(tree.leaves_in_box(&wanted), expected);
         let mut told = Vec::new();
-        tree.points_in_box(&wanted, &mut scratch, |leaf, points, i| told.push((leaf, i, points.classes[i]))).unwrap();
+        tree.points_in_box(&wanted, &mut scratch, |leaf, points, i| {
+            told.push((leaf, i, points.column::<f32>("classification").unwrap()[i]));
+        })
+        .unwrap();
         let inside = all.iter().filter(|p| wanted.contains(p.0)).map(|p| (p.2, p.3 as usize, p.1));
         assert_eq!(told, inside.collect::<Vec<_>>());
         some += usize::from(!told.is_empty());

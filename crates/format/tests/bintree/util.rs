@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use pointmill_format::bintree::{Bintree, Layout, LeafPoints, Memory};
-use pointmill_format::{Lattice, ReadError};
+use pointmill_format::bintree::{Bintree, Layout};
+use pointmill_format::bytes::Memory;
+use pointmill_format::{Lattice, NodePoints, ReadError};
 
 use crate::build::{Builder, Point, header};
 
@@ -19,7 +20,7 @@ pub(crate) fn load(layout: &str) -> Memory {
 }
 
 pub(crate) fn open(files: &Memory) -> Result<Bintree, ReadError> {
-    Bintree::from_source(Box::new(files.clone()))
+    Bintree::from_source(files.clone())
 }
 
 /// A small generator of pseudo-random numbers (SplitMix64): same seed, same numbers, everywhere.
@@ -80,10 +81,10 @@ pub(crate) type Told = ([f64; 3], f32, u32, u32);
 
 /// All points, in preorder of the leaves.
 pub(crate) fn read_all(tree: &Bintree) -> Result<Vec<Told>, ReadError> {
-    let (mut all, mut points) = (Vec::new(), LeafPoints::default());
+    let (mut all, mut points) = (Vec::new(), NodePoints::default());
     for leaf in tree.leaves() {
         tree.read_leaf(leaf, &mut points)?;
-        let told = |i| (points.world(i).unwrap(), points.classes[i], leaf, i as u32);
+        let told = |i| (points.world(i).unwrap(), points.column::<f32>("classification").unwrap()[i], leaf, i as u32);
         all.extend((0..points.len()).map(told));
     }
     Ok(all)

@@ -5,11 +5,11 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use pointmill_format::potree2::{
-    BrotliScratch, Dataset, Encoding, Memory, Metadata, NodeEntry, NodePoints, encode_brotli, encode_hierarchy,
+    BrotliScratch, Dataset, Encoding, Metadata, NodeEntry, encode_brotli, encode_hierarchy,
 };
-use pointmill_format::{Attribute, Column, NodeKey, with_column};
+use pointmill_format::{Attribute, Column, NodeKey, NodePoints, with_column};
 
-use crate::util::corpus;
+use crate::util::{corpus, memory};
 
 /// What tells points of a scan apart, nearly: bits of the GPS time, intensity, return number.
 type Label = (u64, u16, u8);
@@ -27,12 +27,12 @@ fn dataset_points(dataset: &Dataset, las: &las::Header) -> Points {
     for node in dataset.read_hierarchy().unwrap() {
         dataset.read_points(&node, &mut points).unwrap();
         let [Column::Float64(time), Column::UInt16(intensity), Column::UInt8(number)] =
-            columns.map(|c| &points.columns[c])
+            columns.map(|c| &points.columns()[c])
         else {
             panic!("columns of other types");
         };
         for i in 0..points.len() {
-            let world = points.world(metadata, i).unwrap();
+            let world = points.world(i).unwrap();
             let units = |a: usize| ((world[a] - transforms[a].offset) / transforms[a].scale).round() as i64;
             all.entry((time[i].to_bits(), intensity[i], number[i])).or_default().push([0, 1, 2].map(units));
         }
@@ -108,9 +108,9 @@ fn both_encodings_of_a_scan_give_the_same_columns() {
         let mut points = NodePoints::default();
         for node in dataset.read_hierarchy().unwrap() {
             dataset.read_points(&node, &mut points).unwrap();
-            let columns: Vec<Vec<u64>> = points.columns.iter().map(bits).collect();
+            let columns: Vec<Vec<u64>> = points.columns().iter().map(bits).collect();
             for i in 0..points.len() {
-                let position = [0, 1, 2].map(|a| points.positions[a][i] - shift);
+                let position = [0, 1, 2].map(|a| points.quantized().unwrap()[a][i] - shift);
                 let values: Vec<u64> = columns
                     .iter()
                     .flat_map(|c| {
@@ -161,8 +161,8 @@ fn wrong_types_and_empty_nodes_of_the_reference_are_read_as_meant() {
 fn records(points: &NodePoints) -> Vec<u8> {
     let mut records = Vec::new();
     for i in 0..points.len() {
-        records.extend(points.positions.iter().flat_map(|axis| axis[i].to_le_bytes()));
-        for column in &points.columns {
+        records.extend(points.quantized().unwrap().iter().flat_map(|axis| axis[i].to_le_bytes()));
+        for column in points.columns() {
             let elements = column.len() / points.len();
             with_column!(column, v => records.extend(v[i * elements..(i + 1) * elements].iter().flat_map(|v| v.to_le_bytes())));
         }
@@ -189,8 +189,8 @@ fn nodes_of_the_reference_are_encoded_to_the_same_points_in_the_same_order() {
     }
     let hierarchy = encode_hierarchy(&mut entries, 4);
     let metadata = Metadata { first_chunk_size: hierarchy.first_chunk_size, ..dataset.metadata().clone() };
-    let files = Memory { metadata: metadata.to_json().into_bytes(), hierarchy: hierarchy.bytes, octree };
-    let ours = Dataset::from_source(Box::new(files)).unwrap();
+    let files = memory(metadata.to_json().into_bytes(), hierarchy.bytes, octree);
+    let ours = Dataset::from_source(files).unwrap();
 
     let mut again = NodePoints::default();
     let our_nodes = ours.read_hierarchy().unwrap();
@@ -199,7 +199,7 @@ fn nodes_of_the_reference_are_encoded_to_the_same_points_in_the_same_order() {
         assert_eq!((node.key, node.record.child_mask), (our_node.key, our_node.record.child_mask));
         dataset.read_points(node, &mut points).unwrap();
         ours.read_points(our_node, &mut again).unwrap();
-        assert!(points.positions == again.positions, "{}: another order", node.key);
+        assert!(points.positions() == again.positions(), "{}: another order", node.key);
         let [rows, our_rows] = [&points, &again].map(|p| {
             let bytes = records(p);
             let mut rows: Vec<Vec<u8>> = bytes.chunks_exact(metadata.record_len()).map(<[u8]>::to_vec).collect();

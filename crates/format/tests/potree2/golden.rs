@@ -1,6 +1,7 @@
 //! The golden dataset, which a script wrote from the format page alone.
 
-use pointmill_format::potree2::{Dataset, Metadata, NodePoints, encode_hierarchy};
+use pointmill_format::NodePoints;
+use pointmill_format::potree2::{Dataset, HIERARCHY_FILE, Metadata, OCTREE_FILE, encode_hierarchy};
 use pointmill_format::potree2::{Hierarchy, NodeEntry};
 use pointmill_format::{Column, NodeKey};
 
@@ -35,15 +36,16 @@ const POINTS: [(&str, &[Row]); 7] = [
 ];
 
 fn rows(points: &NodePoints) -> Vec<Row> {
-    let [Column::UInt16(rgb), Column::UInt16(intensity), Column::UInt8(class), rest @ ..] = &points.columns[..] else {
-        panic!("columns of other types: {:?}", points.columns);
+    let [Column::UInt16(rgb), Column::UInt16(intensity), Column::UInt8(class), rest @ ..] = points.columns() else {
+        panic!("columns of other types: {:?}", points.columns());
     };
     let [Column::Int16(angle), Column::Float64(time), Column::UInt16(amplitude)] = rest else {
         panic!("columns of other types: {rest:?}");
     };
+    let positions = points.quantized().unwrap();
     let row = |i: usize| {
         let rgb = [0, 1, 2].map(|c| rgb[3 * i + c]);
-        let position = [0, 1, 2].map(|a| points.positions[a][i]);
+        let position = [0, 1, 2].map(|a| positions[a][i]);
         (position, rgb, intensity[i], class[i], angle[i], time[i], amplitude[i])
     };
     (0..points.len()).map(row).collect()
@@ -52,7 +54,7 @@ fn rows(points: &NodePoints) -> Vec<Row> {
 #[test]
 fn every_value_of_every_point_is_read_in_both_encodings() {
     for encoding in ["default", "brotli"] {
-        let dataset = Dataset::open(&golden(encoding)).unwrap();
+        let dataset = Dataset::open(golden(encoding)).unwrap();
         let nodes = dataset.read_hierarchy().unwrap();
         let mut points = NodePoints::default();
         let mut read = |node| {
@@ -67,7 +69,7 @@ fn every_value_of_every_point_is_read_in_both_encodings() {
 
 #[test]
 fn the_metadata_says_what_the_script_wrote_and_survives_a_round_trip() {
-    let dataset = Dataset::open(&golden("default")).unwrap();
+    let dataset = Dataset::open(golden("default")).unwrap();
     let m = dataset.metadata();
     assert_eq!((m.name.as_str(), m.points, m.depth, m.step_size, m.first_chunk_size), ("tiny", 13, 5, 4, 132));
     assert_eq!((m.record_len(), m.planar_len()), (33, 39));
@@ -85,17 +87,17 @@ fn the_metadata_says_what_the_script_wrote_and_survives_a_round_trip() {
 #[test]
 fn the_hierarchy_is_written_byte_for_byte_as_the_script_wrote_it() {
     let expected = load(&golden("default"));
-    let dataset = Dataset::open(&golden("default")).unwrap();
+    let dataset = Dataset::open(golden("default")).unwrap();
     let mut entries: Vec<NodeEntry> = dataset.read_hierarchy().unwrap().iter().map(NodeEntry::from).collect();
     entries.reverse();
     let encoded = encode_hierarchy(&mut entries, 4);
-    assert_eq!(encoded.bytes, expected.hierarchy);
+    assert_eq!(encoded.bytes, expected[HIERARCHY_FILE]);
     assert_eq!((encoded.first_chunk_size, encoded.depth), (132, 5));
 }
 
 #[test]
 fn a_lazy_walk_loads_a_chunk_when_it_comes_to_its_proxy() {
-    let dataset = Dataset::open(&golden("default")).unwrap();
+    let dataset = Dataset::open(golden("default")).unwrap();
     let mut tree = Hierarchy::new(&dataset).unwrap();
     let border = NodeKey::from_name("r0000").unwrap();
     assert_eq!(tree.len(), 6);
@@ -115,12 +117,16 @@ fn the_worked_example_of_the_format_page_is_the_golden_dataset() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats/potree2.md");
     let page = std::fs::read_to_string(page).unwrap();
     let files = load(&golden("default"));
-    let brotli = Dataset::open(&golden("brotli")).unwrap();
+    let brotli = Dataset::open(golden("brotli")).unwrap();
     let (mut payload, mut planar) = (Vec::new(), vec![0; 3 * 39]);
     brotli.read_payload(&brotli.read_root_chunk().unwrap()[0], &mut payload).unwrap();
     assert_eq!(brotlic::decompress(&payload, &mut planar).unwrap(), planar.len());
 
-    let sources = [("hierarchy.bin ", files.hierarchy), ("octree.bin ", files.octree), ("brotli r ", planar)];
+    let sources = [
+        ("hierarchy.bin ", files[HIERARCHY_FILE].clone()),
+        ("octree.bin ", files[OCTREE_FILE].clone()),
+        ("brotli r ", planar),
+    ];
     let mut quoted = [0; 3];
     for line in page.lines() {
         for ((name, bytes), quoted) in sources.iter().zip(&mut quoted) {

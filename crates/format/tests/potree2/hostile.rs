@@ -1,11 +1,13 @@
 //! Bytes that lie: an error that says what is wrong, never a panic, never memory without end.
 
+use pointmill_format::bytes::Memory;
 use pointmill_format::potree2::{
-    BrotliScratch, Dataset, Encoding, Hierarchy, Memory, Metadata, NodePoints, NodeRecord, encode_brotli,
+    BrotliScratch, Dataset, Encoding, HIERARCHY_FILE, Hierarchy, METADATA_FILE, Metadata, NodeRecord, OCTREE_FILE,
+    encode_brotli,
 };
-use pointmill_format::{Attribute, AttributeType, NodeKey, ReadError};
+use pointmill_format::{Attribute, AttributeType, NodeKey, NodePoints, ReadError};
 
-use crate::util::{Random, attributes, corpus, golden, load, metadata, one_node, open};
+use crate::util::{Random, attributes, corpus, file_mut, golden, load, memory, metadata, one_node, open};
 
 /// Everything that a reader does with a dataset; the number of points.
 fn read_all(files: &Memory) -> Result<usize, ReadError> {
@@ -44,11 +46,7 @@ fn assert_fault(files: &Memory, part: &str) {
 }
 
 fn mutate(files: &mut Memory, random: &mut Random) {
-    let file = match random.below(3) {
-        0 => &mut files.metadata,
-        1 => &mut files.hierarchy,
-        _ => &mut files.octree,
-    };
+    let file = file_mut(files, [METADATA_FILE, HIERARCHY_FILE, OCTREE_FILE][random.below(3)]);
     let at = random.below(file.len());
     match random.below(5) {
         0 => file.truncate(at),
@@ -103,7 +101,7 @@ fn with_record(encoding: &str, index: usize, change: impl Fn(&mut NodeRecord)) -
 }
 
 fn change_record(files: &mut Memory, index: usize, change: impl Fn(&mut NodeRecord)) {
-    let bytes: &mut [u8; 22] = files.hierarchy[22 * index..].first_chunk_mut().unwrap();
+    let bytes: &mut [u8; 22] = file_mut(files, HIERARCHY_FILE)[22 * index..].first_chunk_mut().unwrap();
     let mut record = NodeRecord::from_bytes(bytes);
     change(&mut record);
     *bytes = record.to_bytes();
@@ -178,7 +176,7 @@ fn a_chain_below_the_deepest_level_is_refused() {
     let link = NodeRecord { node_type: 0, child_mask: 1, points: 0, byte_offset: 0, byte_size: 0 };
     let hierarchy: Vec<u8> = (0..40).flat_map(|_| link.to_bytes()).collect();
     let json = metadata(Encoding::Default, hierarchy.len() as u64, attributes()).to_json();
-    assert_fault(&Memory { metadata: json.into_bytes(), hierarchy, octree: Vec::new() }, "children below level 31");
+    assert_fault(&memory(json.into_bytes(), hierarchy, Vec::new()), "children below level 31");
 }
 
 #[test]
@@ -188,10 +186,11 @@ fn records_of_old_converters_are_read_as_meant() {
     assert_eq!(count(&with_record("default", 0, no_payload)), 13 - 3, "points without payload");
     assert_eq!(count(&with_record("brotli", 0, |r| r.node_type = 1)), 13, "an inner node marked as a leaf");
     let mut orphan = load(&golden("default"));
-    orphan.hierarchy.extend([0; 22]);
+    file_mut(&mut orphan, HIERARCHY_FILE).extend([0; 22]);
     assert_eq!(count(&orphan), 13, "a chunk that nothing refers to");
     let mut word = load(&golden("default"));
-    word.metadata = replaced(&word.metadata, "\"DEFAULT\"", "\"UNCOMPRESSED\"");
+    let metadata = file_mut(&mut word, METADATA_FILE);
+    *metadata = replaced(metadata, "\"DEFAULT\"", "\"UNCOMPRESSED\"");
     assert_eq!(count(&word), 13, "the encoding's other name");
 }
 
@@ -203,7 +202,7 @@ fn replaced(json: &[u8], from: &str, to: &str) -> Vec<u8> {
 
 #[test]
 fn metadata_faults_are_told_by_name() {
-    let golden = load(&golden("default")).metadata;
+    let golden = load(&golden("default"));
     let faults = [
         ("\"max\": [1016.383, ", "\"max\": [inf, ", "a number is written as inf or nan"),
         ("\"2.0\"", "\"1.8\"", "version \"1.8\""),
@@ -222,7 +221,8 @@ fn metadata_faults_are_told_by_name() {
         ("\"firstChunkSize\": 132", "\"firstChunkSize\": 18446744073709551615", "hierarchy.bin has 176"),
     ];
     for (from, to, expected) in faults {
-        let files = Memory { metadata: replaced(&golden, from, to), ..load(&crate::util::golden("default")) };
+        let mut files = golden.clone();
+        files.insert(METADATA_FILE.to_owned(), replaced(&golden[METADATA_FILE], from, to));
         assert_fault(&files, expected);
     }
 }

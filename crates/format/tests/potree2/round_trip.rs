@@ -2,12 +2,11 @@
 
 use std::collections::{BTreeSet, HashSet};
 
-use pointmill_format::NodeKey;
-use pointmill_format::potree2::{
-    BrotliScratch, Encoding, Memory, Node, NodeEntry, NodePoints, encode_brotli, encode_hierarchy,
-};
+use pointmill_format::bytes::Memory;
+use pointmill_format::potree2::{BrotliScratch, Encoding, Node, NodeEntry, encode_brotli, encode_hierarchy};
+use pointmill_format::{NodeKey, NodePoints};
 
-use crate::util::{Random, attributes, metadata, one_node, open};
+use crate::util::{Random, attributes, memory, metadata, one_node, open};
 
 /// Entries for `leaves` and all their ancestors, with numbers of their own, shuffled.
 fn entries(leaves: impl IntoIterator<Item = NodeKey>, random: &mut Random) -> Vec<NodeEntry> {
@@ -40,7 +39,7 @@ fn name(name: &str) -> NodeKey {
 fn round_trip(entries: &mut [NodeEntry], step: u32) -> (Vec<Node>, Vec<u8>) {
     let encoded = encode_hierarchy(entries, step);
     let json = metadata(Encoding::Default, encoded.first_chunk_size, attributes()).to_json();
-    let files = Memory { metadata: json.into_bytes(), hierarchy: encoded.bytes.clone(), octree: Vec::new() };
+    let files = memory(json.into_bytes(), encoded.bytes.clone(), Vec::new());
     let dataset = open(&files).unwrap();
     let nodes = dataset.read_hierarchy().unwrap();
 
@@ -158,7 +157,7 @@ fn brotli_payloads_hold_the_same_points_as_default_ones_in_morton_order() {
         let mut sorted: Vec<&[u8]> = bytes.chunks_exact(record_len).collect();
         sorted.sort_by_key(|r| (morton_bit_by_bit(r), r.to_vec()));
         let default = read(&one_node(Encoding::Default, attributes(), count as u32, sorted.concat()));
-        assert_eq!(brotli.positions, default.positions, "seed {seed}");
+        assert_eq!(brotli.positions(), default.positions(), "seed {seed}");
         assert_eq!(debug_columns(&brotli), debug_columns(&default), "seed {seed}");
 
         shuffle(&mut sorted, random);
@@ -170,7 +169,7 @@ fn brotli_payloads_hold_the_same_points_as_default_ones_in_morton_order() {
 
 /// NaN is among the random numbers, so columns are compared by what they print.
 fn debug_columns(points: &NodePoints) -> String {
-    format!("{:?}", points.columns)
+    format!("{:?}", points.columns())
 }
 
 /// The 96-bit code of a record's position: bit k of x at 3k, of y at 3k+1, of z at 3k+2.

@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use pointmill_format::bytes::Memory;
 use pointmill_format::potree2::{
-    AttributeStats, Dataset, DatasetFile, Encoding, Memory, Metadata, NodeEntry, encode_hierarchy,
+    AttributeStats, Dataset, Encoding, HIERARCHY_FILE, METADATA_FILE, Metadata, NodeEntry, OCTREE_FILE,
+    encode_hierarchy,
 };
 use pointmill_format::{Aabb, Attribute, AttributeType, Lattice, NodeKey, ReadError};
 
@@ -24,8 +26,18 @@ pub(crate) fn corpus(path: &str) -> Option<PathBuf> {
 
 /// A dataset's files in memory, to be changed.
 pub(crate) fn load(folder: &std::path::Path) -> Memory {
-    let [metadata, hierarchy, octree] = DatasetFile::ALL.map(|f| std::fs::read(folder.join(f.name())).unwrap());
-    Memory { metadata, hierarchy, octree }
+    let [metadata, hierarchy, octree] =
+        [METADATA_FILE, HIERARCHY_FILE, OCTREE_FILE].map(|f| std::fs::read(folder.join(f)).unwrap());
+    memory(metadata, hierarchy, octree)
+}
+
+pub(crate) fn memory(metadata: Vec<u8>, hierarchy: Vec<u8>, octree: Vec<u8>) -> Memory {
+    let files = [(METADATA_FILE, metadata), (HIERARCHY_FILE, hierarchy), (OCTREE_FILE, octree)];
+    Memory::from(files.map(|(name, bytes)| (name.to_owned(), bytes)))
+}
+
+pub(crate) fn file_mut<'a>(files: &'a mut Memory, name: &str) -> &'a mut Vec<u8> {
+    files.get_mut(name).unwrap()
 }
 
 /// A small generator of pseudo-random numbers (SplitMix64): same seed, same numbers, everywhere.
@@ -87,9 +99,9 @@ pub(crate) fn metadata(encoding: Encoding, first_chunk_size: u64, attributes: Ve
 pub(crate) fn one_node(encoding: Encoding, attributes: Vec<Attribute>, points: u32, octree: Vec<u8>) -> Memory {
     let root = NodeEntry { key: NodeKey::ROOT, points, byte_offset: 0, byte_size: octree.len() as u64 };
     let hierarchy = encode_hierarchy(&mut [root], 4).bytes;
-    Memory { metadata: metadata(encoding, 22, attributes).to_json().into_bytes(), hierarchy, octree }
+    memory(metadata(encoding, 22, attributes).to_json().into_bytes(), hierarchy, octree)
 }
 
 pub(crate) fn open(files: &Memory) -> Result<Dataset, ReadError> {
-    Dataset::from_source(Box::new(files.clone()))
+    Dataset::from_source(files.clone())
 }

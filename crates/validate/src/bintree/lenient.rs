@@ -3,7 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::bintree::{ByteSource, Folder, PACKED_FILE};
+use pointmill_format::bintree::PACKED_FILE;
+use pointmill_format::bytes::{ByteSource, Folder};
 
 /// The reader opens no tree with a range that leaves `leaves.bin`. Here it is told that there is no end, so that a file
 /// that was cut short is a finding about the leaves that lie behind the cut, and the others are looked at.

@@ -47,7 +47,7 @@ use tree::Tree;
 /// As [`crate::validate`].
 pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
     let findings = Findings::new(DatasetKind::Bintree, options.max_problems);
-    let dataset = match Bintree::from_source(Box::new(Lenient::new(folder))) {
+    let dataset = match Bintree::from_source(Lenient::new(folder)) {
         Ok(dataset) => dataset,
         Err(error) if matches!(error.kind, ErrorKind::Io(_)) => return Err(error),
         Err(error) => return Ok(unreadable_index(findings, error)),

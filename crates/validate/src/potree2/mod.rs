@@ -24,7 +24,8 @@ mod walk;
 
 use std::path::Path;
 
-use pointmill_format::potree2::{ByteSource, Dataset, DatasetFile, Encoding, Folder};
+use pointmill_format::bytes::Folder;
+use pointmill_format::potree2::{Dataset, Encoding, METADATA_FILE, OCTREE_FILE};
 use pointmill_format::{DatasetKind, ErrorKind, ReadError};
 use serde_json::Value;
 
@@ -44,7 +45,7 @@ use walk::{Task, Walked, walk};
 /// # Errors
 /// As [`crate::validate`].
 pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
-    let source = Folder::open(folder)?;
+    let source = Folder::new(folder);
     let findings = Findings::new(DatasetKind::Potree2, options.max_problems);
     let dataset = match Dataset::open(folder) {
         Ok(dataset) => dataset,
@@ -66,7 +67,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
 
     let mut tree = tree::walk(&source, metadata.first_chunk_size, &findings)?;
     checks::structure::check(&tree, metadata.points, metadata.depth, &findings);
-    let octree_bytes = tree::size_of(&source as &dyn ByteSource, DatasetFile::Octree)?;
+    let octree_bytes = tree::size_of(&source, OCTREE_FILE)?;
     let record_len = (metadata.encoding == Encoding::Default).then(|| metadata.record_len() as u64);
     checks::payload_ranges::check(&mut tree, octree_bytes, record_len, &findings);
 
@@ -112,7 +113,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
 
 /// `metadata.json` as a JSON value; `None` if it is none.
 fn read_json(folder: &Path) -> Result<Option<Value>, ReadError> {
-    let path = folder.join(DatasetFile::Metadata.name());
+    let path = folder.join(METADATA_FILE);
     let bytes = std::fs::read(&path).map_err(|e| ReadError::io(&path, "reading", e))?;
     Ok(serde_json::from_slice(&bytes).ok())
 }

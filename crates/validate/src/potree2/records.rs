@@ -1,7 +1,7 @@
 //! Records of nodes as the comparison with the sources wants them.
 
-use pointmill_format::potree2::{Dataset, Node, NodePoints};
-use pointmill_format::{ErrorKind, ReadError};
+use pointmill_format::potree2::{Dataset, Node};
+use pointmill_format::{ErrorKind, NodePoints, ReadError};
 use rayon::prelude::*;
 
 use super::tree::Tree;
@@ -35,11 +35,11 @@ pub(crate) fn fill_blocks(points: &NodePoints, rules: &Rules, block: &mut Block,
         let n = (points.len() - start).min(BLOCK_POINTS);
         block.reset(rules.attributes.len());
         block.keep.resize(n, true);
-        for (to, from) in block.positions.iter_mut().zip(&points.positions) {
+        for (to, from) in block.positions.iter_mut().zip(points.quantized().unwrap_or_default()) {
             to.extend(from[start..start + n].iter().map(|v| i64::from(*v)));
         }
         for (i, attribute) in rules.attributes.iter().enumerate() {
-            let column = points.columns.get(i).map(|c| (c, attribute.elements));
+            let column = points.columns().get(i).map(|c| (c, attribute.elements));
             append_words(column, start, n, attribute, &mut block.words[i]);
         }
         sink(block);

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use pointmill_format::potree2::{ByteSource, DatasetFile, NodeRecord};
+use pointmill_format::bytes::ByteSource;
+use pointmill_format::potree2::{HIERARCHY_FILE, NodeRecord};
 use pointmill_format::{NodeKey, ReadError};
 
 use crate::check::Check;
@@ -60,7 +61,7 @@ struct Pending {
 /// # Errors
 /// The operating system could not read the file.
 pub(crate) fn walk(source: &dyn ByteSource, first_chunk_size: u64, findings: &Findings) -> Result<Tree, ReadError> {
-    let file_size = size_of(source, DatasetFile::Hierarchy)?;
+    let file_size = size_of(source, HIERARCHY_FILE)?;
     let mut tree = Tree::default();
     let mut chunks = BTreeMap::<u64, u64>::new(); // start → end, disjoint: this bounds the walk by the file
     let mut queue = VecDeque::from([Pending { root: NodeKey::ROOT, offset: 0, size: first_chunk_size, points: None }]);
@@ -70,8 +71,8 @@ pub(crate) fn walk(source: &dyn ByteSource, first_chunk_size: u64, findings: &Fi
         chunks.insert(chunk.offset, end);
         let mut bytes = vec![0; (end - chunk.offset) as usize];
         source
-            .read_at(DatasetFile::Hierarchy, chunk.offset, &mut bytes)
-            .map_err(|e| ReadError::io(source.locate(DatasetFile::Hierarchy), "reading a hierarchy chunk", e))?;
+            .read_at(HIERARCHY_FILE, chunk.offset, &mut bytes)
+            .map_err(|e| ReadError::io(source.locate(HIERARCHY_FILE), "reading a hierarchy chunk", e))?;
         parse(&chunk, &bytes, &mut tree, &mut queue, findings);
     }
     orphans(&chunks, file_size, findings);
@@ -80,7 +81,7 @@ pub(crate) fn walk(source: &dyn ByteSource, first_chunk_size: u64, findings: &Fi
 }
 
 /// Bytes of a file of the dataset.
-pub(crate) fn size_of(source: &dyn ByteSource, file: DatasetFile) -> Result<u64, ReadError> {
+pub(crate) fn size_of(source: &dyn ByteSource, file: &str) -> Result<u64, ReadError> {
     source.size(file).map_err(|e| ReadError::io(source.locate(file), "asking for the size", e))
 }
 

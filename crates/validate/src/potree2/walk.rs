@@ -8,8 +8,8 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pointmill_format::potree2::{Dataset, Encoding, Node, NodePoints};
-use pointmill_format::{ErrorKind, ReadError};
+use pointmill_format::potree2::{Dataset, Encoding, Node};
+use pointmill_format::{ErrorKind, NodePoints, ReadError};
 use rayon::prelude::*;
 
 use crate::against::Sums;
@@ -150,10 +150,11 @@ impl Walk<'_> {
         let checked = self.with_points(node, |points| {
             let (key, findings) = (node.key, task.findings);
             findings.checked(Check::Payloads, 1);
-            node_points::coordinates(key, &points.positions, findings);
-            let all_inside = node_points::boxes(key, &points.positions, &task.geometry, findings);
+            let positions = points.quantized().unwrap_or_default();
+            node_points::coordinates(key, positions, findings);
+            let all_inside = node_points::boxes(key, positions, &task.geometry, findings);
             if task.dataset.metadata().encoding == Encoding::Brotli {
-                node_points::order(key, &points.positions, findings);
+                node_points::order(key, positions, findings);
             }
             let mut seen = ranges::Seen::new(task.dataset.metadata());
             seen.add(points);
@@ -266,6 +267,6 @@ impl Walk<'_> {
 }
 
 fn transpose(points: &NodePoints) -> Vec<[i32; 3]> {
-    let [xs, ys, zs] = &points.positions;
+    let [xs, ys, zs] = points.quantized().unwrap_or_default();
     xs.iter().zip(ys).zip(zs).map(|((x, y), z)| [*x, *y, *z]).collect()
 }

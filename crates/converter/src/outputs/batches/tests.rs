@@ -298,7 +298,7 @@ fn without_colour_grey_shows_the_intensity_and_its_range_is_reported() {
     let mut plan = bench.plan();
     plan.inputs = vec![path.clone()];
     let (ours, report) = bench.convert(&plan, cell(100.0)).unwrap();
-    let ours = Batches::open_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
+    let ours = Batches::from_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
     let description = ours.description();
     assert_eq!(description.colour, ColourSource::Intensity);
     assert_eq!(description.extra["intensityRange"], serde_json::json!([1000, 1299]));
@@ -311,7 +311,7 @@ fn without_colour_grey_shows_the_intensity_and_its_range_is_reported() {
 
     fs::write(&path, "0 0 0\n1 1 1\n").unwrap();
     let (ours, _) = bench.convert(&plan, cell(100.0)).unwrap();
-    let ours = Batches::open_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
+    let ours = Batches::from_bytes(AlignedBytes::from(ours.as_slice()), Path::new("")).unwrap();
     assert!(ours.colour().unwrap().iter().all(|w| w & 0xff_ffff == 0xff_ffff));
 }
 
@@ -340,7 +340,7 @@ fn compressed_sections_are_those_of_the_plain_compressor() {
         let mut plan = bench.plan();
         plan.attributes = AttributeChoice::All;
         let (plain, _) = bench.convert(&plan, settings).unwrap();
-        let plain = Batches::open_bytes(AlignedBytes::from(plain.as_slice()), Path::new("")).unwrap();
+        let plain = Batches::from_bytes(AlignedBytes::from(plain.as_slice()), Path::new("")).unwrap();
         let mut expected = Cursor::new(Vec::new());
         compress(&plain, &mut expected, 3, 16).unwrap();
         for threads in [1, 3] {

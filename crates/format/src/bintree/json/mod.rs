@@ -5,8 +5,8 @@ mod scalars;
 
 use std::io;
 
-use super::ByteSource;
 use super::node::MAX_DEPTH;
+use crate::bytes::ByteSource;
 
 /// Bytes read at a time.
 const CHUNK: u64 = 64 << 10;
@@ -237,7 +237,7 @@ impl<'a> Json<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bintree::Memory;
+    use crate::bytes::Memory;
 
     fn with<T>(text: &str, read: impl Fn(&mut Json) -> Result<T, Fault>) -> Result<T, String> {
         let memory = Memory::from([("a".to_owned(), text.as_bytes().to_vec())]);

@@ -10,7 +10,7 @@ use crate::finding::{Finding, Findings};
 use crate::potree2::expect::{Geometry, morton_cmp};
 
 /// Stored coordinates below 0 (read as unsigned by some clients: 2^31 and more).
-pub(crate) fn coordinates(key: NodeKey, positions: &[Vec<i32>; 3], findings: &Findings) {
+pub(crate) fn coordinates(key: NodeKey, positions: [&[i32]; 3], findings: &Findings) {
     findings.checked(Check::Coordinates, positions[0].len() as u64);
     for (axis, values) in positions.iter().enumerate() {
         let negative = values.iter().filter(|v| **v < 0).count() as u64;
@@ -25,7 +25,7 @@ pub(crate) fn coordinates(key: NodeKey, positions: &[Vec<i32>; 3], findings: &Fi
 
 /// Dequantised points in the closed box of their node, within [`Geometry::tolerance`]. Negative coordinates are
 /// [`coordinates`]'s business. True if all are inside.
-pub(crate) fn boxes(key: NodeKey, positions: &[Vec<i32>; 3], geometry: &Geometry, findings: &Findings) -> bool {
+pub(crate) fn boxes(key: NodeKey, positions: [&[i32]; 3], geometry: &Geometry, findings: &Findings) -> bool {
     let [xs, ys, zs] = positions;
     findings.checked(Check::Boxes, xs.len() as u64);
     // Limits beyond 32 bits cannot be exceeded by what is stored in 32.
@@ -49,7 +49,7 @@ pub(crate) fn boxes(key: NodeKey, positions: &[Vec<i32>; 3], geometry: &Geometry
 }
 
 /// Ascending Morton codes, which BROTLI promises.
-pub(crate) fn order(key: NodeKey, positions: &[Vec<i32>; 3], findings: &Findings) {
+pub(crate) fn order(key: NodeKey, positions: [&[i32]; 3], findings: &Findings) {
     let [xs, ys, zs] = positions;
     findings.checked(Check::Order, xs.len() as u64);
     let at = |i: usize| [xs[i], ys[i], zs[i]];

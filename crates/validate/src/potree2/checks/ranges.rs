@@ -1,7 +1,7 @@
 //! What the metadata says about values: the tight box, min and max of every attribute, histograms.
 
-use pointmill_format::potree2::{AttributeStats, Metadata, NodePoints};
-use pointmill_format::{Column, with_column};
+use pointmill_format::potree2::{AttributeStats, Metadata};
+use pointmill_format::{Column, NodePoints, with_column};
 use serde_json::json;
 
 use crate::check::Check;
@@ -39,10 +39,10 @@ impl Seen {
     /// Takes in the points of a node.
     pub(crate) fn add(&mut self, points: &NodePoints) {
         self.points += points.len() as u64;
-        for (seen, values) in self.position.iter_mut().zip(&points.positions) {
+        for (seen, values) in self.position.iter_mut().zip(points.quantized().unwrap_or_default()) {
             *seen = values.iter().fold(*seen, |(min, max), v| (min.min(*v), max.max(*v)));
         }
-        for (i, column) in points.columns.iter().enumerate() {
+        for (i, column) in points.columns().iter().enumerate() {
             add_column(&mut self.attributes[i], column);
             if let (Some(bins), Column::UInt8(values)) = (&mut self.histograms[i], column) {
                 values.iter().for_each(|v| bins[usize::from(*v)] += 1);

@@ -13,10 +13,10 @@ fn with_scan(points: usize) -> Dir {
 #[test]
 fn standard_output_is_for_results() {
     let dir = with_scan(1000);
-    let told = dir.succeed(["convert", "a.las", "-o", "out"]);
-    assert_eq!(told.stdout(), "");
-    assert!(told.stderr().contains("1,000 points") && told.stderr().contains("peak memory"), "{}", told.stderr());
-    assert!(told.stderr().lines().all(|line| line.starts_with("pointmill: ")), "{}", told.stderr());
+    let ended = dir.succeed(["convert", "a.las", "-o", "out"]);
+    assert_eq!(ended.stdout(), "");
+    assert!(ended.stderr().contains("1,000 points") && ended.stderr().contains("peak memory"), "{}", ended.stderr());
+    assert!(ended.stderr().lines().all(|line| line.starts_with("pointmill: ")), "{}", ended.stderr());
     let quiet = dir.succeed(["convert", "a.las", "-o", "out", "--overwrite", "-q"]);
     assert_eq!((quiet.stdout(), quiet.stderr()), (String::new(), String::new()));
 }
@@ -40,10 +40,10 @@ fn progress_for_programs_is_one_json_object_a_line() {
 #[test]
 fn the_report_is_in_the_dataset_and_where_it_was_asked_for() {
     let dir = with_scan(1000);
-    let told = dir.succeed(["convert", "a.las", "-o", "out", "--report", "run.json", "--json"]);
+    let ended = dir.succeed(["convert", "a.las", "-o", "out", "--report", "run.json", "--json"]);
     let report = dir.report("out");
     let copy: Value = serde_json::from_slice(&std::fs::read(dir.path("run.json")).unwrap()).unwrap();
-    let printed: Value = serde_json::from_str(&told.stdout()).unwrap();
+    let printed: Value = serde_json::from_str(&ended.stdout()).unwrap();
     for key in ["points", "grid", "outputs", "inputs", "checksum_in"] {
         assert!(!report[key].is_null(), "{key}");
         assert!(report[key] == copy[key] && report[key] == printed[key], "{key}");
@@ -53,7 +53,7 @@ fn the_report_is_in_the_dataset_and_where_it_was_asked_for() {
 }
 
 #[test]
-fn info_tells_of_scans_and_of_datasets() {
+fn info_describes_scans_and_datasets() {
     let dir = with_scan(1000);
     dir.succeed(["convert", "a.las", "-o", "out", "-q"]);
     let text = dir.succeed(["info", "a.las", "out"]).stdout();
@@ -68,7 +68,7 @@ fn info_tells_of_scans_and_of_datasets() {
 }
 
 #[test]
-fn info_tells_of_the_good_and_fails_for_the_bad() {
+fn info_describes_the_good_and_fails_for_the_bad() {
     let dir = with_scan(1000);
     dir.write("b.las", b"LASF, or so it says");
     let ended = dir.run(["info", "b.las", "a.las"]);
@@ -87,7 +87,7 @@ fn datasets_of_the_reference_converter_are_known() {
 }
 
 #[test]
-fn validation_tells_in_words_and_in_json() {
+fn validation_reports_in_words_and_in_json() {
     let dir = with_scan(20_000);
     dir.succeed(["convert", "a.las", "-o", "out", "-q"]);
     let text = dir.succeed(["validate", "out", "--against", "a.las"]).stdout();

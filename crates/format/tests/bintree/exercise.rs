@@ -1,12 +1,13 @@
-//! One call that does everything a program may do with a dataset, for fuzzers and tests of damage.
+//! One call that does everything a program may do with a dataset: for the tests of damage here, and for the fuzz target,
+//! which includes this file.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::{io, path::Path};
 
-use crate::{Aabb, ReadError};
-
-use super::{Bintree, ByteSource, Frustum, INDEX_FILE, LeafPoints, Picker, Ray};
+use pointmill_format::bintree::{Bintree, Frustum, INDEX_FILE, Picker, Ray};
+use pointmill_format::bytes::ByteSource;
+use pointmill_format::{Aabb, NodePoints, ReadError};
 
 /// Opens an index from bytes, with `leaves` as the bytes of every other file, and asks everything: all leaves, boxes,
 /// frustums, draw lists, picks. Returns the number of points that could be read.
@@ -14,10 +15,10 @@ use super::{Bintree, ByteSource, Frustum, INDEX_FILE, LeafPoints, Picker, Ray};
 /// # Errors
 /// The first thing that was refused. Nothing else may happen: no panic, and no memory beyond a small multiple of the
 /// bytes given.
-pub fn exercise(index: &[u8], leaves: &[u8]) -> Result<usize, ReadError> {
+pub(crate) fn exercise(index: &[u8], leaves: &[u8]) -> Result<usize, ReadError> {
     let source = Bytes { index: index.to_vec(), leaves: leaves.to_vec() };
-    let tree = Arc::new(Bintree::from_source(Box::new(source))?);
-    let (mut points, mut scratch, mut fault) = (0, LeafPoints::default(), Ok(()));
+    let tree = Arc::new(Bintree::from_source(source)?);
+    let (mut points, mut scratch, mut fault) = (0, NodePoints::default(), Ok(()));
     for leaf in tree.leaves() {
         match tree.read_leaf(leaf, &mut scratch) {
             Ok(()) => points += scratch.len(),

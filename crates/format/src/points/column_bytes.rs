@@ -28,7 +28,7 @@ pub(crate) fn append(column: &mut Column, records: &[u8], record_len: usize, at:
 }
 
 /// Appends one coordinate of every record.
-pub(super) fn append_i32(values: &mut Vec<i32>, records: &[u8], record_len: usize, at: usize) {
+pub(crate) fn append_i32(values: &mut Vec<i32>, records: &[u8], record_len: usize, at: usize) {
     append_typed(values, records, record_len, at, 1);
 }
 
