@@ -237,7 +237,7 @@ fn what_json_cannot_say_is_never_written() {
     made.lattice.offset = [636_001.76, 0.1 + 0.2, 5e-324];
     made.name = "a \"quoted\" name\\\n\u{1}".into();
     made.projection = "+proj=utm +zone=10".into();
-    let read = Metadata::from_json(made.to_json().as_bytes(), "made".as_ref()).unwrap();
+    let read = Metadata::from_json(made.to_json().as_bytes(), "made").unwrap();
     made.attributes[4].min = vec![f64::MIN];
     made.attributes[4].max = vec![0.0];
     assert_eq!(read, made);
