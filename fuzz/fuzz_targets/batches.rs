@@ -2,13 +2,11 @@
 
 #![no_main]
 
-use std::path::Path;
-
 use pointmill_format::batches::{AlignedBytes, Batches};
 use pointmill_fuzz::check_error;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let opened = Batches::from_bytes(AlignedBytes::from(bytes), Path::new("points.qbatch"));
+    let opened = Batches::from_bytes(AlignedBytes::from(bytes), "points.qbatch");
     if let Err(error) = opened.and_then(|batches| batches.read_everything()) {
         check_error(&error);
     }

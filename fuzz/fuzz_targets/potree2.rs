@@ -4,12 +4,9 @@
 
 #![no_main]
 
-use std::path::Path;
-
-use pointmill_format::ReadError;
-use pointmill_format::NodePoints;
 use pointmill_format::bytes::Memory;
 use pointmill_format::potree2::{Dataset, HIERARCHY_FILE, Hierarchy, METADATA_FILE, Metadata, OCTREE_FILE};
+use pointmill_format::{NodePoints, ReadError};
 use pointmill_fuzz::check_error;
 
 const METADATA: [&[u8]; 2] = [
@@ -30,9 +27,9 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
 });
 
 fn read(metadata: &[u8], hierarchy: &[u8], octree: &[u8]) -> Result<(), ReadError> {
-    let parsed = Metadata::from_json(metadata, Path::new("metadata.json"));
+    let parsed = Metadata::from_json(metadata, "metadata.json");
     if let Ok(parsed) = &parsed {
-        let again = Metadata::from_json(parsed.to_json().as_bytes(), Path::new("again"));
+        let again = Metadata::from_json(parsed.to_json().as_bytes(), "again");
         assert!(again.is_ok(), "what is written can be read: {again:?}");
     }
     let metadata = match parsed {

@@ -28,7 +28,7 @@ const LAYERS: [(&str, Layers<'static>); 4] = [
     (
         "pointmill-format",
         &[
-            &["error", "bytes", "geometry"],
+            &["error", "bytes", "geometry", "names"],
             &["points"],
             &["scan"],
             &["potree2", "bintree", "batches"],

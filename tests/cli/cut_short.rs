@@ -4,7 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{Dir, corpus, fixture};
+use pointmill_testkit::files::{corpus, fixture};
+
+use crate::support::Dir;
 
 #[test]
 fn a_scan_that_was_cut_short_is_one_line_and_nothing_else() {

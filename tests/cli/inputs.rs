@@ -1,42 +1,32 @@
 //! Scans of every kind: converted, described, mixed; files that state too little or state it wrongly.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use pointmill_testkit::files::{corpus, entries, fixture, scan_fixtures};
+use pointmill_testkit::las::Las;
 use serde_json::{Value, json};
 
-use crate::support::{Dir, Las, corpus, fixture};
+use crate::support::Dir;
 
-/// The scans of a folder, sorted.
-fn scans(folder: &Path) -> Vec<PathBuf> {
-    let files = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let is_scan = |p: &PathBuf| {
-        p.is_file() && p.extension().is_some_and(|e| e != "tsv") && !p.ends_with("LICENSE-autzen_trim.txt")
-    };
-    let mut files: Vec<PathBuf> = files.filter(is_scan).collect();
-    files.sort();
-    files
-}
-
-/// Converts a file and proves its points; one without points must say so.
-fn converts(path: &Path) {
+/// Converts a file and proves its points; one without points must say so. The points read.
+fn converts(path: &Path) -> u64 {
     let dir = Dir::new();
     let text = path.to_str().unwrap();
     let ended = dir.run(["convert", text, "-o", "out", "-q"]);
     if ended.code() == 3 && ended.stderr().contains("holds no points") {
         assert!(dir.names().is_empty(), "{text}");
-        return;
+        return 0;
     }
     assert_eq!(ended.code(), 0, "{}", ended.stderr());
     dir.validate("out", &[text]);
+    dir.report("out")["points"]["read"].as_u64().unwrap()
 }
 
 #[test]
 fn every_fixture_converts_and_holds_its_points() {
-    for folder in ["e57", "rows"] {
-        let files = scans(&fixture(folder));
-        assert!(files.len() > 10);
-        files.iter().for_each(|path| converts(path));
+    for fixture in ["e57", "rows"].iter().flat_map(|folder| scan_fixtures(folder)) {
+        assert_eq!(converts(&fixture.path), fixture.points, "{}", fixture.name);
     }
 }
 
@@ -45,7 +35,10 @@ fn scans_of_others_convert_and_hold_their_points() {
     for folder in ["e57", "ply", "pcd", "text", "las/permutations"] {
         let Some(folder) = corpus(folder) else { return };
         // a PLY without vertices has nothing to convert
-        scans(&folder).iter().filter(|p| !p.ends_with("no_vertex.ply")).for_each(|path| converts(path));
+        let scans = entries(&folder).into_iter().filter(|p| p.is_file() && !p.ends_with("no_vertex.ply"));
+        scans.for_each(|path| {
+            converts(&path);
+        });
     }
 }
 

@@ -1,8 +1,10 @@
 //! What is said where: results on standard output, everything else on standard error, in a form that was asked for.
 
+use pointmill_testkit::files::corpus;
+use pointmill_testkit::las::Las;
 use serde_json::Value;
 
-use crate::support::{Dir, Las, corpus};
+use crate::support::Dir;
 
 fn with_scan(points: usize) -> Dir {
     let dir = Dir::new();

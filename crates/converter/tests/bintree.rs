@@ -1,5 +1,6 @@
 //! Binary trees against a plain builder that holds everything in memory, and against themselves with other means.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,17 +9,16 @@ use pointmill_converter::{
 };
 use pointmill_format::bintree::{Bintree, Layout, NodeKind, SplitRule};
 use pointmill_format::{NodePoints, OpenOptions};
+use pointmill_testkit::Random;
+use pointmill_testkit::files::dataset;
 
 /// Lattice integers (steps of 0.01) and classes.
 type Points = Vec<([i64; 3], u8)>;
 
 fn random(count: usize, seed: u64, shape: impl Fn([f64; 3]) -> [f64; 3]) -> Points {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..count).map(|i| (shape([next(), next(), next()]).map(|v| (v * 100.0).round() as i64), (i % 7) as u8)).collect()
+    let mut random = Random::new(seed);
+    let mut place = || shape([random.unit(), random.unit(), random.unit()]).map(|v| (v * 100.0).round() as i64);
+    (0..count).map(|i| (place(), (i % 7) as u8)).collect()
 }
 
 fn write_text(path: &Path, points: &Points) {
@@ -131,17 +131,6 @@ fn read(folder: &Path) -> Vec<Expected> {
     nodes
 }
 
-fn every_file(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut files: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|e| e.unwrap())
-        .filter(|e| e.file_name() != "report.json")
-        .map(|e| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap()))
-        .collect();
-    files.sort();
-    files
-}
-
 #[test]
 fn the_tree_is_that_of_the_page_for_every_rule_and_shape() {
     let dir = tempfile::tempdir().unwrap();
@@ -182,7 +171,7 @@ fn threads_memory_tasks_and_the_order_of_inputs_do_not_show_in_the_bytes() {
     let names = ["a.xyz", "b.xyz"].map(|n| dir.path().join(n));
     for layout in [Layout::Files, Layout::Packed] {
         for split in [SplitRule::Mean, SplitRule::Median] {
-            let mut first: Option<Vec<(String, Vec<u8>)>> = None;
+            let mut first: Option<BTreeMap<String, Vec<u8>>> = None;
             for (threads, task, swapped) in
                 [(1, None, false), (3, Some(900), false), (2, Some(5000), true), (2, Some(1), false)]
             {
@@ -198,7 +187,7 @@ fn threads_memory_tasks_and_the_order_of_inputs_do_not_show_in_the_bytes() {
                     plan.memory_bytes = 160 << 20;
                 }
                 convert(&plan, &[settings.into()], &Silent).unwrap();
-                let files = every_file(&out);
+                let files = dataset(&out);
                 let count = if layout == Layout::Packed { 2 } else { 50 };
                 assert!(files.len() >= count, "{}", files.len());
                 match &first {
@@ -220,7 +209,7 @@ fn beside_an_octree_from_one_read_it_is_the_same_tree() {
     let mut plan = plan(vec![dir.path().join("scan.xyz")], both.clone());
     plan.task_points = Some(2000);
     let report = convert(&plan, &[Potree2Settings::default().into(), settings.into()], &Silent).unwrap();
-    assert_eq!(every_file(&both.join("bintree")), every_file(&alone));
+    assert_eq!(dataset(&both.join("bintree")), dataset(&alone));
     assert_eq!(report.outputs.iter().map(|o| o.format.as_str()).collect::<Vec<_>>(), ["potree2", "bintree"]);
     assert!(both.join("potree2/metadata.json").is_file() && both.join("report.json").is_file());
 }

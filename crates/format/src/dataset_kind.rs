@@ -1,14 +1,13 @@
 //! The kinds of datasets: names, files, and how each is recognised. A new format is one row here.
 
-use std::fmt;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
 use crate::ReadError;
+use crate::names::named;
 
 /// A kind of dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -144,33 +143,7 @@ impl DatasetKind {
     }
 }
 
-impl fmt::Display for DatasetKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A word that is the name of no kind of dataset.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{word:?} is no kind of dataset; known are {}", names())]
-pub struct UnknownDatasetKind {
-    word: String,
-}
-
-fn names() -> String {
-    DatasetKind::ALL.map(DatasetKind::name).join(", ")
-}
-
-impl FromStr for DatasetKind {
-    type Err = UnknownDatasetKind;
-
-    fn from_str(name: &str) -> Result<Self, UnknownDatasetKind> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == name)
-            .ok_or_else(|| UnknownDatasetKind { word: name.to_owned() })
-    }
-}
+named!(DatasetKind, "kind of dataset");
 
 impl Serialize for DatasetKind {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

@@ -17,6 +17,7 @@
 mod dataset_kind;
 mod error;
 mod geometry;
+mod names;
 mod points;
 
 pub mod batches;
@@ -25,13 +26,35 @@ pub mod bytes;
 pub mod potree2;
 pub mod scan;
 
-pub use dataset_kind::{DatasetKind, Located, UnknownDatasetKind, locate};
+pub use dataset_kind::{DatasetKind, Located, locate};
 pub use error::{ErrorKind, ReadError};
 pub use geometry::{Aabb, Lattice, NodeKey};
+pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart, Scratch, Sink, Wanted,
     open_scan, supported_scans,
+};
+
+/// The JSON library whose types hold keys that a format leaves free ([`potree2::Metadata::extra`]).
+pub use serde_json;
+
+/// The library of the R*-tree that [`bintree::NearestPoints::leaf_boxes`] gives (feature `rstar`).
+#[cfg(feature = "rstar")]
+pub use rstar;
+
+/// What threads share stays shareable: this compiles, or the types have lost it.
+const _: () = {
+    const fn shared<T: Send + Sync>() {}
+    shared::<potree2::Dataset>();
+    shared::<potree2::Hierarchy>();
+    shared::<bintree::Bintree>();
+    shared::<bintree::Picker>();
+    shared::<batches::Batches<batches::AlignedBytes>>();
+    shared::<NodePoints>();
+    shared::<bytes::Folder>();
+    shared::<ReadError>();
+    shared::<batches::WriteError>();
 };
 
 /// The example in the README compiles, or the tests fail.

@@ -48,7 +48,7 @@ fn text<B: AsRef<[u8]>>(file: &Path, batches: &Batches<B>, size: u64) -> String 
         t.row(&format!("error, {bits} bits"), format!("at most {max}, root mean square {rms}"));
     }
     t.row("CRS", or_none(&description.projection));
-    t.row("colour", format!("{:?}", description.colour).to_lowercase());
+    t.row("colour", description.colour.name());
     t.row("originals", plural(batches.originals().len() as u64, "colour"));
     t.row("size", bytes(size));
     for (i, attribute) in attributes(batches).iter().enumerate() {

@@ -62,7 +62,7 @@ mod zstd_blocks {
         BATCH_POINTS, Batches, Description, Flags, HEADER_BYTES, Header, Part, Section, WriteError, align,
     };
     use super::{BlockScratch, MAX_BATCHES_PER_BLOCK, entry, head};
-    use crate::ReadError;
+    use crate::{Attribute, ReadError};
 
     /// Batches of a block unless another number is asked for: 640 KiB of words.
     pub const DEFAULT_BATCHES_PER_BLOCK: u32 = 16;
@@ -148,19 +148,21 @@ mod zstd_blocks {
         let sections = &mut header.sections;
         file.skip_to(HEADER_BYTES)?;
         sections.batches = file.raw(bytemuck::cast_slice(source.records()))?.offset;
-        sections.hi10 = file.blocks(raw(source, Part::Hi10)?, 4)?.offset;
-        sections.colour = file.blocks(raw(source, Part::Colour)?, 4)?.offset;
-        for (i, attribute) in source.attributes().enumerate() {
-            let section = file.blocks(raw(source, Part::Attribute(i))?, attribute.size())?;
-            if let Some(entry) = description.attributes.get_mut(i) {
-                (entry.offset, entry.bytes) = (section.offset, section.bytes);
+        let attribute_sizes: Vec<usize> = source.attributes().map(Attribute::size).collect();
+        for part in Part::in_file_order(attribute_sizes.len(), source.header().precision()) {
+            let size = if let Part::Attribute(i) = part { attribute_sizes[i] } else { 4 };
+            let section = file.blocks(raw(source, part)?, size)?;
+            match part {
+                Part::Hi10 => sections.hi10 = section.offset,
+                Part::Mid10 => sections.mid10 = Some(section.offset),
+                Part::Lo10 => sections.lo10 = Some(section.offset),
+                Part::Colour => sections.colour = section.offset,
+                Part::Attribute(i) => {
+                    if let Some(entry) = description.attributes.get_mut(i) {
+                        (entry.offset, entry.bytes) = (section.offset, section.bytes);
+                    }
+                }
             }
-        }
-        if sections.mid10.is_some() {
-            sections.mid10 = Some(file.blocks(raw(source, Part::Mid10)?, 4)?.offset);
-        }
-        if sections.lo10.is_some() {
-            sections.lo10 = Some(file.blocks(raw(source, Part::Lo10)?, 4)?.offset);
         }
         if let Some(bytes) = source.originals_section() {
             sections.originals = Some(file.raw(bytes)?.offset);

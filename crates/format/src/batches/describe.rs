@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::names::named;
 use crate::{Attribute, AttributeType, Lattice, ReadError};
 
 use super::Precision;
@@ -142,6 +143,22 @@ pub enum ColourSource {
     #[default]
     None,
 }
+
+impl ColourSource {
+    /// Every source.
+    pub const ALL: [Self; 3] = [Self::Rgb, Self::Intensity, Self::None];
+
+    /// The word in the description.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rgb => "rgb",
+            Self::Intensity => "intensity",
+            Self::None => "none",
+        }
+    }
+}
+
+named!(ColourSource, "source of colours");
 
 /// Errors of decoded positions over all points, world units: x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

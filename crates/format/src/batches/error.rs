@@ -4,6 +4,7 @@ use std::io;
 
 /// A request that the format cannot fulfil, or a disk that did not.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 #[allow(missing_docs)] // the messages say what the values are
 pub enum WriteError {
     #[error("{0} points are more than one file holds (4294967295); divide the cloud")]

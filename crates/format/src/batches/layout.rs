@@ -4,8 +4,8 @@ use crate::{Aabb, Attribute};
 
 use super::describe::{AttributeEntry, Description};
 use super::{
-    BATCH_POINTS, Flags, Grid, HEADER_BYTES, Header, MAX_POINTS, Precision, Sections, WriteError, align, batch_count,
-    swap_slot,
+    BATCH_POINTS, Flags, Grid, HEADER_BYTES, Header, MAX_POINTS, Part, Precision, Sections, WriteError, align,
+    batch_count, swap_slot,
 };
 
 /// A range of the file, in bytes.
@@ -21,6 +21,17 @@ impl Section {
     pub const fn end(&self) -> u64 {
         self.offset.saturating_add(self.bytes)
     }
+}
+
+/// A section with one entry per point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PointSection {
+    /// What it holds.
+    pub part: Part,
+    /// Where it is.
+    pub section: Section,
+    /// Bytes of an entry.
+    pub bytes_per_point: u64,
 }
 
 /// Places of all sections of a file that is not compressed.
@@ -53,6 +64,7 @@ pub struct Layout {
 
 /// The end of a file: what there is to write when all points are.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Finish {
     /// The fields of the header.
     pub header: Header,
@@ -97,14 +109,67 @@ impl Layout {
             end = section.end();
             section
         };
-        let batches = batch_count(points);
-        let records = section(32 * u64::from(batches));
-        let (hi10, colour) = (section(4 * points), section(4 * points));
-        let attributes = described.iter().map(|a| section(points * a.size() as u64)).collect();
-        let mid10 = (precision >= Precision::Twenty).then(|| section(4 * points));
-        let lo10 = (precision >= Precision::Thirty).then(|| section(4 * points));
-        let originals = section(0).offset;
-        Self { points, batches, records, hi10, colour, attributes, mid10, lo10, originals, described }
+        let (batches, count) = (batch_count(points), described.len());
+        let (records, unplaced) = (section(32 * u64::from(batches)), Section { offset: 0, bytes: 0 });
+        let (hi10, colour, attributes) = (unplaced, unplaced, vec![unplaced; count]);
+        let mut layout = Self {
+            points,
+            batches,
+            records,
+            hi10,
+            colour,
+            attributes,
+            mid10: None,
+            lo10: None,
+            originals: 0,
+            described,
+        };
+        for part in Part::in_file_order(count, precision) {
+            let placed = section(points * layout.bytes_per_point(part));
+            match part {
+                Part::Hi10 => layout.hi10 = placed,
+                Part::Mid10 => layout.mid10 = Some(placed),
+                Part::Lo10 => layout.lo10 = Some(placed),
+                Part::Colour => layout.colour = placed,
+                Part::Attribute(i) => layout.attributes[i] = placed,
+            }
+        }
+        layout.originals = section(0).offset;
+        layout
+    }
+
+    /// The sections with one entry per point, in the order of the file.
+    ///
+    /// ```
+    /// use pointmill_format::batches::{Layout, Part, Precision};
+    /// use pointmill_format::{Attribute, AttributeType};
+    ///
+    /// # fn main() -> Result<(), pointmill_format::batches::WriteError> {
+    /// let attributes = [Attribute::new("intensity", AttributeType::UInt16, 1)];
+    /// let layout = Layout::new(1000, &attributes, Precision::Ten)?;
+    /// let sections: Vec<_> = layout.sections().map(|s| (s.part, s.bytes_per_point, s.section.offset)).collect();
+    /// assert_eq!(sections, [(Part::Hi10, 4, 512), (Part::Colour, 4, 4608), (Part::Attribute(0), 2, 8704)]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn sections(&self) -> impl Iterator<Item = PointSection> + '_ {
+        Part::in_file_order(self.described.len(), self.precision()).filter_map(|part| {
+            let section = match part {
+                Part::Hi10 => Some(self.hi10),
+                Part::Mid10 => self.mid10,
+                Part::Lo10 => self.lo10,
+                Part::Colour => Some(self.colour),
+                Part::Attribute(i) => self.attributes.get(i).copied(),
+            };
+            Some(PointSection { part, section: section?, bytes_per_point: self.bytes_per_point(part) })
+        })
+    }
+
+    fn bytes_per_point(&self, part: Part) -> u64 {
+        match part {
+            Part::Attribute(i) => self.described.get(i).map_or(0, |a| a.size() as u64),
+            _ => 4,
+        }
     }
 
     /// The same file with other planes: what lies before mid10 stays where it is.
@@ -124,8 +189,7 @@ impl Layout {
 
     /// The first byte behind the last section that has one entry a point.
     pub fn end_of_points(&self) -> u64 {
-        let attributes = self.attributes.last().unwrap_or(&self.colour);
-        self.lo10.or(self.mid10).unwrap_or(*attributes).end()
+        self.sections().last().map_or(self.records, |last| last.section).end()
     }
 
     /// The slot of Morton batch `batch`, and the storage index of its first point.

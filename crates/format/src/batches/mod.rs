@@ -45,6 +45,7 @@ mod layout;
 #[cfg(feature = "mmap")]
 mod map;
 mod order;
+mod part;
 mod points;
 mod precision;
 mod read;
@@ -63,13 +64,14 @@ pub use encode::{EncodedBatch, ErrorSums, encode_batch, le_bytes};
 pub use error::WriteError;
 pub use grid::{Grid, LOD_LEVELS, f32_above, f32_below};
 pub use header::{Flags, Header, Sections};
-pub use layout::{Finish, Layout, Section};
+pub use layout::{Finish, Layout, PointSection, Section};
 #[cfg(feature = "mmap")]
 pub use map::MappedFile;
 pub use order::{batch_count, batch_points, swap_slot};
+pub use part::Part;
 pub use points::{BatchScratch, Point, PointsInMortonOrder};
 pub use precision::{Precision, distance_to_box, focal_pixels, projected_diagonal};
-pub use read::{Batches, Original, Part};
+pub use read::{Batches, Original};
 pub use record::{BatchRecord, Decoder, planes, quantized};
 pub use write::{Cloud, WriteOptions, Written, write};
 

@@ -10,21 +10,9 @@ use crate::{Attribute, Element, ReadError};
 use super::check::{Check, Places};
 use super::header::CORRUPT;
 use super::{
-    AlignedBytes, BATCH_POINTS, BATCHES_FILE, BatchRecord, BlockScratch, Decoder, Description, Flags, Header,
+    AlignedBytes, BATCH_POINTS, BATCHES_FILE, BatchRecord, BlockScratch, Decoder, Description, Flags, Header, Part,
     Precision, Section, rgb_of, swap_slot,
 };
-
-/// A section with one entry a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[allow(missing_docs)] // the names say it
-pub enum Part {
-    Hi10,
-    Mid10,
-    Lo10,
-    Colour,
-    /// By its place in [`Batches::attributes`].
-    Attribute(usize),
-}
 
 /// The colour of a point before it was replaced by the mean of its cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
@@ -39,6 +27,19 @@ pub struct Original {
 /// An open file of quantised batches: any bytes that are aligned to 8, a map ([`Batches::map`]) or memory.
 ///
 /// Places and lengths were checked when it was opened. Threads may share it.
+///
+/// ```
+/// use pointmill_format::batches::{Batches, Precision, rgb_of};
+///
+/// # fn main() -> Result<(), pointmill_format::ReadError> {
+/// let batches = Batches::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/batches/example.qbatch"))?;
+/// let colours = batches.colour().unwrap_or(&[]); // a section as it is, for the GPU
+/// assert_eq!(colours.len() as u64, batches.header().points);
+/// let (position, rgb) = (batches.position(0, Precision::Ten), colours.first().map(|word| rgb_of(*word)));
+/// println!("{position:?} {rgb:?}");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Batches<B> {
     bytes: B,

@@ -7,8 +7,8 @@ use crate::{Aabb, Attribute, Lattice};
 
 use super::describe::{ColourSource, Description};
 use super::{
-    BATCH_POINTS, ColourSum, EncodedBatch, ErrorSums, Grid, HEADER_BYTES, Header, LOD_LEVELS, Layout, Precision,
-    Section, WriteError, align, colour_word, encode_batch, le_bytes, lod_of, rgb_of,
+    BATCH_POINTS, ColourSum, EncodedBatch, ErrorSums, Grid, HEADER_BYTES, Header, LOD_LEVELS, Layout, Part,
+    PointSection, Precision, Section, WriteError, align, colour_word, encode_batch, le_bytes, lod_of, rgb_of,
 };
 
 /// Points in memory, in any order.
@@ -126,21 +126,19 @@ pub fn write(out: &mut (impl Write + Seek), cloud: &Cloud, options: &WriteOption
         file.put(&r.points.to_le_bytes())?;
     }
     let slots = || (0..layout.batches).map(|slot| &batches[layout.slot(slot).0 as usize]);
-    file.begin(layout.hi10)?;
-    slots().try_for_each(|b| file.put(&le_bytes(&b.hi10)))?;
-    file.begin(layout.colour)?;
-    stored.iter().try_for_each(|i| file.put(&colours[*i].to_le_bytes()))?;
-    for (section, (attribute, values)) in layout.attributes.iter().zip(cloud.attributes) {
-        file.begin(*section)?;
-        stored.iter().try_for_each(|i| file.put(&values[i * attribute.size()..][..attribute.size()]))?;
-    }
-    if let Some(section) = layout.mid10 {
+    for PointSection { part, section, .. } in layout.sections() {
         file.begin(section)?;
-        slots().try_for_each(|b| file.put(&le_bytes(&b.mid10)))?;
-    }
-    if let Some(section) = layout.lo10 {
-        file.begin(section)?;
-        slots().try_for_each(|b| file.put(&le_bytes(&b.lo10)))?;
+        match part {
+            Part::Hi10 => slots().try_for_each(|b| file.put(&le_bytes(&b.hi10)))?,
+            Part::Mid10 => slots().try_for_each(|b| file.put(&le_bytes(&b.mid10)))?,
+            Part::Lo10 => slots().try_for_each(|b| file.put(&le_bytes(&b.lo10)))?,
+            Part::Colour => stored.iter().try_for_each(|i| file.put(&colours[*i].to_le_bytes()))?,
+            Part::Attribute(a) => {
+                let (attribute, values) = &cloud.attributes[a];
+                let size = attribute.size();
+                stored.iter().try_for_each(|i| file.put(&values[i * size..][..size]))?;
+            }
+        }
     }
     file.begin(Section { offset: layout.originals, bytes: Layout::originals_bytes(count) })?;
     file.put(&count.to_le_bytes())?;

@@ -44,6 +44,16 @@ impl Material {
 }
 
 /// What can be seen: inside where a·x + b·y + c·z + d ≥ 0 for every plane [a, b, c, d], world coordinates.
+///
+/// ```
+/// use pointmill_format::{Aabb, bintree::Frustum};
+///
+/// // from the origin along y, z up, 90 degrees in both directions, from 1 to 100 units
+/// let fov = 90f64.to_radians();
+/// let frustum = Frustum::perspective([0.0; 3], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], fov, 1.0, [1.0, 100.0]);
+/// assert!(frustum.contains([0.0, 10.0, 9.0]) && !frustum.contains([0.0, 10.0, 11.0]));
+/// assert!(!frustum.may_see(&Aabb { min: [-1.0, -9.0, -1.0], max: [1.0, -5.0, 1.0] }), "behind the camera");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frustum {
     /// Normals point inwards; they need not have length 1.

@@ -35,6 +35,7 @@ pub fn class_value(class: f64) -> f32 {
 /// assert_eq!((bounds.min, bounds.max, bytes.len()), (points[0], points[1], 32));
 /// ```
 #[derive(Debug)]
+#[must_use = "the bounds of `finish` belong into the index"]
 pub struct LeafEncoder<'a> {
     stride: usize,
     center: [f64; 3],

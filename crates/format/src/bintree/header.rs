@@ -3,6 +3,7 @@
 use serde_json::{Map, Value};
 
 use crate::Lattice;
+use crate::names::named;
 
 use super::RecordLayout;
 
@@ -22,6 +23,9 @@ pub enum Layout {
 }
 
 impl Layout {
+    /// Every layout.
+    pub const ALL: [Self; 2] = [Self::Files, Self::Packed];
+
     /// The word in the index.
     pub const fn name(self) -> &'static str {
         match self {
@@ -29,12 +33,9 @@ impl Layout {
             Self::Packed => "packed",
         }
     }
-
-    /// The layout with that word, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Files, Self::Packed].into_iter().find(|l| l.name() == name)
-    }
 }
+
+named!(Layout, "layout");
 
 /// How splitting planes are found (`docs/formats/bintree.md`, section 6.2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -49,6 +50,9 @@ pub enum SplitRule {
 }
 
 impl SplitRule {
+    /// Every rule.
+    pub const ALL: [Self; 3] = [Self::Mean, Self::Median, Self::Midpoint];
+
     /// The word in the index.
     pub const fn name(self) -> &'static str {
         match self {
@@ -57,12 +61,9 @@ impl SplitRule {
             Self::Midpoint => "midpoint",
         }
     }
-
-    /// The rule with that word, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Mean, Self::Median, Self::Midpoint].into_iter().find(|r| r.name() == name)
-    }
 }
+
+named!(SplitRule, "split rule");
 
 /// Everything in `index.json` but the nodes.
 #[derive(Debug, Clone, PartialEq)]

@@ -47,7 +47,7 @@ pub use encode::{LeafEncoder, class_value, leaf_center};
 pub use header::{Header, Layout, SplitRule};
 #[cfg(feature = "rstar")]
 pub use nearest::{LeafBox, NearestPoints, Neighbour};
-pub use node::{INDEX_FILE, MAX_DEPTH, Node, NodeKind, PACKED_FILE, leaf_file_name};
+pub use node::{INDEX_FILE, MAX_DEPTH, Node, NodeKind, NodePath, PACKED_FILE, leaf_file_name};
 pub use pick::{Hit, Picker, Ray};
 pub use record_layout::{CORE_BYTES, PlacedAttribute, RecordLayout};
 pub use tree::Bintree;

@@ -1,5 +1,7 @@
 //! A node as the index tells it.
 
+use std::fmt::{self, Write as _};
+
 use crate::Aabb;
 
 /// The file of the tree.
@@ -81,6 +83,48 @@ impl Node {
             NodeKind::Leaf { center, .. } if !finite(center) => Some(format!("has the center {center:?}")),
             _ => None,
         }
+    }
+}
+
+/// The way from the root down to a node: for each step, true for the high side. Prints as digits, as in file names.
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodePath(Vec<bool>);
+
+impl NodePath {
+    /// Steps: the node's depth; 0 for the root.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// True for the root.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The steps, the first at the root.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = bool> + '_ {
+        self.0.iter().copied()
+    }
+}
+
+impl FromIterator<bool> for NodePath {
+    fn from_iter<I: IntoIterator<Item = bool>>(steps: I) -> Self {
+        Self(steps.into_iter().collect())
+    }
+}
+
+impl IntoIterator for NodePath {
+    type Item = bool;
+    type IntoIter = std::vec::IntoIter<bool>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
+    }
+}
+
+impl fmt::Display for NodePath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.iter().try_for_each(|high| f.write_char(if high { '1' } else { '0' }))
     }
 }
 

@@ -12,6 +12,16 @@ use super::{Bintree, NodeKind};
 
 /// A ray that is wide enough to meet points: from `origin` along `direction`, all that lies within
 /// `radius + spread · distance` of it.
+///
+/// ```
+/// use pointmill_format::bintree::Ray;
+///
+/// // five pixels wide, if 1080 pixels are 60 degrees
+/// let pixel = (60f64.to_radians() / 1080.0).tan();
+/// let ray = Ray::new([0.0; 3], [0.0, 2.0, 0.0], 0.0).map(|ray| ray.with_spread(5.0 * pixel));
+/// assert!(ray.is_some());
+/// assert!(Ray::new([0.0; 3], [0.0; 3], 0.0).is_none(), "no direction");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     origin: [f64; 3],

@@ -10,7 +10,7 @@ use crate::{Attribute, AttributeType, Lattice};
 
 use super::header::{FORMAT, VERSION};
 use super::json::{Fault, Json};
-use super::{Header, Layout, PlacedAttribute, RecordLayout, SplitRule};
+use super::{Header, PlacedAttribute, RecordLayout};
 
 /// The values of header keys as text, and where they stand.
 #[derive(Default)]
@@ -90,8 +90,8 @@ impl HeaderText {
         self.check_kind("format")?;
         self.check_kind("version")?;
         let word = |key| self.required::<String>(key, "a string");
-        let layout = Layout::from_name(&word("layout")?);
-        let split = SplitRule::from_name(&word("split")?);
+        let layout = word("layout")?.parse().ok();
+        let split = word("split")?.parse().ok();
         let header = Header {
             generator: self.optional("generator", "a string")?.unwrap_or_default(),
             name: self.optional("name", "a string")?.unwrap_or_default(),

@@ -6,12 +6,27 @@ use crate::bytes::{ByteSource, Folder};
 use crate::{NodePoints, ReadError};
 
 use super::read_index::read_index;
-use super::{Header, INDEX_FILE, Node, NodeKind, PACKED_FILE, leaf_file_name, leaf_points};
+use super::{Header, INDEX_FILE, Node, NodeKind, NodePath, PACKED_FILE, leaf_file_name, leaf_points};
 
 /// A mean-split binary tree: its index in memory, its leaves where they are. Threads may share it; reading a leaf keeps
 /// nothing.
 ///
-/// Nodes are told by their index in preorder; the root, if there is one, is 0.
+/// Nodes are identified by their index in preorder; the root, if there is one, is 0.
+///
+/// ```
+/// use pointmill_format::bintree::{Bintree, Frustum, switch_distance};
+///
+/// # fn main() -> Result<(), pointmill_format::ReadError> {
+/// let tree = Bintree::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/bintree/packed"))?;
+/// let bounds = tree.nodes()[0].bounds;
+/// let (eye, fov) = ([bounds.min[0] - 10.0, bounds.center()[1], bounds.center()[2]], 60f64.to_radians());
+/// let frustum = Frustum::perspective(eye, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], fov, 16.0 / 9.0, [0.1, 1e4]);
+/// for (leaf, material) in tree.draw_list(eye, switch_distance(0.05, fov, 1080.0), Some(&frustum)) {
+///     println!("{}: {material:?}", tree.leaf_name(leaf));
+/// }
+/// # Ok(())
+/// # }
+/// ```
 pub struct Bintree {
     source: Box<dyn ByteSource>,
     header: Header,
@@ -64,8 +79,19 @@ impl Bintree {
         (0u32..).zip(&self.nodes).filter(|(_, node)| node.is_leaf()).map(|(index, _)| index)
     }
 
-    /// The steps from the root down to a node: true for the high side. Empty if there is no such node.
-    pub fn path(&self, index: u32) -> Vec<bool> {
+    /// The way from the root down to a node.
+    ///
+    /// ```
+    /// use pointmill_format::bintree::Bintree;
+    ///
+    /// # fn main() -> Result<(), pointmill_format::ReadError> {
+    /// let tree = Bintree::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/bintree/files"))?;
+    /// let paths: Vec<String> = tree.leaves().map(|leaf| tree.path(leaf).to_string()).collect();
+    /// assert_eq!(paths[..3], ["00", "0100", "01010"]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn path(&self, index: u32) -> NodePath {
         let (mut path, mut at) = (Vec::new(), 0);
         while at < index
             && let Some([low, high]) = self.children(at)
@@ -73,7 +99,7 @@ impl Bintree {
             path.push(index >= high);
             at = if index >= high { high } else { low };
         }
-        path
+        path.into_iter().collect()
     }
 
     /// What a leaf's file is called in layout `files`; in layout `packed` a name all the same.

@@ -13,7 +13,24 @@ use super::{Header, Layout, Node, NodeKind, PlacedAttribute};
 ///
 /// Nothing wrong is written: nodes that are not a tree in preorder, counts that do not add up and numbers that JSON does
 /// not know are errors of kind [`io::ErrorKind::InvalidInput`].
+///
+/// ```
+/// use pointmill_format::bintree::{Bintree, IndexWriter};
+/// use pointmill_format::bytes::Memory;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let tree = Bintree::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/bintree/files"))?;
+/// let mut index = IndexWriter::new(Vec::new(), tree.header())?;
+/// for node in tree.nodes() {
+///     index.node(node)?;
+/// }
+/// let copy = Memory::from([("index.json".to_owned(), index.finish()?)]);
+/// assert_eq!(Bintree::from_source(copy)?.nodes(), tree.nodes());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
+#[must_use = "the index is complete after `finish`"]
 pub struct IndexWriter<W> {
     out: W,
     layout: Layout,

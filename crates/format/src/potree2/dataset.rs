@@ -22,6 +22,20 @@ const MAX_BROTLI_RATIO: u64 = 1 << 24;
 const MAX_NODE_BYTES: u64 = 4 << 30;
 
 /// A Potree 2.0 dataset. Threads may share it; every method reads what it needs and keeps nothing.
+///
+/// ```
+/// use pointmill_format::bytes::Folder;
+/// use pointmill_format::potree2::Dataset;
+///
+/// # fn main() -> Result<(), pointmill_format::ReadError> {
+/// let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/potree2/default");
+/// let dataset = Dataset::open(folder)?;
+/// // the same from any source of bytes
+/// let again = Dataset::from_source(Folder::new(folder))?;
+/// assert_eq!(dataset.read_root_chunk()?, again.read_root_chunk()?);
+/// # Ok(())
+/// # }
+/// ```
 pub struct Dataset {
     source: Box<dyn ByteSource>,
     metadata: Metadata,

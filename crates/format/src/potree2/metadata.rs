@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::names::named;
 use crate::{Aabb, Attribute, Lattice, NodeKey, ReadError};
 
 use super::{metadata_json, metadata_parse};
@@ -16,6 +17,9 @@ pub enum Encoding {
 }
 
 impl Encoding {
+    /// Every encoding.
+    pub const ALL: [Self; 2] = [Self::Default, Self::Brotli];
+
     /// The word in the metadata.
     pub const fn name(self) -> &'static str {
         match self {
@@ -24,6 +28,8 @@ impl Encoding {
         }
     }
 }
+
+named!(Encoding, "encoding");
 
 /// An attribute and what its values are like.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +45,23 @@ pub struct AttributeStats {
 }
 
 /// The contents of `metadata.json`.
+///
+/// ```
+/// use pointmill_format::{NodeKey, potree2::{Dataset, Metadata}};
+///
+/// # fn main() -> Result<(), pointmill_format::ReadError> {
+/// let dataset = Dataset::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/potree2/default"))?;
+/// let metadata = dataset.metadata();
+/// assert_eq!(metadata.node_cube(NodeKey::ROOT), metadata.cube);
+/// assert_eq!(metadata.spacing_at(1), metadata.spacing / 2.0);
+/// for stats in &metadata.attributes {
+///     println!("{}: {:?} to {:?}", stats.attribute.name, stats.min, stats.max);
+/// }
+/// // what is written is read back
+/// assert_eq!(&Metadata::from_json(metadata.to_json().as_bytes(), "copy")?, metadata);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Metadata {
     /// Name of the cloud.
@@ -75,8 +98,8 @@ impl Metadata {
     /// # Errors
     /// What is missing, of the wrong type or out of range, and where; [`crate::ErrorKind::Unsupported`] for a version,
     /// an encoding or an attribute type that is not of Potree 2.0.
-    pub fn from_json(bytes: &[u8], path: &Path) -> Result<Self, ReadError> {
-        metadata_parse::parse(bytes, path)
+    pub fn from_json(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        metadata_parse::parse(bytes, path.as_ref())
     }
 
     /// The text of `metadata.json`, with all keys that PotreeConverter 2.1 writes and then [`Self::extra`].

@@ -67,7 +67,8 @@ impl Source {
     pub(crate) fn slice_at<'a>(&self, offset: u64, len: u64, buf: &'a mut Vec<u8>) -> Result<&'a [u8], ReadError> {
         let end = offset.checked_add(len).filter(|end| *end <= self.len);
         let Some(len) = end.and_then(|_| usize::try_from(len).ok()) else {
-            return Err(ReadError::broken(&self.path, offset, format!("{len} bytes expected, the file ends before")));
+            return Err(ReadError::broken(&self.path, offset, format!("{len} bytes expected, the file ends before"))
+                .advise("it was cut short; copy or export it again"));
         };
         if buf.len() < len {
             buf.resize(len, 0);

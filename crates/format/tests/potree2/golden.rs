@@ -80,7 +80,7 @@ fn the_metadata_says_what_the_script_wrote_and_survives_a_round_trip() {
     assert_eq!(m.attributes[3].histogram.as_ref().map(|h| h[17]), Some(2));
     assert_eq!(m.extra["pointmill"]["wkt"], r#"LOCAL_CS["a \ b"]"#);
 
-    let again = Metadata::from_json(m.to_json().as_bytes(), "again".as_ref()).unwrap();
+    let again = Metadata::from_json(m.to_json().as_bytes(), "again").unwrap();
     assert_eq!(&again, m);
 }
 

@@ -43,7 +43,7 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     let xml_bytes = header::read_xml(&source, &mut warnings)?;
     let document = xml::parse(&xml_bytes).map_err(|why| {
         let what = format!("the XML section cannot be read: {why}");
-        ReadError::broken(path, 24, what)
+        ReadError::broken(path, 24, what).advise("export it again from its source")
     })?;
     tell_of_the_rest(&document, &mut warnings);
     let mut notes = Notes::default();

@@ -47,7 +47,7 @@ impl Header {
         let bytes = source.vec_at(0, HEADER_1_4)?;
         if !super::is_las(&bytes) {
             let what = if bytes.is_empty() { "the file is empty" } else { "not a LAS or LAZ file (no LASF signature)" };
-            return Err(ReadError::broken(path, 0, what));
+            return Err(ReadError::broken(path, 0, what).advise("see which file was meant"));
         }
         if source.len() < MIN_HEADER {
             let what = format!("the header has {} of at least {MIN_HEADER} bytes", source.len());

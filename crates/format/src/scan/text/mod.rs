@@ -119,13 +119,15 @@ pub fn open(path: &Path, options: &TextOptions) -> Result<Box<dyn Scan>, ReadErr
     let source = Source::open(path)?;
     let first = source.vec_at(0, 64 << 10)?;
     if first.is_empty() {
-        return Err(ReadError::broken(path, 0, "the file is empty"));
+        return Err(ReadError::broken(path, 0, "the file is empty").advise("see which file was meant"));
     }
     if first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff]) {
         return Err(ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8"));
     }
     if let Some(at) = first.iter().position(|b| *b == 0) {
-        return Err(ReadError::broken(path, at as u64, "not text: it has zero bytes"));
+        return Err(
+            ReadError::broken(path, at as u64, "not text: it has zero bytes").advise("see which file was meant")
+        );
     }
     match kind(&first) {
         Some(TextKind::Off) => off::open(source),

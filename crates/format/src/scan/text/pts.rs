@@ -29,7 +29,9 @@ pub(super) fn open(source: Source, options: &TextOptions) -> Result<Box<dyn Scan
     }
     let first = lines::first_filled(&source, from, 64)?;
     let Some((first_row, row)) = first.into_iter().find(|(_, line)| is_row(line)) else {
-        return Err(ReadError::broken(source.path(), from, "there are no rows of points"));
+        return Err(
+            ReadError::broken(source.path(), from, "there are no rows of points").advise("see which file was meant")
+        );
     };
     let separator = wanted_separator(options).unwrap_or_else(|| separator(&row));
     let numeric: Vec<bool> = fields(&row, separator).iter().map(|f| is_number(f)).collect();
