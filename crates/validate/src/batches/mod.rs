@@ -126,7 +126,12 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
 
 /// True if the planes determine every point's lattice integers, by the boxes. Planes that are absent although they would
 /// have determined them are reported: a writer should omit them only when asked to.
-fn lattice_is_determined(header: &Header, description: &Description, boxes: &[Option<Box32>], findings: &Findings) -> bool {
+fn lattice_is_determined(
+    header: &Header,
+    description: &Description,
+    boxes: &[Option<Box32>],
+    findings: &Findings,
+) -> bool {
     let fine = |bounds: &Box32, bits: u32| {
         (0..3).all(|a| Axis::new(&description.lattice, header.origin, bounds, a, bits).is_fine())
     };
