@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-/// 60 % of what the machine or its cgroup allows, bytes; 2 GiB where nothing can be found out.
+/// 60 % of what the machine or its cgroup allows, bytes; 2 GiB where neither is known.
 pub fn default_ceiling_bytes() -> u64 {
     let limit = [cgroup_limit_bytes(), available_bytes()].into_iter().flatten().min();
     limit.map_or(2 << 30, |bytes| bytes / 5 * 3)

@@ -108,7 +108,41 @@ fn an_octree_in_memory_and_spilled() {
     check("octree", &[potree2()], |_| ());
     let brotli = Potree2Settings { encoding: Encoding::Brotli { quality: 1 }, ..Potree2Settings::default() };
     check("octree, Brotli", &[brotli.into()], |_| ());
-    check("octree, spilled", &[potree2()], |plan| (plan.threads, plan.memory_bytes) = (1, 92 << 20));
+}
+
+/// A PLY whose points are so wide that few of them exceed the memory.
+fn wide_scan(path: &Path) {
+    const COLUMNS: usize = 300;
+    let names: String = (0..COLUMNS).map(|i| format!("property double q{i}\n")).collect();
+    let axes = "property double x\nproperty double y\nproperty double z\n";
+    let head = format!("ply\nformat binary_little_endian 1.0\nelement vertex 6000\n{axes}{names}end_header\n");
+    let mut bytes = head.into_bytes();
+    for i in 0..6000u32 {
+        let q = [i * 7919 % 10_007, i * 104_729 % 9_973, i % 7].map(f64::from);
+        let wide = (0..COLUMNS as u32).map(|c| f64::from(i ^ c));
+        bytes.extend(q.into_iter().chain(wide).flat_map(f64::to_le_bytes));
+    }
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_cloud_that_is_spilled() {
+    let spilled = |targets: &[Target], what: &str| {
+        check(what, targets, |plan| {
+            wide_scan(&plan.inputs[0]);
+            (plan.threads, plan.memory_bytes) = (1, 1);
+            let Err(ConvertError::Memory { needed, .. }) =
+                convert_on(FailingDisk::after(u64::MAX), plan, targets, &Silent)
+            else {
+                panic!("one byte is enough?")
+            };
+            plan.memory_bytes = needed;
+            let report = convert_on(FailingDisk::after(u64::MAX), plan, targets, &Silent).unwrap();
+            assert!(report.temp_bytes > 0, "{what}: nothing was spilled");
+        });
+    };
+    spilled(&[bintree(Layout::Packed)], "binary tree, spilled");
+    spilled(&[potree2()], "octree, spilled");
 }
 
 #[test]

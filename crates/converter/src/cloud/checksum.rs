@@ -21,7 +21,7 @@ fn fold(a: u64, b: u64) -> u64 {
     (p as u64) ^ (p >> 64) as u64
 }
 
-/// Mixes 16 bytes; `i` tells their place.
+/// Mixes 16 bytes; `i` is their place.
 #[inline]
 fn mix(bytes: &[u8; 16], i: u64) -> u64 {
     let v = u128::from_le_bytes(*bytes);

@@ -1,4 +1,4 @@
-//! Sorting by Morton codes: a radix sort of (code, index) packed into one word; what the words cannot tell apart is
+//! Sorting by Morton codes: a radix sort of (code, index) packed into one word; what the words do not distinguish is
 //! settled by a comparison, so that the order depends on the points alone.
 
 use std::cmp::Ordering;
@@ -29,7 +29,7 @@ impl MortonSorter {
     }
 
     /// Sorts by the codes, which are below `2^code_bits`. The lowest `idle_bits` need not be looked at. Points whose
-    /// codes agree as far as the words tell are put in order by `compare`, which takes two indices.
+    /// codes agree in all bits that the words hold are put in order by `compare`, which takes two indices.
     pub(crate) fn sort(&mut self, code_bits: u32, idle_bits: u32, compare: impl Fn(usize, usize) -> Ordering) {
         let index_bits = self.index_bits;
         let shift = code_bits.saturating_sub(u64::BITS - index_bits).max(idle_bits);

@@ -59,7 +59,7 @@ impl<'a> Regrouper<'a> {
         source.map_or(Ok(()), |source| self.put_back(source, &mut code, &mut found))
     }
 
-    /// Puts the records of one source into a block of their own.
+    /// Puts the records of one source into a new block.
     fn put_back(
         &mut self,
         source: u32,

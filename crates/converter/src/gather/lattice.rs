@@ -17,7 +17,7 @@ const USUAL_STEP: f64 = 0.001;
 /// The least step, world units: below it single precision of renderers ends.
 const LEAST_STEP: f64 = 1e-30;
 
-/// A step that could be so many times finer, had the headers been right, is worth a second read.
+/// A step that could be this many times finer, had the headers been right, is worth a second read.
 const WORTH_READING_AGAIN: f64 = 100.0;
 
 /// The lattice for what the headers say.
@@ -117,7 +117,7 @@ impl Need {
                 is_sampled |= extent.is_sampled;
             }
             if info.lattice.is_some() {
-                continue; // its own step is a candidate of its own
+                continue; // its step is a candidate by itself
             }
             is_single &= info.resolution == Resolution::Single;
             resolution = resolution.min(match info.resolution {
@@ -133,7 +133,7 @@ impl Need {
         }
         // The true box of a sampled scan is larger, though hardly twice as large.
         let extent = if is_sampled { 2.0 * extent } else { extent };
-        // Doubles themselves have 53 bits; a step is some of their own steps, or the lattice would be uneven.
+        // Doubles themselves have 53 bits; a step is several of theirs, or the lattice would be uneven.
         let room = (extent / 2f64.powi(EXTENT_BITS)).max(farthest * 2f64.powi(-50));
         let room = if farthest > 0.0 { room.max(LEAST_STEP) } else { room };
         let resolution = if resolution.is_finite() { resolution } else { 0.0 };

@@ -108,7 +108,7 @@ impl<E> TopNodes<E> {
         (self.slabs.len() - 1) as u32
     }
 
-    /// Moves the records of a node that was just sampled into a slab of their own.
+    /// Moves the records of a node that was just sampled into a separate slab.
     fn gather_slab(&mut self, points: &mut [TopPoint]) {
         let mut records = Vec::with_capacity(points.len() * self.stride);
         for p in points.iter() {

@@ -102,7 +102,7 @@ pub(crate) struct DiskSize {
 /// What all outputs need together.
 ///
 /// # Errors
-/// An attribute that was asked for and that no input has.
+/// An attribute that was requested and that no input has.
 pub(crate) fn wants(plan: &Plan, targets: &[Target], all: &Schema) -> Result<Wants, PlanError> {
     let each: Vec<Wants> = targets.iter().map(|t| t.output().wants(plan, all)).collect();
     if let AttributeChoice::List(names) = &plan.attributes {

@@ -67,33 +67,36 @@ impl StagedFolder {
         StagedDataset { folder: self.staging.path().to_path_buf(), name: "", disk: Arc::clone(&self.disk) }
     }
 
-    /// Gives the folder its final name. What stood there before goes only when the new one is in place.
+    /// Gives the folder its final name. What stood there before goes only when the new one is in place; whatever fails
+    /// before is undone.
     pub(crate) fn finish(self) -> Result<(), ConvertError> {
-        let output = self.output.as_path();
+        let (output, staging) = (self.output.as_path(), self.staging.path());
         let fail = |doing| move |e| ConvertError::io(output, doing, e);
-        check_output(&self.output, self.overwrite)?;
-        make_readable(self.staging.path()).map_err(fail("setting permissions"))?;
-        sync_folder(&*self.disk, self.staging.path()).map_err(fail("syncing the output"))?;
-        let old = if self.output.exists() {
-            let mut old = self.staging.path().as_os_str().to_owned();
+        check_output(output, self.overwrite)?;
+        make_readable(staging).map_err(fail("setting permissions"))?;
+        sync_folder(&*self.disk, staging).map_err(fail("syncing the output"))?;
+        let old = output.exists().then(|| {
+            let mut old = staging.as_os_str().to_owned();
             old.push("-old");
-            let old = PathBuf::from(old);
-            rename(&*self.disk, &self.output, &old).map_err(fail("moving the old output aside"))?;
-            Some(old)
-        } else {
-            None
-        };
-        if let Err(error) = rename(&*self.disk, self.staging.path(), &self.output) {
-            if let Some(old) = &old {
-                fs::rename(old, &self.output).map_err(fail("moving the old output back"))?;
-            }
+            PathBuf::from(old)
+        });
+        if let Some(old) = &old {
+            rename(&*self.disk, output, old).map_err(fail("moving the old output aside"))?;
+        }
+        // From here on a failure puts the old output back; the new one goes with the staging folder.
+        let put_back = || old.as_ref().map_or(Ok(()), |old| fs::rename(old, output));
+        if let Err(error) = rename(&*self.disk, staging, output) {
+            put_back().map_err(fail("moving the old output back"))?;
             return Err(fail("giving the output its name")(error));
         }
-        let _moved = self.staging.keep();
-        sync_folder(&*self.disk, &parent_of(&self.output)).map_err(fail("syncing the folder of the output"))?;
-        if let Some(old) = old {
-            fs::remove_dir_all(&old).map_err(fail("removing the old output"))?;
+        if let Err(error) = sync_folder(&*self.disk, &parent_of(output)) {
+            fs::rename(output, staging).and_then(|()| put_back()).map_err(fail("moving the old output back"))?;
+            return Err(fail("syncing the folder of the output")(error));
         }
+        if let Some(old) = &old {
+            fs::remove_dir_all(old).map_err(fail("removing the old output"))?;
+        }
+        let _moved = self.staging.keep();
         Ok(())
     }
 }

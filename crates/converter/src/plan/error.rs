@@ -106,7 +106,7 @@ pub enum PlanFault {
     /// An attribute that no input has.
     #[error("no input has \"{name}\"; the inputs have: {}", known.join(", "))]
     UnknownAttribute {
-        /// The name that was asked for.
+        /// The name that was requested.
         name: String,
         /// The names that the inputs have.
         known: Vec<String>,

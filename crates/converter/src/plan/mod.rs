@@ -1,4 +1,4 @@
-//! What was asked for: every setting resolved, nothing left to guess.
+//! What was requested: every setting resolved, nothing left to guess.
 
 mod error;
 

@@ -1,4 +1,4 @@
-//! How a run tells what it is doing, and how it is told to stop.
+//! How a run reports what it is doing, and how it is asked to stop.
 
 use crate::warning::Warning;
 

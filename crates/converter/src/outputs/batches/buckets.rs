@@ -17,7 +17,7 @@ const PIECE_POINTS: u64 = 1 << 20;
 /// Levels by which a bucket that is too large is divided at once.
 const SPLIT_LEVELS: u32 = 3;
 
-/// At the level of buckets that is chosen, at most one point in so many lies in a bucket that must be divided again.
+/// At the level of buckets that is chosen, at most one point in this many is in a bucket that must be divided again.
 const MOST_FIT: u64 = 16;
 
 /// A run of the Morton order that one thread sorts and encodes.

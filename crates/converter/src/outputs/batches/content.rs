@@ -10,7 +10,7 @@ use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
 use crate::warning::Warning;
 
-/// Where colours come from, and which attributes have sections of their own.
+/// Where colours come from, and which attributes have a section each.
 pub(super) struct Content {
     colour: Colour,
     /// In the order of their sections.
@@ -21,7 +21,7 @@ pub(super) struct Content {
     pub(super) warnings: Vec<Warning>,
 }
 
-/// An attribute with a section of its own.
+/// An attribute that has a section.
 #[derive(Debug, Clone)]
 pub(super) struct Extra {
     pub(super) attribute: Attribute,

@@ -27,7 +27,7 @@ const WRITE_BYTES: usize = 4 << 20;
 struct Patch {
     /// Colour word before averaging.
     word: u32,
-    /// What the file holds so far, and what it shall hold.
+    /// What the file holds so far, and what it must hold.
     written: u32,
     shown: u32,
 }

@@ -11,7 +11,7 @@ use crate::plan::{PlanError, PlanFault, Setting};
 /// Levels of buckets: what is called a start is a Morton code of that many bits an axis.
 pub(super) const BUCKET_LEVELS: u32 = 21;
 
-/// Points of a surface that a cell of level 0 shall hold where its size is left to us.
+/// Points of a surface that a cell of level 0 should hold where the plan does not state its size.
 const POINTS_PER_CELL: f64 = 64.0;
 
 /// How stored integers become positions, cells and Morton codes. Every step is monotonous on each axis, so boxes of

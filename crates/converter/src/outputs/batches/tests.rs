@@ -91,7 +91,7 @@ impl Scan {
         fs::write(path, b).unwrap();
     }
 
-    /// What the plain writer makes of it; `like` tells cell, planes and description.
+    /// What the plain writer makes of it; `like` gives cell, planes and description.
     fn reference(&self, like: &[u8], with_extras: bool) -> (Vec<u8>, Written) {
         let header = Header::parse(like, Path::new("ours")).unwrap();
         let at = header.sections.description as usize;
@@ -239,7 +239,7 @@ fn planes_are_left_out_when_asked_or_not_needed() {
         assert_eq!(bits, planes.map_or(10, |p| 10 * u32::from(p)), "9 m in steps of 1 cm");
         assert_eq!(report.outputs[0].details["planes"], bits);
     }
-    // most batches are small, some are not: found out at the end
+    // most batches are small, some are not: detected at the end
     let mut clusters = scan.map(|p| p.map(|v| v / 4));
     clusters.positions.iter_mut().step_by(2).for_each(|p| p[0] += 100_000);
     check("clusters", &clusters, cell(1.0));

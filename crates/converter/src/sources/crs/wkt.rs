@@ -19,7 +19,7 @@ const HORIZONTAL: [&str; 10] = [
     "GEODETICCRS",
     "GEOCCS",
 ];
-/// Systems made of others, with a name of their own.
+/// Systems made of others, which have a name too.
 const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 /// Elements that only hold a system.
 const HOLDERS: [&str; 2] = ["BOUNDCRS", "SOURCECRS"];
