@@ -1,6 +1,6 @@
 //! What the headers say, put together: open inputs, one lattice, one schema.
 
-use pointmill_format::{Aabb, ErrorKind, Lattice, ReadError, Resolution, Scan, Wanted, open_scan};
+use pointmill_format::{Aabb, Advice, ErrorKind, Fault, Lattice, ReadError, Resolution, Scan, Wanted, open_scan};
 
 use crate::axis::{AxisMap, SourceMap};
 use crate::error::ConvertError;
@@ -62,7 +62,7 @@ impl Job {
                     points_missing = points_missing.saturating_add(missing);
                     scans.push(scan);
                 }
-                Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind, ErrorKind::Unsupported) => {
+                Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind(), ErrorKind::Unsupported) => {
                     warnings.push(format!("left out: {error}"));
                 }
                 Err(error) => return Err(error.into()),
@@ -125,7 +125,7 @@ impl Job {
                 let columns: Vec<Option<usize>> = columns.into_iter().map(|c| places[c]).collect();
                 let class =
                     |i: usize| plan.filter.classes.is_some() && scan.info().attributes[i].name == "classification";
-                let wanted = Wanted(columns.iter().enumerate().map(|(i, c)| c.is_some() || class(i)).collect());
+                let wanted = columns.iter().enumerate().map(|(i, c)| c.is_some() || class(i)).collect::<Wanted>();
                 Source { scan, columns, wanted, map }
             })
             .collect();
@@ -213,9 +213,8 @@ fn missing_points(scan: &dyn Scan, policy: OnFault) -> Result<u64, ReadError> {
     let found: u64 = scan.pieces().iter().map(|p| p.points).sum();
     let missing = info.points_declared.saturating_sub(found);
     if missing > 0 && policy == OnFault::Fail {
-        let what = format!("the header declares {} points, the file holds {found}", info.points_declared);
-        return Err(ReadError::broken(&info.path, info.file_bytes, what)
-            .advise("copy the file again, or pass --unreadable skip to convert the points that are there"));
+        let fault = Fault::PointsMissing { declared: info.points_declared, found };
+        return Err(ReadError::broken(&info.path, info.file_bytes, fault).advise(Advice::SkipUnreadable));
     }
     Ok(missing)
 }

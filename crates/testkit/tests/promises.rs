@@ -128,7 +128,7 @@ impl Fake {
         match self.fault {
             Fault::ErrorOfTwoLines => {
                 let mut error = ReadError::broken("fake", 7, "odd").advise("look at it");
-                error.what += "\nvery odd";
+                error.what() += "\nvery odd";
                 Some(error)
             }
             Fault::ErrorWithoutByte => Some(ReadError::broken("fake", None, "odd").advise("look at it")),

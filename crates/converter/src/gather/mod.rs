@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use pointmill_format::{NodeKey, Scratch};
+use pointmill_format::{Advice, NodeKey, Scratch};
 
 pub(crate) use batch::{Grouping, is_eight_bit};
 pub(crate) use moments::Moments;
@@ -216,9 +216,7 @@ impl Pass<'_> {
                 worker.stats.warnings.push(format!("left out {lost} points: {error}"));
                 Ok(())
             }
-            Err(error) if error.advice.is_empty() => {
-                Err(error.advise("copy the file again, or pass --unreadable skip to convert the rest").into())
-            }
+            Err(error) if error.advice().is_none() => Err(error.advise(Advice::SkipUnreadable).into()),
             Err(error) => Err(error.into()),
         }
     }

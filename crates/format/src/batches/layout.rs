@@ -234,7 +234,7 @@ impl Layout {
         description.errors = description.errors.up_to(self.precision());
         let text = description.to_json();
         if let Err(e) = Description::from_json(text.as_bytes(), "description".as_ref(), 0) {
-            return Err(WriteError::input(format!("{}: not a number, infinite, or a scale that is not > 0", e.what)));
+            return Err(WriteError::input(format!("{}: not a number, infinite, or a scale that is not > 0", e.what())));
         }
         let description_offset = align(self.originals + Self::originals_bytes(originals));
         let header = Header {

@@ -31,14 +31,14 @@ impl Cloud {
     }
 
     pub(crate) fn warned(&self, words: &str) -> bool {
-        self.info.warnings.iter().any(|w| w.contains(words))
+        self.info.warnings.iter().any(|w| w.to_string().contains(words))
     }
 }
 
 /// Decodes all pieces and checks what every decode promises: consecutive points, batches within bounds, columns that
 /// fit, memory that the file justifies.
 pub(crate) fn read(path: &Path) -> Result<Cloud, ReadError> {
-    let scan = e57::open_with(path, E57Options { keep_row_column: true })?;
+    let scan = e57::open_with(path, E57Options::default().keep_row_column(true))?;
     Ok(read_scan(scan.as_ref(), &Wanted::all(scan.info())))
 }
 

@@ -11,7 +11,10 @@ fn a_file_cut_anywhere_is_one_clear_error() {
         for i in 0..64 {
             let len = whole.len() * i / 64;
             let error = read_bytes(&whole[..len]).unwrap_err();
-            assert!(matches!(error.kind, ErrorKind::Broken) && error.offset.is_some(), "{name} cut to {len}: {error}");
+            assert!(
+                matches!(error.kind(), ErrorKind::Broken) && error.offset().is_some(),
+                "{name} cut to {len}: {error}"
+            );
             assert!(!error.to_string().contains('\n'));
         }
     }

@@ -86,7 +86,7 @@ fn a_selection_of_columns_leaves_the_others_empty_and_changes_no_value() {
         let all = common::read_scan(scan.as_ref(), &Wanted::all(scan.info()));
         for i in 0..all.columns.len() {
             let mut wanted = Wanted::positions(scan.info());
-            wanted.0[i] = true;
+            wanted.set(i, true);
             let one = common::read_scan(scan.as_ref(), &wanted);
             assert_eq!(one.xyz, all.xyz, "{name}");
             for (j, column) in one.columns.iter().enumerate() {

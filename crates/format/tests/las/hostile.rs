@@ -10,7 +10,7 @@ const SCALE: usize = 131;
 
 fn refused(bytes: &[u8], words: &str) {
     let error = read_bytes(bytes).unwrap_err();
-    assert!(matches!(error.kind, ErrorKind::Broken), "{error}");
+    assert!(matches!(error.kind(), ErrorKind::Broken), "{error}");
     assert!(error.to_string().contains(words), "{error}");
 }
 
@@ -55,7 +55,7 @@ fn versions_and_formats_that_are_not_known_are_named() {
         let mut bytes = fixture("format3.las");
         bytes[at] = value;
         let error = read_bytes(&bytes).unwrap_err();
-        assert!(matches!(error.kind, ErrorKind::Unsupported));
+        assert!(matches!(error.kind(), ErrorKind::Unsupported));
         assert!(error.to_string().contains(words), "{error}");
     }
 }

@@ -29,7 +29,7 @@ impl Cloud {
     }
 
     pub(crate) fn warned(&self, words: &str) -> bool {
-        self.info.warnings.iter().any(|w| w.contains(words))
+        self.info.warnings.iter().any(|w| w.to_string().contains(words))
     }
 
     /// "name typexelements" of every attribute.

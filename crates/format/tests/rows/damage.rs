@@ -20,8 +20,8 @@ fn check_errors(result: &Result<Cloud, ReadError>) {
     for e in errors {
         let line = e.to_string();
         assert!(!line.contains('\n'), "{line}");
-        assert!(e.offset.is_some() || matches!(e.kind, pointmill_format::ErrorKind::Unsupported), "{line}");
-        assert!(!e.advice.is_empty() || e.what.contains("empty") || e.what.contains("text"), "{line}");
+        assert!(e.offset().is_some() || matches!(e.kind(), pointmill_format::ErrorKind::Unsupported), "{line}");
+        assert!(e.advice().is_some() || e.what().contains("empty") || e.what().contains("text"), "{line}");
     }
 }
 

@@ -83,14 +83,14 @@ impl Drop for Context<'_> {
 pub fn check_error(error: &ReadError) {
     let line = error.to_string();
     assert!(!line.contains(['\n', '\r']), "an error is not one line: {line:?}");
-    assert!(!error.what.is_empty(), "an error without a word: {line:?}");
+    assert!(!error.what().is_empty(), "an error without a word: {line:?}");
 }
 
 /// [`check_error`], and that a broken scan is told with its byte and what to do.
 fn check_scan_error(error: &ReadError) {
     check_error(error);
-    if matches!(error.kind, ErrorKind::Broken) {
-        assert!(error.offset.is_some(), "an error without its byte: {error}");
-        assert!(!error.advice.is_empty(), "an error without advice: {error}");
+    if matches!(error.kind(), ErrorKind::Broken) {
+        assert!(error.offset().is_some(), "an error without its byte: {error}");
+        assert!(error.advice().is_some(), "an error without advice: {error}");
     }
 }

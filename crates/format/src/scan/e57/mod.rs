@@ -22,7 +22,7 @@
 //! use pointmill_format::{Scan, Scratch, Wanted};
 //! use std::ops::ControlFlow;
 //!
-//! let scan = e57::open("scan.e57".as_ref())?;
+//! let scan = e57::open("scan.e57")?;
 //! let (wanted, mut scratch, mut points) = (Wanted::all(scan.info()), Scratch::default(), 0);
 //! for piece in 0..scan.pieces().len() {
 //!     scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
@@ -64,9 +64,18 @@ use schema::{Fill, PositionFields};
 
 /// What to make of an E57 file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct E57Options {
     /// Keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as columns.
     pub keep_row_column: bool,
+}
+
+impl E57Options {
+    /// Sets [`Self::keep_row_column`].
+    #[must_use]
+    pub fn keep_row_column(self, keep_row_column: bool) -> Self {
+        Self { keep_row_column }
+    }
 }
 
 /// True if the first bytes of a file say that it is E57.
@@ -79,7 +88,7 @@ pub fn is_e57(first_bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// Not E57, cut short before the XML, XML that is damaged or not understood, a scan without positions.
-pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     open_with(path, E57Options::default())
 }
 
@@ -87,8 +96,8 @@ pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
 ///
 /// # Errors
 /// Those of [`open`].
-pub fn open_with(path: &Path, options: E57Options) -> Result<Box<dyn Scan>, ReadError> {
-    Ok(Box::new(open::open(path, options)?))
+pub fn open_with(path: impl AsRef<Path>, options: E57Options) -> Result<Box<dyn Scan>, ReadError> {
+    Ok(Box::new(open::open(path.as_ref(), options)?))
 }
 
 /// An open file.

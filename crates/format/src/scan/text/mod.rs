@@ -39,10 +39,11 @@ use std::path::Path;
 use crate::scan::source::Source;
 use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::lines;
-use crate::{ReadError, Scan};
+use crate::{Fault, ReadError, Scan};
 
 /// What the file does not say of itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TextOptions {
     /// Names of all columns in file order: `x`, `y`, `z`, `r`, `g`, `b`, `i` (intensity), `c` (classification), `nx`,
     /// `ny`, `nz`; `-` is left out; any other becomes an attribute of that name. A type may follow a colon
@@ -52,8 +53,25 @@ pub struct TextOptions {
     pub separator: Option<char>,
 }
 
+impl TextOptions {
+    /// Sets [`Self::columns`].
+    #[must_use]
+    pub fn columns<N: Into<String>>(mut self, names: impl IntoIterator<Item = N>) -> Self {
+        self.columns = Some(names.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Sets [`Self::separator`].
+    #[must_use]
+    pub fn separator(mut self, separator: char) -> Self {
+        self.separator = Some(separator);
+        self
+    }
+}
+
 /// The kinds of text that are told apart by content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TextKind {
     /// Lines of numbers: XYZ, TXT, CSV, ASC.
     Xyz,
@@ -115,11 +133,12 @@ pub fn is_xyz(first_bytes: &[u8]) -> bool {
 /// # Errors
 /// Not text, columns that cannot be told or do not fit `options`, a header (PTX, OFF) that is cut short or makes no
 /// sense, a line of more than 1 MiB.
-pub fn open(path: &Path, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
+    let path = path.as_ref();
     let source = Source::open(path)?;
     let first = source.vec_at(0, 64 << 10)?;
     if first.is_empty() {
-        return Err(ReadError::broken(path, 0, "the file is empty"));
+        return Err(ReadError::broken(path, 0, Fault::Empty));
     }
     if first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff]) {
         return Err(ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8"));
