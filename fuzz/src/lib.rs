@@ -99,7 +99,7 @@ fn mix(sum: u64, v: u64) -> u64 {
 fn check_columns(scan: &dyn Scan, wanted: &Wanted, batch: &PointBatch) {
     let attributes = &scan.info().attributes;
     assert_eq!(batch.columns.len(), attributes.len());
-    for ((column, attribute), wanted) in batch.columns.iter().zip(attributes).zip(wanted.flags()) {
+    for ((column, attribute), wanted) in batch.columns.iter().zip(attributes.iter()).zip(wanted.flags()) {
         assert_eq!(column.ty(), attribute.ty, "{}", attribute.name);
         let len = with_column!(column, v => v.len());
         assert!(!wanted || len == batch.len() * attribute.elements, "{}: {len} values", attribute.name);

@@ -188,15 +188,15 @@ mod tests {
     use super::*;
 
     fn geotiff(code: u32) -> ResolvedCrs {
-        resolve(&Crs { epsg: Some(code), ..Crs::default() }, None).unwrap()
+        resolve(&Crs::new(None, Some(code), None), None).unwrap()
     }
 
     fn in_wkt(text: &str, epsg: Option<u32>) -> ResolvedCrs {
-        resolve(&Crs { wkt: Some(text.into()), epsg, vertical_epsg: None }, None).unwrap()
+        resolve(&Crs::new(Some(text.into()), epsg, None), None).unwrap()
     }
 
     fn given(text: &str) -> Result<ResolvedCrs, ConvertError> {
-        resolve(&Crs { epsg: Some(32633), ..Crs::default() }, Some(text))
+        resolve(&Crs::new(None, Some(32633), None), Some(text))
     }
 
     const OREGON: &str = "+proj=lcc +lat_1=43 +lat_2=45.5 +lat_0=41.75 +lon_0=-120.5 +x_0=399999.9999984 +y_0=0 \
@@ -213,7 +213,7 @@ mod tests {
         assert_eq!(geotiff(25832).label, "EPSG:25832 ETRS89 / UTM zone 32N");
         assert!(geotiff(3857).projection.starts_with("+proj=merc +a=6378137 +b=6378137"));
         assert!(geotiff(3857).projection.contains("+nadgrids=@null"));
-        let crs = Crs { epsg: Some(2994), vertical_epsg: Some(5703), wkt: None };
+        let crs = Crs::new(None, Some(2994), Some(5703));
         assert!(resolve(&crs, None).unwrap().label.ends_with("(ft) + EPSG:5703"));
     }
 

@@ -17,6 +17,13 @@ pub struct Crs {
     pub vertical_epsg: Option<u32>,
 }
 
+impl Crs {
+    /// What is known: WKT text, code of the (projected) system, code of the vertical one.
+    pub fn new(wkt: Option<String>, epsg: Option<u32>, vertical_epsg: Option<u32>) -> Self {
+        Self { wkt, epsg, vertical_epsg }
+    }
+}
+
 /// What is known of a scan before its points are decoded. Header values are claims, not facts.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]

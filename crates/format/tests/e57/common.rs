@@ -58,7 +58,9 @@ pub(crate) fn read_scan(scan: &dyn Scan, wanted: &Wanted) -> Cloud {
             next += batch.len() as u64;
             let Positions::World(xyz) = &batch.positions else { panic!("E57 has no lattice") };
             cloud.xyz.iter_mut().zip(xyz).for_each(|(all, some)| all.extend(some));
-            for ((all, some), attribute) in cloud.columns.iter_mut().zip(&batch.columns).zip(&cloud.info.attributes) {
+            for ((all, some), attribute) in
+                cloud.columns.iter_mut().zip(&batch.columns).zip(cloud.info.attributes.iter())
+            {
                 assert!(some.is_empty() || some.len() == batch.len() * attribute.elements);
                 assert_eq!(some.ty(), attribute.ty);
                 all.extend(doubles(some));

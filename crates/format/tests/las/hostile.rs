@@ -140,5 +140,5 @@ fn names_with_line_breaks_leave_warnings_one_line() {
     put(&mut bytes, at + 2, b"a\nb\r\x1b[31m");
     put(&mut bytes, at + 20, &u64::MAX.to_le_bytes());
     let cloud = read_bytes(&bytes).unwrap();
-    assert!(cloud.warned("a b  [31m") && cloud.info.warnings.iter().all(|w| !w.contains(char::is_control)));
+    assert!(cloud.warned("a b  [31m") && cloud.info.warnings.iter().all(|w| !w.to_string().contains(char::is_control)));
 }

@@ -138,7 +138,7 @@ fn check_batch(info: &ScanInfo, wanted: &Wanted, batch: &PointBatch) {
     assert_eq!(is_lattice, info.lattice.is_some(), "positions are on a lattice, or the scan has none");
     assert_eq!(lengths, [batch.len(); 3], "the axes have the same length");
     assert_eq!(batch.columns.len(), info.attributes.len(), "one column for each attribute");
-    for ((column, attribute), wanted) in batch.columns.iter().zip(&info.attributes).zip(wanted.flags()) {
+    for ((column, attribute), wanted) in batch.columns.iter().zip(info.attributes.iter()).zip(wanted.flags()) {
         let name = &attribute.name;
         assert_eq!(column.ty(), attribute.ty, "the type of {name}");
         let expected = if *wanted { batch.len() * attribute.elements } else { 0 };
@@ -159,6 +159,8 @@ pub(super) fn check_description(scan: &dyn Scan) -> u64 {
     }
     let warnings = &info.warnings;
     assert!(warnings.len() < MAX_WARNINGS, "{} warnings", warnings.len());
-    warnings.iter().for_each(|w| assert!(!w.contains(char::is_control), "a warning is not one line: {w:?}"));
+    warnings
+        .iter()
+        .for_each(|w| assert!(!w.to_string().contains(char::is_control), "a warning is not one line: {w:?}"));
     next
 }
