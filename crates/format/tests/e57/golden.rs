@@ -96,7 +96,7 @@ fn columns_have_their_names_types_and_meaning() {
         "rgb, intensity, point source id, rowIndex, columnIndex, returnIndex, returnCount, timeStamp"
     );
     assert_eq!(names("normals.e57"), "point source id, NormalX, NormalY, NormalZ, class, class 2, reflectance");
-    let of = |file: &str, name: &str| attributes(file).into_iter().find(|a| a.name == name).unwrap();
+    let of = |file: &str, name: &str| attributes(file).iter().find(|a| a.name == name).cloned().unwrap();
     let scaled = of("normals.e57", "class 2");
     assert_eq!((scaled.ty, scaled.scale[0], scaled.offset[0]), (AttributeType::Int16, 0.25, 10.0));
     assert_eq!(of("normals.e57", "class").ty, AttributeType::UInt8);

@@ -107,7 +107,7 @@ trait KindName {
 
 impl KindName for ReadError {
     fn kind_name(&self) -> &'static str {
-        match self.kind {
+        match self.kind() {
             pointmill_format::ErrorKind::Broken => "Broken",
             pointmill_format::ErrorKind::Unsupported => "Unsupported",
             pointmill_format::ErrorKind::Io(_) => "Io",
