@@ -60,7 +60,7 @@ fn fake(fault: Fault) -> Fake {
     ];
     let piece = |i: u64| Piece { first_point: i * PIECE, points: PIECE, byte_offset: i * 1000, byte_len: 1000 };
     let mut pieces: Vec<Piece> = (0..3).map(piece).collect();
-    let mut warnings = vec![ScanWarning::NoScans];
+    let mut warnings = vec![ScanWarning::Other("the header is odd".to_owned())];
     match fault {
         Fault::Gap => pieces[1].first_point += 1,
         Fault::EmptyPiece => pieces[2].points = 0,
