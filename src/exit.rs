@@ -8,6 +8,8 @@ use std::sync::{Mutex, PoisonError};
 use pointmill_converter::ConvertError;
 use pointmill_format::{Advice, ErrorKind, ReadError};
 
+use crate::flags;
+
 /// Why the program ends without success.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -112,16 +114,16 @@ fn read_line(error: &ReadError) -> String {
 
 impl From<ConvertError> for Failure {
     fn from(error: ConvertError) -> Self {
-        let line = error.to_string();
+        let line = flags::error_line(&error);
         match error {
             ConvertError::Read(read) => read.into(),
-            ConvertError::Usage(_) | ConvertError::OutputExists(_) => Self::Usage(line),
+            ConvertError::Plan(_) | ConvertError::Output(_) => Self::Usage(line),
             ConvertError::Unsupported(_) => Self::Unsupported(line),
             ConvertError::Input(_) => Self::Input(line),
             ConvertError::Io { .. } => Self::Io(line),
             ConvertError::Memory { .. } => Self::Memory(line),
             ConvertError::Interrupted => Self::Interrupted(line),
-            ConvertError::Internal(_) => Self::Internal(line),
+            _ => Self::Internal(line),
         }
     }
 }
@@ -160,20 +162,23 @@ pub(crate) fn last_panic() -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pointmill_converter::{MemoryNeed, OutputFault};
 
     #[test]
     fn the_kind_of_error_decides_the_code() {
         let io_error = || io::Error::from(io::ErrorKind::StorageFull);
-        let table: [(Failure, u8); 10] = [
+        let exists = || ConvertError::Output(OutputFault::Exists("x".into()));
+        let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error() };
+        let why = MemoryNeed::OnePlace { points: 1 };
+        let table: [(Failure, u8); 9] = [
             (ConvertError::Internal("x".into()).into(), 1),
-            (ConvertError::Usage("x".into()).into(), 2),
-            (ConvertError::OutputExists("x".into()).into(), 2),
+            (exists().into(), 2),
             (ReadError::broken("a.las", None, "x").into(), 3),
             (ConvertError::Read(ReadError::broken("a.las", None, "x")).into(), 3),
             (ReadError::unsupported("a.las", "x").into(), 4),
             (ReadError::io("a.las", "x", io_error()).into(), 5),
-            (ConvertError::io("a", "x", io_error()).into(), 5),
-            (ConvertError::Memory { ceiling: 1, needed: 2, why: "x".into() }.into(), 6),
+            (full().into(), 5),
+            (ConvertError::Memory { ceiling: 1, needed: 2, why }.into(), 6),
             (ConvertError::Interrupted.into(), 130),
         ];
         for (failure, code) in table {

@@ -7,6 +7,7 @@ mod args;
 mod commands;
 mod datasets;
 mod exit;
+mod flags;
 mod human;
 mod inputs;
 mod interrupt;

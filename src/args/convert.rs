@@ -14,7 +14,7 @@ use super::values::{
 };
 
 /// The Brotli quality for node payloads; above it the time grows several times over for a few per cent.
-pub(crate) const BROTLI_QUALITY: u8 = 5;
+pub(crate) const BROTLI_QUALITY: u8 = pointmill_converter::Encoding::BROTLI_QUALITY;
 
 /// The seed of random sampling.
 pub(crate) const SEED: u64 = 0;

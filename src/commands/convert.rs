@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, RgbDepth, Sampling,
-    ScaleChoice, Target,
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, Potree2Settings,
+    RgbDepth, Sampling, ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
@@ -25,9 +25,9 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     if !args.talk.quiet {
         inputs.notes.iter().for_each(|note| print_line(note));
     }
-    let plan = plan(args, targets, inputs)?;
+    let plan = plan(args, inputs)?;
     if args.dry_run {
-        let estimate = pointmill_converter::estimate(&plan)?;
+        let estimate = pointmill_converter::estimate(&plan, &targets)?;
         return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
     }
     protect_inputs(&plan)?;
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         protect_from_report(&plan, file)?;
     }
     let progress = Progress::new(&args.talk, Some(stop_flag()));
-    let result = pointmill_converter::convert(&plan, &progress);
+    let result = pointmill_converter::convert(&plan, &targets, &progress);
     let for_people = progress.end();
     let report = result?;
     if let Some(file) = &args.report {
@@ -53,12 +53,18 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
 
 /// The formats with their settings; an option of a format that was not requested is a usage error.
 fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
+    if args.seed.is_some() && args.sampling != SamplingArg::Random {
+        return Err(Failure::Usage("--seed requires --sampling random".to_owned()));
+    }
+    if args.brotli_quality.is_some() && args.encoding != EncodingArg::Brotli {
+        return Err(Failure::Usage("--brotli-quality requires --encoding brotli".to_owned()));
+    }
     let mut targets = Vec::new();
     for to in &args.to {
         let target = match to {
-            TargetArg::Potree2 => Target::Potree2,
-            TargetArg::Bintree => Target::Bintree(bintree_settings(&args.bintree)),
-            TargetArg::Batches => Target::Batches(batches_settings(&args.batches)),
+            TargetArg::Potree2 => potree2_settings(args).into(),
+            TargetArg::Bintree => bintree_settings(&args.bintree).into(),
+            TargetArg::Batches => batches_settings(&args.batches).into(),
             TargetArg::Potree1 => {
                 let line =
                     "--to potree1 is not supported by this version; the formats are potree2, bintree and batches";
@@ -81,6 +87,19 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
         return Err(Failure::Usage(format!("{option} requires --to {}", format!("{to:?}").to_lowercase())));
     }
     Ok(targets)
+}
+
+fn potree2_settings(args: &ConvertArgs) -> Potree2Settings {
+    let sampling = match args.sampling {
+        SamplingArg::Random => Sampling::Random { seed: args.seed.unwrap_or(SEED) },
+        SamplingArg::Poisson => Sampling::Poisson,
+        SamplingArg::Grid => Sampling::Grid,
+    };
+    let encoding = match args.encoding {
+        EncodingArg::Brotli => Encoding::Brotli { quality: args.brotli_quality.unwrap_or(BROTLI_QUALITY) },
+        EncodingArg::Default => Encoding::Default,
+    };
+    Potree2Settings { sampling, encoding, leaf_capacity: args.leaf_capacity }
 }
 
 fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
@@ -109,26 +128,11 @@ fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
     }
 }
 
-fn plan(args: &ConvertArgs, targets: Vec<Target>, inputs: Inputs) -> Result<Plan, Failure> {
+fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
     let mut plan = Plan::new(inputs.files, args.output.clone());
     plan.open = args.inputs.options()?;
     plan.name = name;
-    plan.targets = targets;
-    plan.sampling = match (args.sampling, args.seed) {
-        (SamplingArg::Random, seed) => Sampling::Random { seed: seed.unwrap_or(SEED) },
-        (_, Some(_)) => return Err(Failure::Usage("--seed requires --sampling random".to_owned())),
-        (SamplingArg::Poisson, None) => Sampling::Poisson,
-        (SamplingArg::Grid, None) => Sampling::Grid,
-    };
-    plan.encoding = match (args.encoding, args.brotli_quality) {
-        (EncodingArg::Brotli, quality) => Encoding::Brotli { quality: quality.unwrap_or(BROTLI_QUALITY) },
-        (EncodingArg::Default, Some(_)) => {
-            return Err(Failure::Usage("--brotli-quality requires --encoding brotli".to_owned()));
-        }
-        (EncodingArg::Default, None) => Encoding::Default,
-    };
-    plan.leaf_capacity = args.leaf_capacity;
     plan.attributes = match &args.attributes {
         None => AttributeChoice::Usual,
         Some(Attributes::All) => AttributeChoice::All,
@@ -229,7 +233,9 @@ mod tests {
         let Command::Convert(args) = args.command else { panic!() };
         let files = vec![PathBuf::from("a.las")];
         let inputs = Inputs { files: files.clone(), notes: Vec::new() };
-        let given = plan(&args, targets(&args).unwrap(), inputs).unwrap();
+        let given = plan(&args, inputs).unwrap();
+        let octree: Target = Potree2Settings::default().into();
+        assert_eq!(format!("{:?}", targets(&args).unwrap()), format!("{:?}", [octree]));
         let mut usual = Plan::new(files, "out".into());
         usual.name = "a".to_owned();
         usual.filter.every = 1; // 0 and 1 both keep every point

@@ -1,7 +1,9 @@
 //! Reports of runs and estimates as text. No figure is computed here.
 
-use pointmill_converter::{Estimate, OutputReport, Plan, Report};
+use pointmill_converter::{DropReason, Estimate, OutputReport, Plan, Report};
 use serde_json::Value;
+
+use crate::flags;
 
 use super::quantities::{bytes, count, number, numbers, plural, rate, seconds};
 use super::text::{Table, batches, corners, or_none};
@@ -44,20 +46,21 @@ fn output_line(output: &OutputReport, plan: &Plan) -> String {
 
 /// Attributes that are not in an output, those of one reason together.
 fn dropped_line(output: &OutputReport, name_it: bool) -> Option<String> {
-    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    let mut reasons: Vec<(&DropReason, Vec<&str>)> = Vec::new();
     for dropped in &output.attributes_dropped {
-        match reasons.iter_mut().find(|(why, _)| *why == dropped.why) {
+        match reasons.iter_mut().find(|(why, _)| **why == dropped.why) {
             Some((_, names)) => names.push(&dropped.name),
             None => reasons.push((&dropped.why, vec![&dropped.name])),
         }
     }
     let of = if name_it { format!(" of {}", output.format) } else { String::new() };
-    let listed = reasons.iter().map(|(why, names)| format!("{} ({why})", names.join(", ")));
-    (!reasons.is_empty()).then(|| format!("attributes not written{of}: {}", listed.collect::<Vec<_>>().join("; ")))
+    let each = reasons.iter().map(|(why, names)| format!("{} ({})", names.join(", "), flags::drop_reason(why)));
+    (!reasons.is_empty()).then(|| format!("attributes not written{of}: {}", each.collect::<Vec<_>>().join("; ")))
 }
 
 fn points_lines(report: &Report) -> Vec<String> {
     let p = &report.points;
+    let duplicates = duplicates_dropped(report);
     let from = plural(report.inputs.len() as u64, "scan");
     if points_not_written(report) == 0 {
         return vec![format!("all {} of {from} written", plural(p.read, "point"))];
@@ -66,7 +69,7 @@ fn points_lines(report: &Report) -> Vec<String> {
         (p.outside_bounds, "outside the bounds"),
         (p.other_class, "by class"),
         (p.thinned, "by thinning"),
-        (p.duplicates_dropped, "as duplicates"),
+        (duplicates, "as duplicates"),
         (p.invalid, "without a valid position"),
         (p.unreadable, "unreadable"),
     ];
@@ -98,7 +101,7 @@ fn coordinates_line(report: &Report) -> String {
 }
 
 fn details(report: &Report) -> Vec<String> {
-    let mut lines = vec![format!("grid: {}", report.grid.why), format!("attributes: {}", report.attributes.join(", "))];
+    let mut lines = vec![format!("grid: {}", report.grid.why)];
     for input in &report.inputs {
         let read = plural(input.points_read, "point");
         lines.push(format!("input {}: {}, {read}, {}", input.path.display(), input.format, or_none(&input.crs)));
@@ -106,11 +109,15 @@ fn details(report: &Report) -> Vec<String> {
     for phase in &report.phases {
         lines.push(format!("phase {}: {}, {}", phase.name, seconds(phase.seconds), rate(phase.points_per_second)));
     }
-    for (level, points) in report.tree.points_per_level.iter().enumerate() {
-        let nodes = report.tree.nodes_per_level.get(level).copied().unwrap_or(0);
-        lines.push(format!("level {level}: {} in {}", plural(*points, "point"), plural(nodes, "node")));
+    for output in &report.outputs {
+        lines.push(format!("{} attributes: {}", output.format, output.attributes.join(", ")));
+        for (level, points) in output.tree.points_per_level.iter().enumerate() {
+            let nodes = output.tree.nodes_per_level.get(level).copied().unwrap_or(0);
+            let (points, nodes) = (plural(*points, "point"), plural(nodes, "node"));
+            lines.push(format!("{} level {level}: {points} in {nodes}", output.format));
+        }
+        lines.push(format!("{} checksum {} of {}", output.format, output.checksum, report.checksum_in));
     }
-    lines.push(format!("checksum in {} out {}", report.checksum_in, report.checksum_out));
     lines
 }
 
@@ -132,12 +139,17 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
         let advice = if plan.overwrite { "will be replaced" } else { "requires --overwrite" };
         t.row("exists", advice);
     }
-    estimate.warnings.iter().for_each(|w| t.row("warning", w));
+    estimate.warnings.iter().for_each(|w| t.row("warning", flags::warning_line(w)));
     t.0
 }
 
 /// Points read that are not in the dataset.
 fn points_not_written(report: &Report) -> u64 {
     let p = &report.points;
-    p.outside_bounds + p.other_class + p.thinned + p.duplicates_dropped + p.invalid + p.unreadable
+    p.outside_bounds + p.other_class + p.thinned + duplicates_dropped(report) + p.invalid + p.unreadable
+}
+
+/// Only octrees drop duplicates, and there is one octree at most.
+fn duplicates_dropped(report: &Report) -> u64 {
+    report.outputs.iter().map(|o| o.duplicates_dropped).max().unwrap_or(0)
 }

@@ -6,12 +6,13 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
-use pointmill_converter::{Events, Phase};
+use pointmill_converter::{Events, Phase, Warning};
 use serde_json::json;
 
 use super::quantities::{count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
+use crate::flags;
 
 /// Interval of JSON lines; one per batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);
@@ -176,8 +177,8 @@ impl Events for Progress {
         self.step(points);
     }
 
-    fn warning(&self, line: &str) {
-        self.note(line);
+    fn warning(&self, warning: &Warning) {
+        self.note(&flags::warning_line(warning));
     }
 
     fn stop_requested(&self) -> bool {

@@ -2,7 +2,10 @@
 
 use std::fs;
 
-use crate::support::{Dir, Ended, Las, dataset_bytes};
+use pointmill_testkit::files::dataset;
+use pointmill_testkit::las::Las;
+
+use crate::support::{Dir, Ended};
 
 fn with_dataset() -> Dir {
     let dir = Dir::new();
@@ -14,10 +17,10 @@ fn with_dataset() -> Dir {
 #[test]
 fn an_output_that_exists_is_left_alone_unless_overwriting() {
     let dir = with_dataset();
-    let before = dataset_bytes(&dir.path("out"));
+    let before = dataset(&dir.path("out"));
     dir.write("b.las", &Las::terrain(3000, 2).bytes());
     dir.run(["convert", "b.las", "-o", "out"]).failed_with(2, &["out", "--overwrite"]);
-    assert_eq!(dataset_bytes(&dir.path("out")), before);
+    assert_eq!(dataset(&dir.path("out")), before);
     dir.succeed(["convert", "b.las", "-o", "out", "--overwrite"]);
     dir.validate("out", &["b.las"]);
     assert_eq!(dir.names(), ["a.las", "b.las", "out"]);
@@ -26,11 +29,11 @@ fn an_output_that_exists_is_left_alone_unless_overwriting() {
 #[test]
 fn a_run_that_fails_leaves_the_old_dataset_as_it_was() {
     let dir = with_dataset();
-    let before = dataset_bytes(&dir.path("out"));
+    let before = dataset(&dir.path("out"));
     let whole = Las::terrain(3000, 2).bytes();
     dir.write("b.las", &whole[..whole.len() / 2]);
     dir.run(["convert", "b.las", "-o", "out", "--overwrite"]).failed_with(3, &["b.las"]);
-    assert_eq!(dataset_bytes(&dir.path("out")), before);
+    assert_eq!(dataset(&dir.path("out")), before);
     assert_eq!(dir.names(), ["a.las", "b.las", "out"]);
 }
 
@@ -59,14 +62,14 @@ fn an_output_whose_parent_is_missing_or_a_file_is_no_panic() {
 #[test]
 fn a_full_disk_is_code_5_and_the_old_dataset_stays() {
     let dir = with_dataset();
-    let before = dataset_bytes(&dir.path("out"));
+    let before = dataset(&dir.path("out"));
     dir.write("b.las", &Las::terrain(60_000, 2).bytes());
     let program = env!("CARGO_BIN_EXE_pointmill");
     // 1,000 blocks of 512 bytes, and the signal that comes with the limit ignored, so that the write itself fails.
     let script = "trap '' XFSZ; ulimit -f 1000; exec \"$0\" convert b.las -o out --overwrite";
     let output = std::process::Command::new("sh").args(["-c", script, program]).current_dir(dir.path("")).output();
     Ended(output.unwrap()).failed_with(5, &["arge"]); // "File too large"
-    assert_eq!(dataset_bytes(&dir.path("out")), before);
+    assert_eq!(dataset(&dir.path("out")), before);
     assert_eq!(dir.names(), ["a.las", "b.las", "out"]);
 }
 

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use crate::support::{Dir, Las};
+use pointmill_testkit::las::Las;
+
+use crate::support::Dir;
 
 fn two_scans(points: usize) -> Dir {
     let dir = Dir::new();

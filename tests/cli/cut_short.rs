@@ -4,7 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{Dir, corpus, fixture};
+use pointmill_testkit::files::{corpus, fixture};
+
+use crate::support::Dir;
 
 #[test]
 fn a_scan_that_was_cut_short_is_one_line_and_nothing_else() {
@@ -65,7 +67,7 @@ fn broken_scans_of_others_are_refused_or_read_whole() {
         match read_whole.iter().find(|(n, _)| *n == name) {
             Some((_, points)) => {
                 assert_eq!(ended.code(), 0, "{}", ended.stderr());
-                assert_eq!(dir.report("out")["points"]["written"], *points, "{name}");
+                assert_eq!(dir.report("out")["outputs"][0]["points"], *points, "{name}");
                 dir.validate("out", &[path.to_str().unwrap()]);
             }
             None => {

@@ -1,17 +1,16 @@
 //! `validate` finds out what a dataset is.
 
 use std::fs;
-use std::path::Path;
+
+use pointmill_testkit::files::{dataset, fixture};
 
 use crate::support::Dir;
 
 #[test]
 fn a_binary_tree_is_found_by_its_index_and_a_leaf_that_is_missing_is_named() {
     let dir = Dir::new();
-    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/bintree/files");
-    for entry in fs::read_dir(fixture).unwrap() {
-        let entry = entry.unwrap();
-        dir.write(&format!("tree/{}", entry.file_name().to_str().unwrap()), &fs::read(entry.path()).unwrap());
+    for (name, bytes) in dataset(&fixture("bintree/files")) {
+        dir.write(&format!("tree/{name}"), &bytes);
     }
     for path in ["tree", "tree/index.json"] {
         let ended = dir.succeed(["validate", path]);

@@ -1,42 +1,32 @@
 //! Scans of every kind: converted, described, mixed; files that state too little or state it wrongly.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use pointmill_testkit::files::{corpus, entries, fixture, scan_fixtures};
+use pointmill_testkit::las::Las;
 use serde_json::{Value, json};
 
-use crate::support::{Dir, Las, corpus, fixture};
+use crate::support::Dir;
 
-/// The scans of a folder, sorted.
-fn scans(folder: &Path) -> Vec<PathBuf> {
-    let files = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let is_scan = |p: &PathBuf| {
-        p.is_file() && p.extension().is_some_and(|e| e != "tsv") && !p.ends_with("LICENSE-autzen_trim.txt")
-    };
-    let mut files: Vec<PathBuf> = files.filter(is_scan).collect();
-    files.sort();
-    files
-}
-
-/// Converts a file and proves its points; one without points must say so.
-fn converts(path: &Path) {
+/// Converts a file and proves its points; one without points must say so. The points read.
+fn converts(path: &Path) -> u64 {
     let dir = Dir::new();
     let text = path.to_str().unwrap();
     let ended = dir.run(["convert", text, "-o", "out", "-q"]);
     if ended.code() == 3 && ended.stderr().contains("holds no points") {
         assert!(dir.names().is_empty(), "{text}");
-        return;
+        return 0;
     }
     assert_eq!(ended.code(), 0, "{}", ended.stderr());
     dir.validate("out", &[text]);
+    dir.report("out")["points"]["read"].as_u64().unwrap()
 }
 
 #[test]
 fn every_fixture_converts_and_holds_its_points() {
-    for folder in ["e57", "rows"] {
-        let files = scans(&fixture(folder));
-        assert!(files.len() > 10);
-        files.iter().for_each(|path| converts(path));
+    for fixture in ["e57", "rows"].iter().flat_map(|folder| scan_fixtures(folder)) {
+        assert_eq!(converts(&fixture.path), fixture.points, "{}", fixture.name);
     }
 }
 
@@ -45,7 +35,10 @@ fn scans_of_others_convert_and_hold_their_points() {
     for folder in ["e57", "ply", "pcd", "text", "las/permutations"] {
         let Some(folder) = corpus(folder) else { return };
         // a PLY without vertices has nothing to convert
-        scans(&folder).iter().filter(|p| !p.ends_with("no_vertex.ply")).for_each(|path| converts(path));
+        let scans = entries(&folder).into_iter().filter(|p| p.is_file() && !p.ends_with("no_vertex.ply"));
+        scans.for_each(|path| {
+            converts(&path);
+        });
     }
 }
 
@@ -61,12 +54,13 @@ fn mixed_inputs_have_the_union_of_their_attributes() {
     let ended = dir.succeed(["convert", "in", "-o", "out"]);
     assert!(ended.stderr().contains("1 other file skipped"), "{}", ended.stderr());
     let report = dir.report("out");
-    let names: Vec<&str> = report["attributes"].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect();
+    let names: Vec<&str> =
+        report["outputs"][0]["attributes"].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect();
     for name in ["rgb", "intensity", "gps-time", "point source id", "NormalX", "scalar_Quality", "timeStamp"] {
         assert!(names.contains(&name), "{name} is not among {names:?}");
     }
     let read = report["points"]["read"].as_u64().unwrap();
-    assert_eq!(read, report["points"]["written"].as_u64().unwrap() + report["points"]["invalid"].as_u64().unwrap());
+    assert_eq!(read, report["outputs"][0]["points"].as_u64().unwrap() + report["points"]["invalid"].as_u64().unwrap());
     dir.validate("out", &["in"]);
 }
 
@@ -76,7 +70,7 @@ fn one_name_with_two_meanings_becomes_two_attributes() {
     dir.write("a.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nproperty uchar quality\nend_header\n1 2 3 4\n2 3 4 5\n");
     dir.write("b.xyz", b"# x y z quality\n1.5 2 3 0.25\n2.5 3 4 0.5\n");
     dir.succeed(["convert", "a.ply", "b.xyz", "-o", "out", "-q"]);
-    assert_eq!(dir.report("out")["attributes"], json!(["position", "quality", "quality (2)"]));
+    assert_eq!(dir.report("out")["outputs"][0]["attributes"], json!(["position", "quality", "quality (2)"]));
     dir.validate("out", &["a.ply", "b.xyz"]);
 }
 
@@ -88,12 +82,12 @@ fn a_far_point_is_named_with_the_bounds_that_leave_it_out() {
     dir.write("a.xyz", text.as_bytes());
     let ended = dir.succeed(["convert", "a.xyz", "-o", "out"]).stderr();
     let line = ended.lines().find(|l| l.contains("--bounds")).unwrap_or_else(|| panic!("{ended}"));
-    assert!(line.contains("1 point lies far from all others"), "{line}");
+    assert!(line.contains("1 point is far from all others"), "{line}");
     let bounds = line.split("--bounds ").nth(1).unwrap().split(' ').next().unwrap();
     let step = |out: &str| dir.report(out)["grid"]["scale"][0].as_f64().unwrap();
     dir.succeed(["convert", "a.xyz", "-o", "out2", "-q", "--bounds", bounds]);
     let report = dir.report("out2");
-    assert_eq!((&report["points"]["outside_bounds"], &report["points"]["written"]), (&json!(1), &json!(4000)));
+    assert_eq!((&report["points"]["outside_bounds"], &report["outputs"][0]["points"]), (&json!(1), &json!(4000)));
     assert!(step("out2") <= step("out") / 10.0, "{} and {}", step("out2"), step("out"));
     dir.validate("out2", &["a.xyz"]);
 }
@@ -106,8 +100,8 @@ fn points_without_a_position_are_counted_or_refused() {
     dir.succeed(["convert", path, "-o", "out", "-q"]);
     let points = dir.report("out")["points"].clone();
     let n = |name: &str| points[name].as_u64().unwrap();
-    assert!(n("invalid") > 0 && n("written") > 0, "{points}");
-    assert_eq!(n("read"), n("written") + n("invalid"));
+    assert!(n("invalid") > 0 && n("kept") > 0, "{points}");
+    assert_eq!(n("read"), n("kept") + n("invalid"));
     dir.validate("out", &[path]);
     dir.run(["convert", path, "-o", "out2", "--invalid", "fail"]).failed_with(3, &["not_finite.ply", "--invalid skip"]);
     assert_eq!(dir.names(), ["out"]);
@@ -132,7 +126,7 @@ fn columns_and_separators_are_what_was_typed() {
     let options = ["--columns", "quality:uint8,c,y,-,x", "--separator", "|"];
     dir.succeed(["convert", "a.txt", "-o", "out", "-q"].iter().chain(&options));
     let report = dir.report("out");
-    assert_eq!(report["attributes"], json!(["position", "classification", "quality"]));
+    assert_eq!(report["outputs"][0]["attributes"], json!(["position", "classification", "quality"]));
     assert_eq!(report["inputs"][0]["bounds_measured"], json!([20.5, 10.5, 0.0, 21.5, 11.5, 0.0]));
     let validate = ["validate", "out", "-q", "--against", "a.txt"];
     assert_eq!(dir.run(validate.iter().chain(&options)).code(), 0);
@@ -146,7 +140,7 @@ fn row_and_column_come_when_asked_for() {
     let path = path.to_str().unwrap();
     let has_row = |options: &[&str]| {
         dir.succeed(["convert", path, "-o", "out", "-q", "--overwrite"].iter().chain(options));
-        dir.report("out")["attributes"].as_array().unwrap().contains(&json!("rowIndex"))
+        dir.report("out")["outputs"][0]["attributes"].as_array().unwrap().contains(&json!("rowIndex"))
     };
     assert!(!has_row(&[]));
     assert!(has_row(&["--row-column"]));

@@ -5,7 +5,10 @@ use std::io::{BufRead as _, BufReader};
 use std::os::unix::process::ExitStatusExt as _;
 use std::process::{Child, Command, Stdio};
 
-use crate::support::{Dir, Las, dataset_bytes};
+use pointmill_testkit::files::dataset;
+use pointmill_testkit::las::Las;
+
+use crate::support::Dir;
 
 /// A folder with a dataset `out` and a scan `big.las` whose conversion takes long enough to be met half-way.
 fn stage() -> Dir {
@@ -31,21 +34,21 @@ fn interrupt(dir: &Dir, signal: &str) -> (Child, Vec<String>) {
 #[test]
 fn ctrl_c_leaves_the_old_dataset_and_nothing_else() {
     let dir = stage();
-    let before = dataset_bytes(&dir.path("out"));
+    let before = dataset(&dir.path("out"));
     let (mut child, lines) = interrupt(&dir, "-INT");
     assert_eq!(child.wait().unwrap().code(), Some(130), "{lines:?}");
     assert!(lines.last().unwrap().starts_with("pointmill: interrupted"), "{lines:?}");
-    assert_eq!(dataset_bytes(&dir.path("out")), before);
+    assert_eq!(dataset(&dir.path("out")), before);
     assert_eq!(dir.names(), ["a.las", "big.las", "out"]);
 }
 
 #[test]
 fn a_killed_run_leaves_the_old_dataset_and_does_not_hinder_the_next() {
     let dir = stage();
-    let before = dataset_bytes(&dir.path("out"));
+    let before = dataset(&dir.path("out"));
     let (mut child, lines) = interrupt(&dir, "-KILL");
     assert_eq!(child.wait().unwrap().signal(), Some(9), "{lines:?}");
-    assert_eq!(dataset_bytes(&dir.path("out")), before);
+    assert_eq!(dataset(&dir.path("out")), before);
     dir.succeed(["convert", "big.las", "-o", "out", "--overwrite", "-q"]);
-    assert_eq!(dir.report("out")["points"]["written"], 1_500_000);
+    assert_eq!(dir.report("out")["outputs"][0]["points"], 1_500_000);
 }

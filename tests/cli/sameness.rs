@@ -1,6 +1,11 @@
 //! The same points give the same bytes, whatever the machine and in whatever order they come.
 
-use crate::support::{Dir, Las, dataset_bytes};
+use std::collections::BTreeMap;
+
+use pointmill_testkit::files::dataset;
+use pointmill_testkit::las::Las;
+
+use crate::support::Dir;
 
 fn two_scans(points: usize) -> Dir {
     let dir = Dir::new();
@@ -12,10 +17,10 @@ fn two_scans(points: usize) -> Dir {
 }
 
 /// Converts with `options` and returns the bytes of the dataset.
-fn bytes(dir: &Dir, options: &[&str]) -> [Vec<u8>; 3] {
+fn bytes(dir: &Dir, options: &[&str]) -> BTreeMap<String, Vec<u8>> {
     let args = ["convert", "-o", "out", "--overwrite", "-q", "--name", "same"];
     dir.succeed(args.iter().chain(options));
-    dataset_bytes(&dir.path("out"))
+    dataset(&dir.path("out"))
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Several formats from one read.
 
-use crate::support::{Dir, Las};
+use pointmill_testkit::las::Las;
+
+use crate::support::Dir;
 
 #[test]
 fn each_format_has_its_folder_and_one_command_validates_and_tells_of_all() {

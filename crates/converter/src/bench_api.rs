@@ -2,50 +2,46 @@
 
 use pointmill_format::{Attribute, Lattice, NodeKey};
 
-use crate::build::sort::{Point, SortScratch, sort};
-use crate::checksum::Checksum;
-use crate::grid::{Cube, LatticeBounds};
-use crate::plan::{Encoding, Sampling};
-use crate::records::{OutputLayout, RecordFrame, position};
-use crate::sample::Sampler;
-use crate::schema::Schema;
-use crate::write::payload::PayloadWriter;
+use crate::cloud::{Checksum, Cube, JobBounds, JobPoint, RecordFrame, StoredOrigin, TreePoint, position};
+use crate::octree::{NodeEncoder, OrderScratch, Point, Sampler, Sampling, order};
+use crate::outputs::potree2::{Encoding, OutputLayout, PayloadEncoder};
+use crate::sources::Schema;
 
 /// The records of a chunk, as the converter holds them while it builds the chunk.
 pub struct Chunk {
     frame: RecordFrame,
     records: Vec<u8>,
     points: Vec<Point>,
-    scratch: SortScratch,
-    writer: PayloadWriter,
+    scratch: OrderScratch,
+    encoder: PayloadEncoder,
 }
 
 impl Chunk {
     /// `records`: three `i32` of position, then `attributes`, packed. `None` if there are none.
     pub fn new(records: Vec<u8>, attributes: Vec<Attribute>) -> Option<Self> {
         let schema = Schema::new(attributes);
-        let mut bounds = LatticeBounds::EMPTY;
+        let origin = StoredOrigin(JobPoint([0; 3]));
+        let mut bounds = JobBounds::EMPTY;
         for record in records.chunks_exact(schema.stride) {
-            let q = position(record).map(i64::from);
-            bounds.union(&LatticeBounds { min: q, max: q });
+            bounds.grow(origin.job(position(record)));
         }
         let lattice = Lattice { scale: [0.01; 3], offset: [0.0; 3] };
         let cube = Cube::around(&bounds, &lattice).ok().filter(|_| !bounds.is_empty())?;
-        let frame = RecordFrame { stride: schema.stride, cube, base: [0; 3] };
+        let frame = RecordFrame { stride: schema.stride, cube, origin };
         let kept: Vec<usize> = (0..schema.attributes.len()).collect();
-        let writer = PayloadWriter::new(OutputLayout::new(&schema, &kept, &frame), Encoding::Default);
-        Some(Self { frame, records, points: Vec::new(), scratch: SortScratch::default(), writer })
+        let encoder = PayloadEncoder::new(OutputLayout::new(&schema, &kept, &frame), Encoding::Default);
+        Some(Self { frame, records, points: Vec::new(), scratch: OrderScratch::default(), encoder })
     }
 
     /// Morton order of all records; returns their number.
     pub fn sort(&mut self) -> usize {
-        sort(&self.records, &self.frame, 0, &mut self.scratch, &mut self.points);
+        order(&self.records, &self.frame, 0, &mut self.scratch, &mut self.points);
         self.points.len()
     }
 
     /// Tree coordinates in the order of the last sort.
     pub fn trees(&self) -> Vec<[u32; 3]> {
-        self.points.iter().map(|p| p.t).collect()
+        self.points.iter().map(|p| p.t.0).collect()
     }
 
     /// The DEFAULT payload of all records, in the order of the last sort, checksum included; returns its bytes.
@@ -53,8 +49,8 @@ impl Chunk {
         out.clear();
         let (records, stride) = (&self.records, self.frame.stride);
         let ordered = self.points.iter().map(|p| &records[p.record as usize * stride..][..stride]);
-        let written = self.writer.write(NodeKey::ROOT, ordered, out, &mut Checksum::default());
-        written.map_or(0, |entry| entry.byte_size as usize)
+        let encoded = self.encoder.encode(NodeKey::ROOT, ordered, &mut Checksum::default(), out);
+        encoded.map_or(0, |()| out.len())
     }
 }
 
@@ -70,7 +66,7 @@ impl Sample {
     /// The number of candidates that the node takes.
     pub fn choose(&mut self, level: u8, candidates: &[[u32; 3]]) -> usize {
         self.0.begin();
-        self.0.offer(candidates.iter().copied());
+        self.0.offer(candidates.iter().copied().map(TreePoint));
         self.0.choose(NodeKey { level, ..NodeKey::ROOT }).iter().filter(|taken| **taken).count()
     }
 }

@@ -1,68 +1,365 @@
 //! Why a run could not finish. Each error is one line: what, where, what to do.
 
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::ReadError;
+use pointmill_format::{DatasetKind, ReadError};
+
+use crate::advice::Advice;
+use crate::plan::PlanError;
 
 /// Why a run could not finish; the output is as it was before.
-#[derive(Debug, thiserror::Error)]
+///
+/// `Display` gives one line: [`Self::what`], and after a semicolon [`Self::advice`] in words.
+#[derive(Debug)]
+#[non_exhaustive]
 pub enum ConvertError {
     /// An input is broken, not supported or not readable (see its kind).
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// The request makes no sense as given.
-    #[error("{0}")]
-    Usage(String),
+    Read(ReadError),
+    /// A setting has a value that cannot be used.
+    Plan(PlanError),
     /// The request is sensible, but this version cannot do it.
-    #[error("{0}")]
-    Unsupported(String),
+    Unsupported(Unsupported),
     /// The inputs break a promise together, or hold nothing that can be converted.
-    #[error("{0}")]
-    Input(String),
-    /// The output exists and may not be replaced.
-    #[error("{}: the output exists already; choose another one or pass --overwrite", .0.display())]
-    OutputExists(PathBuf),
+    Input(InputFault),
+    /// The output may not be replaced.
+    Output(OutputFault),
     /// Disk full, no permission, …
-    #[error("{}: {doing}: {error}{}", path.display(), disk_advice(error))]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What was tried ("writing the spill file").
         doing: &'static str,
-        /// What the operating system said.
+        /// The error of the operating system.
         error: io::Error,
     },
-    /// The memory ceiling is too small for this job.
-    #[error("the memory ceiling of {} MiB is too small: {why}; pass --memory {}MiB or more", ceiling >> 20, (needed >> 20) + 1)]
+    /// The memory ceiling is too small for this run.
     Memory {
         /// Bytes allowed.
         ceiling: u64,
-        /// Bytes that would do.
+        /// Bytes that are enough.
         needed: u64,
         /// What needs them.
-        why: String,
+        why: MemoryNeed,
     },
     /// The run was asked to stop.
-    #[error("interrupted; nothing was written")]
     Interrupted,
     /// A promise of our own code did not hold.
-    #[error("internal fault: {0}; please report it with the command line and the input")]
     Internal(String),
 }
 
+/// A request that this version cannot carry out.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Unsupported {
+    /// Duplicates can be dropped for octrees only.
+    DropDuplicates(DatasetKind),
+    /// An attribute with more elements than the readers of the format accept.
+    WideAttribute {
+        /// The format.
+        kind: DatasetKind,
+        /// The attribute.
+        name: String,
+        /// Elements per point.
+        elements: usize,
+        /// Maximum elements per point.
+        max: usize,
+    },
+    /// The columns of a leaf record cannot be stored.
+    LeafColumns(String),
+    /// More points in one place than a node can hold.
+    CrowdedNode {
+        /// Points in that place.
+        points: u64,
+        /// Maximum points of a node.
+        max: u64,
+    },
+    /// The inputs are too far apart for one lattice of 31 bits.
+    TooFarApart,
+    /// The format cannot hold this cloud.
+    Format {
+        /// The format.
+        kind: DatasetKind,
+        /// Why.
+        what: String,
+    },
+}
+
+/// Inputs that cannot be converted, though each of them can be read.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum InputFault {
+    /// Every input was skipped as unreadable.
+    NoneReadable,
+    /// No point passed the filter.
+    NothingLeft {
+        /// Points read.
+        read: u64,
+        /// Points outside the bounds.
+        outside_bounds: u64,
+        /// Points of other classes.
+        other_class: u64,
+        /// Points removed by thinning.
+        thinned: u64,
+        /// Points without a valid position.
+        invalid: u64,
+    },
+    /// Points farther away than coordinates can be.
+    FarPoints {
+        /// Lower corner of the points, world units.
+        min: [f64; 3],
+        /// Upper corner of the points, world units.
+        max: [f64; 3],
+    },
+    /// A point without a finite position, and the run was asked to fail at it.
+    InvalidPosition {
+        /// The scan.
+        path: PathBuf,
+        /// Index of the point in the scan.
+        point: u64,
+    },
+    /// Colours declared as 8 bits deep have values above 255.
+    DeepColours {
+        /// The scan.
+        path: PathBuf,
+    },
+}
+
+/// An existing output that may not be replaced.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OutputFault {
+    /// It exists, and nothing may be replaced.
+    Exists(PathBuf),
+    /// It is a dataset that contains a file which belongs to no dataset.
+    Foreign {
+        /// The output.
+        output: PathBuf,
+        /// The file.
+        file: PathBuf,
+    },
+    /// It is not a dataset.
+    NotADataset(PathBuf),
+}
+
+/// What needs more memory than is allowed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MemoryNeed {
+    /// The least that every thread works on.
+    Threads {
+        /// Worker threads.
+        threads: u64,
+        /// Maximum points of a leaf.
+        leaf_capacity: u64,
+    },
+    /// Points that share one place and must be written as one node.
+    OnePlace {
+        /// Points in that place.
+        points: u64,
+    },
+    /// Points that share one cell of the order and must be sorted together.
+    OneCell {
+        /// Points in that cell.
+        points: u64,
+    },
+}
+
 impl ConvertError {
-    /// Wraps an operating-system error.
-    pub fn io(path: impl AsRef<Path>, doing: &'static str, error: io::Error) -> Self {
+    /// Wraps an error of the operating system.
+    pub(crate) fn io(path: impl AsRef<Path>, doing: &'static str, error: io::Error) -> Self {
         Self::Io { path: path.as_ref().to_path_buf(), doing, error }
+    }
+
+    /// The line without the advice: what and where.
+    pub fn what(&self) -> String {
+        match self {
+            Self::Read(e) => e.to_string(),
+            Self::Plan(e) => e.to_string(),
+            Self::Unsupported(e) => e.to_string(),
+            Self::Input(e) => e.to_string(),
+            Self::Output(e) => e.to_string(),
+            Self::Io { path, doing, error } => format!("{}: {doing}: {error}", path.display()),
+            Self::Memory { ceiling, why, .. } => {
+                format!("the memory ceiling of {} MiB is too small: {why}", ceiling >> 20)
+            }
+            Self::Interrupted => "interrupted; nothing was written".to_owned(),
+            Self::Internal(what) => {
+                format!("internal fault: {what}; please report it with the command line and the input")
+            }
+        }
+    }
+
+    /// What the user can do, where there is something.
+    pub fn advice(&self) -> Option<Advice> {
+        match self {
+            Self::Unsupported(e) => e.advice(),
+            Self::Input(e) => e.advice(),
+            Self::Output(e) => Some(e.advice()),
+            Self::Io { error, .. } => {
+                let is_full = matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
+                is_full.then_some(Advice::FreeDisk)
+            }
+            Self::Memory { needed, .. } => Some(Advice::RaiseMemory { mib: (needed >> 20) + 1 }),
+            Self::Read(_) | Self::Plan(_) | Self::Interrupted | Self::Internal(_) => None,
+        }
     }
 }
 
-fn disk_advice(error: &io::Error) -> &'static str {
-    match error.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            "; free some space, or put temporary files elsewhere with --temp-dir"
+impl fmt::Display for ConvertError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what())?;
+        match self.advice() {
+            Some(advice) => write!(f, "; {advice}"),
+            None => Ok(()),
         }
-        _ => "",
+    }
+}
+
+impl std::error::Error for ConvertError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Read(error) => Some(error),
+            Self::Plan(error) => Some(error),
+            Self::Io { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<ReadError> for ConvertError {
+    fn from(error: ReadError) -> Self {
+        Self::Read(error)
+    }
+}
+
+impl From<PlanError> for ConvertError {
+    fn from(error: PlanError) -> Self {
+        Self::Plan(error)
+    }
+}
+
+impl From<Unsupported> for ConvertError {
+    fn from(error: Unsupported) -> Self {
+        Self::Unsupported(error)
+    }
+}
+
+impl From<InputFault> for ConvertError {
+    fn from(error: InputFault) -> Self {
+        Self::Input(error)
+    }
+}
+
+impl From<OutputFault> for ConvertError {
+    fn from(error: OutputFault) -> Self {
+        Self::Output(error)
+    }
+}
+
+impl Unsupported {
+    fn advice(&self) -> Option<Advice> {
+        match self {
+            Self::DropDuplicates(_) => Some(Advice::KeepDuplicates),
+            Self::WideAttribute { .. } => Some(Advice::NameAttributes),
+            Self::LeafColumns(_) => Some(Advice::LeaveOutAttribute),
+            Self::CrowdedNode { .. } => Some(Advice::DropDuplicates),
+            Self::TooFarApart => Some(Advice::ConvertApart),
+            Self::Format { .. } => None,
+        }
+    }
+}
+
+impl fmt::Display for Unsupported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DropDuplicates(kind) => write!(f, "{kind}: duplicates can be dropped for potree2 only"),
+            Self::WideAttribute { kind, name, elements, max } => {
+                write!(f, "{kind}: \"{name}\" has {elements} elements per point, viewers read at most {max}")
+            }
+            Self::LeafColumns(what) => write!(f, "the columns of a leaf: {what}"),
+            Self::CrowdedNode { points, max } => {
+                write!(f, "{points} points share one place; a node holds at most {max}")
+            }
+            Self::TooFarApart => f.write_str("the inputs are too far apart for one lattice of 31 bits"),
+            Self::Format { kind, what } => write!(f, "{kind}: {what}"),
+        }
+    }
+}
+
+impl InputFault {
+    fn advice(&self) -> Option<Advice> {
+        match self {
+            Self::FarPoints { .. } => Some(Advice::CutBounds { bounds: None }),
+            Self::InvalidPosition { .. } => Some(Advice::SkipInvalid),
+            Self::DeepColours { .. } => Some(Advice::DetectRgbDepth),
+            Self::NoneReadable | Self::NothingLeft { .. } => None,
+        }
+    }
+}
+
+impl fmt::Display for InputFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoneReadable => f.write_str("none of the inputs could be read"),
+            Self::NothingLeft { read, outside_bounds, other_class, thinned, invalid } => write!(
+                f,
+                "no points left after filtering {read}: {outside_bounds} outside the bounds, {other_class} of other \
+                 classes, {thinned} thinned out, {invalid} without a valid position"
+            ),
+            Self::FarPoints { min, max } => {
+                write!(f, "points lie as far out as {min:?} to {max:?}, which cannot be coordinates")
+            }
+            Self::InvalidPosition { path, point } => {
+                write!(f, "{}: point {point} has no finite position", path.display())
+            }
+            Self::DeepColours { path } => {
+                write!(f, "{}: has colour values above 255, so they cannot be 8 bits deep", path.display())
+            }
+        }
+    }
+}
+
+impl OutputFault {
+    fn advice(&self) -> Advice {
+        match self {
+            Self::Exists(_) => Advice::ReplaceOutput,
+            Self::Foreign { .. } => Advice::MoveAway,
+            Self::NotADataset(_) => Advice::OtherOutput,
+        }
+    }
+}
+
+impl fmt::Display for OutputFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exists(output) => write!(f, "{}: the output exists already", output.display()),
+            Self::Foreign { output, file } => write!(
+                f,
+                "{}: {} in it is not part of a dataset, so the output is not replaced",
+                output.display(),
+                file.display()
+            ),
+            Self::NotADataset(output) => {
+                write!(f, "{}: exists and is not a dataset, so it is not replaced", output.display())
+            }
+        }
+    }
+}
+
+impl fmt::Display for MemoryNeed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Threads { threads, leaf_capacity } => {
+                write!(f, "working threads: {threads}, points of a leaf: up to {leaf_capacity}")
+            }
+            Self::OnePlace { points } => {
+                write!(f, "{points} points share one place and must be written as one node")
+            }
+            Self::OneCell { points } => {
+                write!(f, "{points} points share one cell of the order and must be sorted together")
+            }
+        }
     }
 }

@@ -1,101 +1,54 @@
 //! What a run would do, from the headers alone.
 
-use pointmill_format::bintree::CORE_BYTES;
-
-use crate::budget::Budget;
-use crate::describe::{grid_report, input_reports, resolve_crs, tidy_bounds};
+use crate::cloud::{Cube, Intake, Range, tidy_world};
 use crate::error::ConvertError;
-use crate::events::Silent;
-use crate::gather::Range;
-use crate::grid::{Cube, LatticeBounds};
-use crate::job::Job;
-use crate::needs;
-use crate::octree::choose_attributes;
-use crate::plan::{AttributeChoice, Plan, Target};
-use crate::report::Estimate;
-use crate::schema::{POSITION_BYTES, Schema};
+use crate::gather::{from_headers, is_lossless, quantized};
+use crate::outputs::{self, DiskSize, Target, choose_attributes};
+use crate::plan::Plan;
+use crate::report::{Estimate, grid_report, input_reports};
+use crate::runtime::{Budget, Least, Silent};
+use crate::sources::{Sources, resolve_crs};
 
-/// Bytes of a hierarchy record, and of metadata and report together.
-const NODE_BYTES: u64 = 22;
+/// Bytes of metadata and report together.
 const JSON_BYTES: u64 = 16 << 10;
-
-/// Bytes of a node of a binary tree in its index, and of a batch.
-const INDEX_NODE_BYTES: u64 = 220;
-const BATCH_BYTES: u64 = 32;
-
-/// What an output takes on disk: of each point, and of nodes or batches for a thousand points.
-struct Size {
-    per_point: u64,
-    per_1000_points: u64,
-}
-
-impl Size {
-    /// An upper bound; `attributes`: bytes of those that an octree would keep.
-    fn of(target: &Target, plan: &Plan, schema: &Schema, attributes: u64) -> Self {
-        let is_usual = plan.attributes == AttributeChoice::Usual;
-        match target {
-            Target::Potree2 => {
-                let nodes = 3000 / u64::from(plan.leaf_capacity).max(1) + 1;
-                Self { per_point: POSITION_BYTES as u64 + attributes, per_1000_points: nodes * NODE_BYTES }
-            }
-            Target::Bintree(settings) => {
-                // Leaves are two thirds full, and there is an inner node for each.
-                let nodes = 3000 / u64::from(settings.capacity).max(1) + 1;
-                let class = needs::class(schema).map_or(0, |i| schema.attributes[i].size() as u64);
-                let extras = if is_usual { 0 } else { attributes.saturating_sub(class).next_multiple_of(4) };
-                Self { per_point: CORE_BYTES as u64 + extras, per_1000_points: nodes * INDEX_NODE_BYTES }
-            }
-            Target::Batches(settings) => {
-                let colour = needs::colour(schema).map_or(0, |i| schema.attributes[i].size() as u64);
-                let extras = if is_usual { 0 } else { attributes.saturating_sub(colour) };
-                let planes = u64::from(settings.planes.unwrap_or(3));
-                // Colour word, and index and word of an original for points of the coarser levels.
-                let originals = if settings.originals { 8 } else { 0 };
-                Self { per_point: 4 * planes + 4 + originals + extras, per_1000_points: BATCH_BYTES }
-            }
-        }
-    }
-}
 
 /// Says from the headers alone what [`crate::convert`] would do.
 ///
 /// # Errors
-/// Inputs that cannot be opened, or a memory ceiling that is too small.
-pub fn estimate(plan: &Plan) -> Result<Estimate, ConvertError> {
-    let job = Job::open(plan, &Silent)?;
-    let budget = Budget::new(plan, job.schema.stride)?;
-    let mut warnings = job.warnings.clone();
-    let crs = resolve_crs(plan, &job, &mut warnings)?;
+/// Inputs that cannot be opened, settings that cannot be used, or a memory ceiling that is too small.
+pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertError> {
+    outputs::check(plan, targets)?;
+    let sources = Sources::open(plan, &Silent)?;
+    let wants = outputs::wants(plan, targets, &sources.attributes)?;
+    let intake = Intake::new(plan, &sources, &wants.attributes);
+    let schema = &intake.schema;
+    let budget = Budget::new(plan, schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
+    let mut warnings = sources.warnings.clone();
+    let crs = resolve_crs(plan, &sources.all, &mut warnings)?;
+    let lattice = from_headers(plan, &sources)?;
     // Which attributes are constant is not known before the points are read.
-    let ranges: Vec<Range> = job.schema.attributes.iter().map(|a| Range::new(a.elements)).collect();
-    let kept = match &plan.attributes {
-        AttributeChoice::Scene => choose_attributes(&AttributeChoice::All, &job, &ranges),
-        other => choose_attributes(other, &job, &ranges),
-    }
-    .kept;
-    let size = |i: &usize| job.schema.attributes[*i].size();
-    let all = kept.iter().map(size).sum::<usize>() as u64;
-    let sizes: Vec<Size> = plan.targets.iter().map(|t| Size::of(t, plan, &job.schema, all)).collect();
+    let ranges: Vec<Range> = schema.attributes.iter().map(|a| Range::new(a.elements)).collect();
+    let kept = choose_attributes(&plan.attributes, schema, &intake.unread, &ranges).kept;
+    let kept_bytes = kept.iter().map(|i| schema.attributes[*i].size()).sum::<usize>() as u64;
+    let sizes: Vec<DiskSize> = targets.iter().map(|t| t.output().disk_size(plan, schema, kept_bytes)).collect();
     let bytes_per_point: u64 = sizes.iter().map(|s| s.per_point).sum();
-    let bounds = job.bounds_hint.map(|b| LatticeBounds {
-        min: std::array::from_fn(|a| job.lattice.quantize(a, b.min[a])),
-        max: std::array::from_fn(|a| job.lattice.quantize(a, b.max[a])),
-    });
-    let cube = bounds.and_then(|b| Cube::around(&b, &job.lattice).ok());
-    let points = job.points_declared / plan.filter.every.max(1);
-    let stride = job.schema.stride as u64;
+    let bounds = sources.bounds_hint(plan.filter.bounds.as_ref()).map(|b| quantized(&lattice.lattice, &b));
+    let cube = bounds.and_then(|b| Cube::around(&b, &lattice.lattice).ok());
+    let points = sources.points_declared / plan.filter.every.max(1);
+    let stride = schema.stride as u64;
     let of_nodes: u64 = sizes.iter().map(|s| points * s.per_1000_points / 1000).sum();
+    let lossless = is_lossless(&sources, &lattice);
+    let world = |q: i64, a: usize| tidy_world(q, lattice.lattice.scale[a], lattice.lattice.offset[a]);
+    let names = kept.iter().map(|&i| schema.attributes[i].name.clone());
     Ok(Estimate {
-        inputs: input_reports(&job, None),
+        inputs: input_reports(&sources, None),
         points,
-        bounds: bounds.map(|b| tidy_bounds(&job, b.min, b.max)),
+        bounds: bounds.map(|b| std::array::from_fn(|i| world(if i < 3 { b.min[i] } else { b.max[i - 3] }, i % 3))),
         crs: if crs.projection.is_empty() { crs.label } else { crs.projection },
-        grid: cube.map(|c| grid_report(&job, &c)).unwrap_or_default(),
-        attributes: std::iter::once("position".to_owned())
-            .chain(kept.iter().map(|&i| job.schema.attributes[i].name.clone()))
-            .collect(),
+        grid: cube.map(|c| grid_report(&lattice, lossless, &c)).unwrap_or_default(),
+        attributes: std::iter::once("position".to_owned()).chain(names).collect(),
         bytes_per_point,
-        memory_bytes: budget.estimate_peak(points, job.schema.stride),
+        memory_bytes: budget.estimate_peak(points, schema.stride),
         temp_bytes: (points * stride).saturating_sub(budget.store_bytes),
         output_bytes: points * bytes_per_point + of_nodes + JSON_BYTES,
         warnings,

@@ -1,56 +1,62 @@
-//! From scans to datasets: gathering, octree building and sampling within a memory budget.
+//! From scans to datasets, within a memory budget.
 //!
-//! [`convert`] makes a Potree 2.0 octree of any number of scans:
+//! [`convert`] makes octrees, binary trees and batches of any number of scans, several from one read:
 //!
-//! 1. every point is decoded once, in parallel, becomes integers on one lattice, and is kept as a record in blocks that
-//!    are grouped by the cells of a coarse grid, in memory or, beyond the budget, in one spill file;
-//! 2. the cloud is cut into chunks, octree nodes that are small enough to be built alone; each is sorted in Morton
-//!    order, divided and sampled bottom-up by one thread;
-//! 3. finished chunks are put behind one another in Morton order, and the few nodes above them are sampled as soon as
-//!    all their children are there.
+//! 1. `sources`: the scans are opened; their headers give a lattice before the first point is read.
+//! 2. `gather`: every point is decoded once, in parallel, becomes integers on that lattice, and is kept as a record in
+//!    blocks that are grouped by the cells of a coarse grid, in memory or, beyond the budget, in one spill file. The
+//!    result is the `cloud`, which nothing changes afterwards.
+//! 3. `outputs`: each format builds its dataset from the cloud: the octree by sampling chunks in Morton order, the binary
+//!    tree by exact sums of cells, batches by sorting.
 //!
-//! The bytes depend on the points and the settings alone: not on threads, memory, chunks or the order of the inputs.
+//! The bytes depend on the points and the settings alone: not on threads, memory, or the order of the inputs.
+//!
+//! ```
+//! use pointmill_converter::{Plan, Potree2Settings, Silent, convert};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let folder = tempfile::tempdir()?;
+//! let scan = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/las/format3.las");
+//! let plan = Plan::new(vec![scan.into()], folder.path().join("city"));
+//! let report = convert(&plan, &[Potree2Settings::default().into()], &Silent)?;
+//! assert_eq!(report.points.read, report.outputs[0].points);
+//! # Ok(())
+//! # }
+//! ```
 
-mod axis;
-mod batches;
+mod advice;
+#[cfg(feature = "bench")]
 #[doc(hidden)]
 pub mod bench_api;
-mod bintree;
-mod budget;
-mod build;
-mod checksum;
-mod chunks;
+mod cloud;
 mod convert;
-mod crs;
-mod describe;
 mod error;
 mod estimate;
-mod events;
 mod gather;
-mod grid;
-mod job;
-mod lattice;
 pub mod memory;
-mod morton;
-mod needs;
 mod octree;
-mod os_hints;
+mod outputs;
 mod plan;
-mod records;
 mod report;
-mod sample;
-mod schema;
-mod write;
+mod runtime;
+mod sources;
+mod warning;
 
-pub use convert::convert;
-pub use error::ConvertError;
+pub use advice::Advice;
+pub use convert::{convert, convert_on};
+pub use error::{ConvertError, InputFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
-pub use events::{Events, Phase, Silent};
+pub use octree::Sampling;
+pub use outputs::Target;
+pub use outputs::batches::BatchesSettings;
+pub use outputs::bintree::BintreeSettings;
+pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
-    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, RgbDepth, Sampling,
-    ScaleChoice, Target,
+    AttributeChoice, Duplicates, Filter, OnFault, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
 };
 pub use report::{
-    CoordinateChange, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport, PointsReport,
-    Report, TreeReport,
+    CoordinateChange, DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport,
+    PointsReport, Report, TreeReport,
 };
+pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
+pub use warning::{CrsNote, Proj4Fault, Warning};

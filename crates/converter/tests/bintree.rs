@@ -1,24 +1,24 @@
 //! Binary trees against a plain builder that holds everything in memory, and against themselves with other means.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BintreeSettings, ConvertError, Plan, Report, ScaleChoice, Silent, Target, convert,
+    AttributeChoice, BintreeSettings, ConvertError, Plan, Potree2Settings, Report, ScaleChoice, Silent, convert,
 };
 use pointmill_format::bintree::{Bintree, Layout, NodeKind, SplitRule};
 use pointmill_format::{NodePoints, OpenOptions};
+use pointmill_testkit::Random;
+use pointmill_testkit::files::dataset;
 
 /// Lattice integers (steps of 0.01) and classes.
 type Points = Vec<([i64; 3], u8)>;
 
 fn random(count: usize, seed: u64, shape: impl Fn([f64; 3]) -> [f64; 3]) -> Points {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..count).map(|i| (shape([next(), next(), next()]).map(|v| (v * 100.0).round() as i64), (i % 7) as u8)).collect()
+    let mut random = Random::new(seed);
+    let mut place = || shape([random.unit(), random.unit(), random.unit()]).map(|v| (v * 100.0).round() as i64);
+    (0..count).map(|i| (place(), (i % 7) as u8)).collect()
 }
 
 fn write_text(path: &Path, points: &Points) {
@@ -29,9 +29,8 @@ fn write_text(path: &Path, points: &Points) {
     fs::write(path, points.iter().map(line).collect::<String>()).unwrap();
 }
 
-fn plan(inputs: Vec<PathBuf>, out: PathBuf, settings: BintreeSettings) -> Plan {
+fn plan(inputs: Vec<PathBuf>, out: PathBuf) -> Plan {
     let mut plan = Plan::new(inputs, out);
-    plan.targets = vec![Target::Bintree(settings)];
     plan.scale = ScaleChoice::Fixed(0.01);
     plan.name = "cloud".into();
     let columns = ["x", "y", "z", "c"].map(str::to_owned).to_vec();
@@ -43,7 +42,7 @@ fn make(dir: &Path, points: &Points, settings: BintreeSettings) -> (PathBuf, Rep
     let (scan, out) = (dir.join("scan.xyz"), dir.join("out"));
     write_text(&scan, points);
     let _ = fs::remove_dir_all(&out);
-    let report = convert(&plan(vec![scan], out.clone(), settings), &Silent).unwrap();
+    let report = convert(&plan(vec![scan], out.clone()), &[settings.into()], &Silent).unwrap();
     (out, report)
 }
 
@@ -132,17 +131,6 @@ fn read(folder: &Path) -> Vec<Expected> {
     nodes
 }
 
-fn every_file(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut files: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|e| e.unwrap())
-        .filter(|e| e.file_name() != "report.json")
-        .map(|e| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap()))
-        .collect();
-    files.sort();
-    files
-}
-
 #[test]
 fn the_tree_is_that_of_the_page_for_every_rule_and_shape() {
     let dir = tempfile::tempdir().unwrap();
@@ -167,8 +155,8 @@ fn the_tree_is_that_of_the_page_for_every_rule_and_shape() {
             let differs = found.iter().zip(&expected).position(|(f, e)| f != e);
             assert_eq!((differs, found.len()), (None, expected.len()), "{name}, {}", split.name());
             assert_eq!(
-                (report.points.written, report.checksum_in),
-                (points.len() as u64, report.checksum_out),
+                (report.outputs[0].points, report.checksum_in),
+                (points.len() as u64, report.outputs[0].checksum.clone()),
                 "{name}"
             );
         }
@@ -183,7 +171,7 @@ fn threads_memory_tasks_and_the_order_of_inputs_do_not_show_in_the_bytes() {
     let names = ["a.xyz", "b.xyz"].map(|n| dir.path().join(n));
     for layout in [Layout::Files, Layout::Packed] {
         for split in [SplitRule::Mean, SplitRule::Median] {
-            let mut first: Option<Vec<(String, Vec<u8>)>> = None;
+            let mut first: Option<BTreeMap<String, Vec<u8>>> = None;
             for (threads, task, swapped) in
                 [(1, None, false), (3, Some(900), false), (2, Some(5000), true), (2, Some(1), false)]
             {
@@ -193,13 +181,13 @@ fn threads_memory_tasks_and_the_order_of_inputs_do_not_show_in_the_bytes() {
                 let out = dir.path().join("out");
                 let _ = fs::remove_dir_all(&out);
                 let settings = BintreeSettings { capacity: 700, layout, split };
-                let mut plan = plan(names.to_vec(), out.clone(), settings);
+                let mut plan = plan(names.to_vec(), out.clone());
                 (plan.threads, plan.task_points) = (threads, task);
                 if task == Some(1) {
                     plan.memory_bytes = 160 << 20;
                 }
-                convert(&plan, &Silent).unwrap();
-                let files = every_file(&out);
+                convert(&plan, &[settings.into()], &Silent).unwrap();
+                let files = dataset(&out);
                 let count = if layout == Layout::Packed { 2 } else { 50 };
                 assert!(files.len() >= count, "{}", files.len());
                 match &first {
@@ -218,11 +206,10 @@ fn beside_an_octree_from_one_read_it_is_the_same_tree() {
     let settings = BintreeSettings { capacity: 1000, ..BintreeSettings::default() };
     let (alone, _) = make(dir.path(), &points, settings);
     let both = dir.path().join("both");
-    let mut plan = plan(vec![dir.path().join("scan.xyz")], both.clone(), settings);
-    plan.targets = vec![Target::Potree2, Target::Bintree(settings)];
+    let mut plan = plan(vec![dir.path().join("scan.xyz")], both.clone());
     plan.task_points = Some(2000);
-    let report = convert(&plan, &Silent).unwrap();
-    assert_eq!(every_file(&both.join("bintree")), every_file(&alone));
+    let report = convert(&plan, &[Potree2Settings::default().into(), settings.into()], &Silent).unwrap();
+    assert_eq!(dataset(&both.join("bintree")), dataset(&alone));
     assert_eq!(report.outputs.iter().map(|o| o.format.as_str()).collect::<Vec<_>>(), ["potree2", "bintree"]);
     assert!(both.join("potree2/metadata.json").is_file() && both.join("report.json").is_file());
 }
@@ -234,13 +221,13 @@ fn optional_columns_come_as_asked_and_duplicates_cannot_be_dropped_yet() {
     fs::write(&scan, "x,y,z,r,g,b,i\n1,2,3,10,20,30,500\n4,5,6,255,0,1,7\n").unwrap();
     let out = dir.path().join("out");
     let mut plan = Plan::new(vec![scan], out.clone());
-    plan.targets = vec![Target::Bintree(BintreeSettings::default())];
+    let tree = [BintreeSettings::default().into()];
     plan.attributes = AttributeChoice::List(vec!["rgba".into(), "intensity".into()]);
-    let report = convert(&plan, &Silent).unwrap();
-    assert_eq!(report.attributes, ["position", "rgba", "intensity"]);
+    let report = convert(&plan, &tree, &Silent).unwrap();
+    assert_eq!(report.outputs[0].attributes, ["position", "rgba", "intensity"]);
     let leaf = fs::read(out.join("n.bin")).unwrap();
     assert_eq!((leaf.len(), &leaf[16..20], &leaf[20..22]), (48, &[10, 20, 30, 255][..], &500u16.to_le_bytes()[..]));
     plan.overwrite = true;
     plan.duplicates = pointmill_converter::Duplicates::Drop;
-    assert!(matches!(convert(&plan, &Silent), Err(ConvertError::Unsupported(_))));
+    assert!(matches!(convert(&plan, &tree, &Silent), Err(ConvertError::Unsupported(_))));
 }

@@ -4,48 +4,31 @@
 //! nobody can know. Nor can anybody if the last number of any text loses digits.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use pointmill_converter::{ConvertError, Plan, Report, Silent, convert};
+use pointmill_converter::{ConvertError, Plan, Potree2Settings, Report, Silent, convert};
 use pointmill_format::ErrorKind;
-
-const CUTS: usize = 64;
-
-/// Kinds without a count of their points.
-const UNCOUNTED: [&str; 4] = ["xyz", "txt", "csv", "asc"];
-
-/// The fixtures of a folder that hold points.
-fn fixtures(folder: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures").join(folder);
-    let files = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let mut files: Vec<_> = files.filter(|p| p.extension().is_some_and(|e| e != "tsv")).collect();
-    files.retain(|p| {
-        !["LICENSE-autzen_trim.txt", "no_scans.e57", "autzen_trim.laz"].iter().any(|name| p.ends_with(name))
-    });
-    files.sort();
-    files
-}
+use pointmill_testkit::{damage, files};
 
 fn run(input: &Path, output: &Path) -> Result<Report, ConvertError> {
     let mut plan = Plan::new(vec![input.to_path_buf()], output.to_path_buf());
     (plan.threads, plan.overwrite) = (1, true);
-    convert(&plan, &Silent)
+    convert(&plan, &[Potree2Settings::default().into()], &Silent)
 }
 
 fn check(folder: &str) {
     let dir = tempfile::tempdir().unwrap();
     let output = dir.path().join("out");
-    for path in fixtures(folder) {
-        let whole = run(&path, &output).unwrap();
+    for fixture in files::scan_fixtures(folder).into_iter().filter(|f| f.is_small() && f.points > 0) {
+        let whole = run(&fixture.path, &output).unwrap();
+        assert_eq!(whole.points.read, fixture.points, "{}", fixture.name);
         fs::remove_dir_all(&output).unwrap();
-        let bytes = fs::read(&path).unwrap();
-        let name = path.file_name().unwrap().to_str().unwrap();
-        let is_counted = !UNCOUNTED.contains(&path.extension().unwrap().to_str().unwrap());
-        let (input, is_rows) = (dir.path().join(name), folder == "rows");
-        for k in 0..CUTS {
-            let cut = bytes.len() * k / CUTS;
-            fs::write(&input, &bytes[..cut]).unwrap();
+        let (bytes, name) = (fixture.bytes(), files::file_name(&fixture.path));
+        let (input, is_rows) = (dir.path().join(&name), folder == "rows");
+        for part in damage::cuts(&bytes) {
+            let cut = part.len();
+            fs::write(&input, part).unwrap();
             let start = Instant::now();
             let result = run(&input, &output);
             assert!(start.elapsed() < Duration::from_secs(20), "{name} cut to {cut}");
@@ -58,7 +41,7 @@ fn check(folder: &str) {
                     let in_last_line = is_rows && !bytes[cut..].trim_ascii_end().contains(&b'\n');
                     let points = report.points.read;
                     assert!(
-                        same || !is_counted && fewer || !fewer && in_last_line,
+                        same || !fixture.is_counted() && fewer || !fewer && in_last_line,
                         "{name} cut to {cut}: {points} points"
                     );
                     fs::remove_dir_all(&output).unwrap();

@@ -145,7 +145,8 @@ impl Las {
         out
     }
 
-    fn bounds(&self) -> [[f64; 3]; 2] {
+    /// The bounds of the points, as an honest header declares them: minimum and maximum.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
         let axis = |a: usize| self.points.iter().map(move |p| p.xyz[a]);
         let world = |a: usize, q: Option<i32>| f64::from(q.unwrap_or(0)) * self.scale[a] + self.offset[a];
         [[0, 1, 2].map(|a| world(a, axis(a).min())), [0, 1, 2].map(|a| world(a, axis(a).max()))]

@@ -1,22 +1,11 @@
 //! What PotreeConverter 2.1.1 wrote, and what is wrong with it. Skipped where the corpus is not at hand.
 
-use std::path::PathBuf;
-
+use pointmill_testkit::files::corpus;
 use pointmill_validate::{Check, Options, Outcome, validate};
 
-fn corpus() -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/corpus");
-    if !path.is_dir() {
-        eprintln!("skipped: no corpus at {}", path.display());
-        return None;
-    }
-    Some(path)
-}
-
 fn run(name: &str, source: &str) -> Option<Outcome> {
-    let corpus = corpus()?;
-    let options = Options { against: vec![corpus.join("las").join(source)], max_problems: 100, ..Options::default() };
-    Some(validate(&corpus.join("potree2").join(name), &options, &|_| {}).unwrap())
+    let options = Options { against: vec![corpus("las")?.join(source)], max_problems: 100, ..Options::default() };
+    Some(validate(&corpus("potree2")?.join(name), &options, &|_| {}).unwrap())
 }
 
 /// Checks that found errors, and how many.

@@ -84,9 +84,8 @@ fn make(file: &Path, dir: &Path, target: Target) -> Result<(OutputReport, PathBu
     if out.exists() {
         fs::remove_dir_all(&out)?;
     }
-    let mut plan = Plan::new(vec![file.to_path_buf()], out.clone());
-    plan.targets = vec![target];
-    let report = convert(&plan, &Silent)?;
+    let plan = Plan::new(vec![file.to_path_buf()], out.clone());
+    let report = convert(&plan, &[target], &Silent)?;
     let output = report.outputs.into_iter().next().ok_or("no output")?;
     Ok((output, out))
 }
@@ -94,12 +93,12 @@ fn make(file: &Path, dir: &Path, target: Target) -> Result<(OutputReport, PathBu
 fn batch_rows(scene: Scene, file: &Path, dir: &Path) -> Result<String, Box<dyn std::error::Error>> {
     let mut rows = String::new();
     let settings = |planes, originals| BatchesSettings { lod_cell: None, planes, originals, ..Default::default() };
-    let (_, out) = make(file, dir, Target::Batches(settings(None, true)))?;
+    let (_, out) = make(file, dir, settings(None, true).into())?;
     let auto = Batches::open(out.join("points.qbatch"))?.header().precision().planes();
     for planes in 1..=3u8 {
         eprintln!("{}: {planes} planes", scene.name());
-        let (bare, _) = make(file, dir, Target::Batches(settings(Some(planes), false)))?;
-        let (full, out) = make(file, dir, Target::Batches(settings(Some(planes), true)))?;
+        let (bare, _) = make(file, dir, settings(Some(planes), false).into())?;
+        let (full, out) = make(file, dir, settings(Some(planes), true).into())?;
         let batches = Batches::open(out.join("points.qbatch"))?;
         let errors = batches.description().errors;
         let figures = [errors.ten, errors.twenty, errors.thirty][usize::from(planes) - 1].unwrap_or_default();
@@ -125,7 +124,7 @@ fn tree_rows(scene: Scene, file: &Path, dir: &Path) -> Result<String, Box<dyn st
     let mut rows = String::new();
     for split in [SplitRule::Mean, SplitRule::Median, SplitRule::Midpoint] {
         eprintln!("{}: {}", scene.name(), split.name());
-        let (output, out) = make(file, dir, Target::Bintree(BintreeSettings { split, ..Default::default() }))?;
+        let (output, out) = make(file, dir, BintreeSettings { split, ..Default::default() }.into())?;
         let tree = Bintree::open(&out)?;
         let root = tree.node(0).ok_or("no root")?.bounds;
         let volume = |b: &pointmill_format::Aabb| b.extent().iter().product::<f64>();

@@ -2,7 +2,7 @@
 
 use pointmill_format::{Column, with_column};
 
-use crate::schema::Schema;
+use crate::sources::Schema;
 
 /// Columns that are written together.
 pub(crate) enum Part<'a> {
@@ -12,7 +12,7 @@ pub(crate) enum Part<'a> {
     Bytes { columns: Vec<&'a [u8]>, offset: usize },
 }
 
-/// Most bytes written by one move.
+/// Maximum bytes written by one move.
 const MAX_BYTES: usize = 8;
 
 impl<'a> Part<'a> {

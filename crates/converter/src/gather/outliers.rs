@@ -2,54 +2,43 @@
 
 use pointmill_format::Aabb;
 
-use super::{Cell, Gathered};
-use crate::job::Job;
+use crate::cloud::{Cell, Gathered};
+use crate::warning::Warning;
 
-/// So many points, or one in a million, are a handful.
+/// This many points, or one in a million, are a handful.
 const HANDFUL: u64 = 16;
 
-/// Of a cloud so many times smaller they are no handful any more.
+/// In a cloud with fewer points per outlier they are no handful any more.
 const RARE: u64 = 100;
 
-/// The box without them must be so many times smaller to be worth a word.
+/// The box without them must be this many times smaller to be worth a warning.
 const WORTH: f64 = 10.0;
 
 /// The box that holds all but a handful of points, and how many these are, if it is much smaller than the cloud's.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Outliers {
-    pub(crate) points: u64,
+pub(super) struct Outliers {
+    pub(super) points: u64,
     /// World coordinates; whole cells.
-    pub(crate) others: Aabb,
+    pub(super) others: Aabb,
     /// Longest side of the cloud over that of `others`.
-    pub(crate) factor: f64,
+    pub(super) factor: f64,
 }
 
 impl Outliers {
-    /// The line for people. `held_back`: a smaller extent would allow a finer step.
-    pub(crate) fn line(&self, held_back: bool) -> String {
-        let (lie, make, them) =
-            if self.points == 1 { ("point lies", "makes", "it") } else { ("points lie", "make", "them") };
-        let gain = if held_back { "the coordinate step could be finer and" } else { "" };
-        let corner = |c: [f64; 3], to: fn(f64) -> f64| c.map(|v| to(v).to_string()).join(",");
-        format!(
-            "{} {lie} far from all others and {make} the extent at least {} times larger; without {them} {gain} the tree would have \
-             fewer levels: --bounds {}..{} leaves {them} out",
-            self.points,
-            self.factor.floor(),
-            corner(self.others.min, f64::floor),
-            corner(self.others.max, f64::ceil)
-        )
-        .replace("  ", " ")
+    /// For the user; the box in whole world units. `holds_back_step`: a smaller extent would allow a finer step.
+    pub(super) fn warning(&self, holds_back_step: bool) -> Warning {
+        let others = Aabb { min: self.others.min.map(f64::floor), max: self.others.max.map(f64::ceil) };
+        Warning::Outliers { points: self.points, others, factor: self.factor, holds_back_step }
     }
 }
 
 /// Looks at the cells of the partition, not at the points.
-pub(crate) fn find(gathered: &Gathered, job: &Job) -> Option<Outliers> {
+pub(super) fn find(gathered: &Gathered) -> Option<Outliers> {
     let handful = handful(gathered.stats.points);
     let cells: Vec<&Cell> = gathered.cells.iter().collect();
     let (kept, left_out) = trim(cells, handful)?;
-    let cube = &gathered.cube;
-    let corner = cube.offset(&job.lattice);
+    let (cube, lattice) = (&gathered.frame.cube, &gathered.lattice.lattice);
+    let corner = cube.offset(lattice);
     let mut others = Aabb::EMPTY;
     for cell in &kept {
         let side = cube.side / 2f64.powi(i32::from(cell.key.level));
@@ -59,7 +48,7 @@ pub(crate) fn find(gathered: &Gathered, job: &Job) -> Option<Outliers> {
     }
     let bounds = &gathered.stats.bounds;
     let longest = |extent: [f64; 3]| extent.into_iter().fold(0.0, f64::max);
-    let whole = longest([0, 1, 2].map(|a| bounds.max[a].abs_diff(bounds.min[a]) as f64 * job.lattice.scale[a]));
+    let whole = longest([0, 1, 2].map(|a| bounds.max[a].abs_diff(bounds.min[a]) as f64 * lattice.scale[a]));
     let factor = whole / longest(others.extent());
     (left_out > 0 && factor >= WORTH).then_some(Outliers { points: left_out, others, factor })
 }
@@ -102,12 +91,12 @@ fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gather::Moments;
+    use crate::cloud::{Moments, Segments};
     use pointmill_format::NodeKey;
 
     fn cell(x: u32, points: u64) -> Cell {
         let key = NodeKey { level: 8, x, y: 3, z: 0 };
-        Cell { key, points, segments: vec![], is_one_place: false, moments: Moments::default() }
+        Cell { key, points, segments: Segments::default(), is_one_place: false, moments: Moments::default() }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use pointmill_format::{Lattice, NodeKey};
 
-use crate::grid::{ANCHOR_BITS, Cube, LatticeBounds, TREE_BITS};
+use crate::cloud::{ANCHOR_BITS, Cube, JobBounds, JobColumns, JobPoint, StoredOrigin, TREE_BITS, morton};
 
 /// Bits of a packed cell coordinate, per axis.
 const CELL_BITS: u32 = 21;
@@ -12,9 +12,9 @@ const POINTS_PER_CELL: u64 = 32_768;
 
 /// Cells of the grid, and the frame in which records keep their integers.
 #[derive(Debug, Clone)]
-pub(crate) struct Partition {
-    /// Subtracted from job lattice coordinates to store them as `i32`.
-    base: [i64; 3],
+pub(super) struct Partition {
+    /// What is stored as zeros.
+    origin: StoredOrigin,
     grid: Grid,
 }
 
@@ -29,12 +29,12 @@ enum Grid {
 
 impl Partition {
     /// A grid for about `points` points inside `hint`.
-    pub(crate) fn choose(hint: Option<LatticeBounds>, lattice: &Lattice, points: u64) -> Self {
-        let hint = hint.unwrap_or(LatticeBounds { min: [0; 3], max: [1 << 20; 3] });
+    pub(super) fn choose(hint: Option<JobBounds>, lattice: &Lattice, points: u64) -> Self {
+        let hint = hint.unwrap_or(JobBounds::new([0; 3], [1 << 20; 3]));
         let center: [i64; 3] = std::array::from_fn(|a| hint.min[a] / 2 + hint.max[a] / 2);
         // Integers of a single LAS file fit as they are; only far-apart lattices need another zero.
         let fits = |v: i64| i32::try_from(v).is_ok();
-        let base = if hint.min.iter().chain(&hint.max).all(|v| fits(*v)) { [0; 3] } else { center };
+        let origin = if hint.min.0.iter().chain(&hint.max.0).all(|v| fits(*v)) { [0; 3] } else { center };
         // Surfaces: cells quadruple with each level.
         let level = (points / POINTS_PER_CELL).max(1).ilog2().div_ceil(2).clamp(ANCHOR_BITS + 2, 8);
         let cube = Cube::around(&hint, lattice);
@@ -46,17 +46,17 @@ impl Partition {
                 Grid::Absolute { shift, first: center.map(|c| (c >> shift) - (1 << (CELL_BITS - 1))) }
             }
         };
-        Self { base, grid }
+        Self { origin: StoredOrigin(JobPoint(origin)), grid }
     }
 
-    pub(crate) fn base(&self) -> [i64; 3] {
-        self.base
+    pub(super) fn origin(&self) -> StoredOrigin {
+        self.origin
     }
 
     /// True if every point within `bounds` can be stored and has a cell.
-    pub(crate) fn holds(&self, bounds: &LatticeBounds) -> bool {
+    pub(super) fn holds(&self, bounds: &JobBounds) -> bool {
         let stored = (0..3).all(|a| {
-            let fits = |q: i64| q.checked_sub(self.base[a]).is_some_and(|v| i32::try_from(v).is_ok());
+            let fits = |q: i64| q.checked_sub(self.origin.0[a]).is_some_and(|v| i32::try_from(v).is_ok());
             fits(bounds.min[a]) && fits(bounds.max[a])
         });
         stored
@@ -69,9 +69,10 @@ impl Partition {
     }
 
     /// Packed cells of points that the partition holds.
-    pub(crate) fn cells(&self, q: &[Vec<i64>; 3], out: &mut Vec<u64>) {
+    pub(super) fn cells(&self, q: &JobColumns, out: &mut Vec<u64>) {
         out.clear();
-        let points = q[0].iter().zip(&q[1]).zip(&q[2]);
+        let [x, y, z] = &q.0;
+        let points = x.iter().zip(y).zip(z);
         match &self.grid {
             Grid::Absolute { shift, first } => out.extend(points.map(|((x, y), z)| {
                 pack([
@@ -82,13 +83,13 @@ impl Partition {
             })),
             Grid::OfCube { cube, level } => out.extend(points.map(|((x, y), z)| {
                 // Points outside the believed cube get some cell: the pass is then repeated anyway.
-                pack(cube.tree([*x, *y, *z]).map(|t| u64::from(t) >> (TREE_BITS - level)))
+                pack(cube.tree(JobPoint([*x, *y, *z])).cell(TREE_BITS - level).map(u64::from))
             })),
         }
     }
 
     /// True if the cells are octree nodes of the final cube.
-    pub(crate) fn fits(&self, cube: &Cube, bounds: &LatticeBounds) -> bool {
+    pub(super) fn fits(&self, cube: &Cube, bounds: &JobBounds) -> bool {
         match &self.grid {
             Grid::Absolute { shift, .. } => self.holds(bounds) && *shift <= cube.bits - ANCHOR_BITS,
             Grid::OfCube { cube: believed, .. } => self.holds(bounds) && **believed == *cube,
@@ -96,7 +97,7 @@ impl Partition {
     }
 
     /// The octree node of a packed cell.
-    pub(crate) fn node(&self, packed: u64, cube: &Cube) -> NodeKey {
+    pub(super) fn node(&self, packed: u64, cube: &Cube) -> NodeKey {
         let cell = unpack(packed);
         match &self.grid {
             Grid::Absolute { shift, first } => {
@@ -117,8 +118,8 @@ fn pack(cell: [u64; 3]) -> u64 {
 }
 
 /// Rank of a packed cell in Morton order.
-pub(crate) fn morton_of(packed: u64) -> u64 {
-    crate::morton::interleave(unpack(packed).map(|c| c as u32))
+pub(super) fn morton_of(packed: u64) -> u64 {
+    morton::interleave(unpack(packed).map(|c| c as u32))
 }
 
 fn unpack(packed: u64) -> [u64; 3] {
@@ -130,7 +131,7 @@ fn unpack(packed: u64) -> [u64; 3] {
 mod tests {
     use super::*;
 
-    fn check(hint: LatticeBounds, actual: LatticeBounds, scale: [f64; 3]) -> bool {
+    fn check(hint: JobBounds, actual: JobBounds, scale: [f64; 3]) -> bool {
         let lattice = Lattice { scale, offset: [0.0; 3] };
         let partition = Partition::choose(Some(hint), &lattice, 20_000_000);
         let cube = Cube::around(&actual, &lattice).unwrap();
@@ -141,23 +142,22 @@ mod tests {
         let mut cells = Vec::new();
         for corner in 0..8 {
             let q: [i64; 3] = std::array::from_fn(|a| if corner >> a & 1 == 0 { actual.min[a] } else { actual.max[a] });
-            partition.cells(&q.map(|v| vec![v]), &mut cells);
+            partition.cells(&JobColumns(q.map(|v| vec![v])), &mut cells);
             let node = partition.node(cells[0], &cube);
-            let t = cube.tree(q);
-            assert_eq!([node.x, node.y, node.z], t.map(|t| t >> (31 - u32::from(node.level))));
+            assert_eq!([node.x, node.y, node.z], cube.tree(JobPoint(q)).cell(31 - u32::from(node.level)));
         }
         true
     }
 
     #[test]
     fn cells_are_octree_nodes_even_when_the_header_was_somewhat_wrong() {
-        let hint = LatticeBounds { min: [1000, -70_000, 5], max: [101_000, 30_123, 9_000] };
+        let hint = JobBounds::new([1000, -70_000, 5], [101_000, 30_123, 9_000]);
         assert!(check(hint, hint, [0.01; 3]));
-        let slightly_larger = LatticeBounds { min: [900, -70_003, 5], max: [101_000, 31_123, 12_000] };
+        let slightly_larger = JobBounds::new([900, -70_003, 5], [101_000, 31_123, 12_000]);
         assert!(check(hint, slightly_larger, [0.01; 3]));
-        let half = LatticeBounds { min: [1000, -30_000, 5], max: [40_000, 123, 9_000] };
+        let half = JobBounds::new([1000, -30_000, 5], [40_000, 123, 9_000]);
         assert!(check(hint, half, [0.01; 3]));
-        let tiny = LatticeBounds { min: [1000; 3], max: [1300; 3] };
+        let tiny = JobBounds::new([1000; 3], [1300; 3]);
         assert!(!check(hint, tiny, [0.01; 3]), "cells coarser than the anchor must be refused");
         assert!(check(hint, hint, [0.01, 0.01, 0.001]));
         assert!(!check(hint, slightly_larger, [0.01, 0.01, 0.001]));

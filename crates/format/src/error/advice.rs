@@ -14,6 +14,8 @@ pub enum Advice {
     ExportAgain,
     /// The file lacks coordinates.
     ExportPositions,
+    /// The file is none of the kind that it was opened as.
+    WrongFile,
     /// A number does not fit its column.
     CheckColumns,
     /// Rows of two numbers: cut short, or x and y alone, which [`crate::OpenOptions::columns`] can say.
@@ -34,6 +36,7 @@ impl fmt::Display for Advice {
             Self::CutShort => f.write_str("it was cut short; copy or export it again"),
             Self::Damaged => f.write_str("it is damaged; copy or export it again"),
             Self::ExportAgain => f.write_str("export it again from its source"),
+            Self::WrongFile => f.write_str("see which file was meant"),
             Self::ExportPositions => f.write_str("export it with x, y and z"),
             Self::CheckColumns => f.write_str(
                 "the file is damaged, or its columns are not what they are called; correct it or export it again",

@@ -263,42 +263,16 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 
 #[cfg(all(test, feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod tests {
+    use pointmill_testkit::files::{SCAN_FOLDERS, scan_fixtures};
+
     use super::*;
     use crate::ErrorKind;
-    use std::path::PathBuf;
-
-    fn fixtures() -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures")
-    }
-
-    /// Every fixture, with its ending.
-    fn scans() -> Vec<(PathBuf, String)> {
-        let folders = ["las", "e57", "rows"].map(|f| fixtures().join(f));
-        let files = folders.iter().flat_map(|f| fs::read_dir(f).unwrap()).map(|e| e.unwrap().path());
-        let ending = |p: &Path| p.extension().unwrap_or_default().to_string_lossy().into_owned();
-        files
-            .map(|p| (p.clone(), ending(&p)))
-            .filter(|(path, ending)| ending != "tsv" && !path.to_string_lossy().contains("LICENSE"))
-            .collect()
-    }
 
     #[test]
     fn content_alone_tells_the_kind_of_every_fixture() {
-        let all = scans();
-        assert!(all.len() > 20, "{}", all.len());
-        for (path, ending) in all {
-            let kind = ScanKind::of_file(&path).unwrap().map(|k| k.name());
-            let expected = match ending.as_str() {
-                "las" | "laz" => "LAS",
-                "e57" => "E57",
-                "ply" => "PLY",
-                "pcd" => "PCD",
-                "pts" => "PTS",
-                "ptx" => "PTX",
-                "off" => "OFF",
-                _ => "XYZ",
-            };
-            assert_eq!(kind, Some(expected), "{}", path.display());
+        for fixture in SCAN_FOLDERS.iter().flat_map(|folder| scan_fixtures(folder)) {
+            let kind = ScanKind::of_file(&fixture.path).unwrap().map(|k| k.name());
+            assert_eq!(kind, Some(fixture.kind), "{}", fixture.name);
         }
     }
 

@@ -69,7 +69,7 @@ impl Source {
     pub(crate) fn slice_at<'a>(&self, offset: u64, len: u64, buf: &'a mut Vec<u8>) -> Result<&'a [u8], ReadError> {
         let end = offset.checked_add(len).filter(|end| *end <= self.len);
         let Some(len) = end.and_then(|_| usize::try_from(len).ok()) else {
-            return Err(self.cut_short(offset, len));
+            return Err(self.cut_short(offset, len).advise(Advice::CutShort));
         };
         if buf.len() < len {
             buf.resize(len, 0);

@@ -2,8 +2,9 @@
 
 use pointmill_format::Lattice;
 use pointmill_format::batches::{Header, Precision};
+use pointmill_testkit::Random;
 
-use crate::util::{Lcg, Points, golden, open};
+use crate::util::{Points, golden, open};
 
 /// Everything that a reader does with a file; the number of points.
 fn read_all(bytes: &[u8]) -> Result<u64, String> {
@@ -124,7 +125,7 @@ fn originals_that_belong_to_no_point_are_found_by_reading_everything() {
 
 /// Damage at random places, also in fields that were made to look right: no panic, one line.
 fn survives(bytes: &[u8], seed: u64, rounds: usize) -> usize {
-    let mut random = Lcg(seed);
+    let mut random = Random::new(seed);
     let mut refused = 0;
     for _ in 0..rounds {
         let mut bytes = bytes.to_vec();

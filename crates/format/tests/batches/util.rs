@@ -5,25 +5,17 @@ use std::path::PathBuf;
 
 use pointmill_format::batches::{AlignedBytes, Batches, Cloud, WriteOptions, Written, colour_word, write};
 use pointmill_format::{Attribute, AttributeType, Lattice, ReadError};
+use pointmill_testkit::Random;
+use pointmill_testkit::files::fixture;
 
 /// A golden file.
 pub(crate) fn golden(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/batches").join(name)
+    fixture("batches").join(name)
 }
 
 /// Opens a file in memory.
 pub(crate) fn open(bytes: &[u8]) -> Result<Batches<AlignedBytes>, ReadError> {
     Batches::from_bytes(AlignedBytes::from(bytes), "points.qbatch")
-}
-
-/// The generator of `fixtures/generators/batches.py`.
-pub(crate) struct Lcg(pub(crate) u64);
-
-impl Lcg {
-    pub(crate) fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % n
-    }
 }
 
 /// A cloud that owns its columns.
@@ -39,7 +31,7 @@ impl Points {
     /// The cloud of the same name in `fixtures/generators/batches.py`: positions below `sides`.
     pub(crate) fn random(seed: u64, points: usize, sides: [u64; 3], with_attributes: bool, lattice: Lattice) -> Self {
         let mut cloud = Self::empty(lattice, with_attributes);
-        let mut random = Lcg(seed);
+        let mut random = Random::new(seed);
         for _ in 0..points {
             let p = sides.map(|s| random.below(s) as i64);
             let rgb = [(); 3].map(|()| random.below(256) as u8);

@@ -2,9 +2,10 @@
 
 use pointmill_format::bintree::Layout;
 use pointmill_format::bytes::Memory;
+use pointmill_testkit::Random;
 
 use crate::exercise::exercise;
-use crate::util::{FAR, Random, corridor, files_of, golden, load, open, read_all};
+use crate::util::{FAR, corridor, files_of, golden, load, open, read_all};
 
 #[track_caller]
 fn assert_fault(files: &Memory, part: &str) {
@@ -230,23 +231,23 @@ fn an_index_that_ends_anywhere_is_refused() {
 }
 
 fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
-    let at = random.below(bytes.len());
-    match random.below(6) {
+    let at = random.index(bytes.len());
+    match random.index(6) {
         0 => bytes.truncate(at),
-        1 => bytes[at] = b"0123456789.-e\",[]{}"[random.below(19)],
+        1 => bytes[at] = b"0123456789.-e\",[]{}"[random.index(19)],
         2 => {
-            let number: &[u8] = [&b"1e308"[..], b"-1", b"18446744073709551615", b"4294967295", b"0"][random.below(5)];
-            bytes.splice(at..(at + random.below(4)).min(bytes.len()), number.iter().copied());
+            let number: &[u8] = [&b"1e308"[..], b"-1", b"18446744073709551615", b"4294967295", b"0"][random.index(5)];
+            bytes.splice(at..(at + random.index(4)).min(bytes.len()), number.iter().copied());
         }
         3 => {
-            let end = (at + random.below(60)).min(bytes.len());
+            let end = (at + random.index(60)).min(bytes.len());
             let copy = bytes[at..end].to_vec();
-            let to = random.below(bytes.len());
+            let to = random.index(bytes.len());
             bytes.splice(to..to, copy);
         }
-        _ => (0..1 + random.below(4)).for_each(|_| {
-            let at = random.below(bytes.len());
-            bytes[at] ^= 1 << random.below(8);
+        _ => (0..1 + random.index(4)).for_each(|_| {
+            let at = random.index(bytes.len());
+            bytes[at] ^= 1 << random.index(8);
         }),
     }
 }
@@ -271,9 +272,9 @@ fn damaged_files_give_points_or_an_error_within_bounded_memory() {
     ];
     let (mut read, mut refused) = (0, 0);
     for seed in 0..4000 {
-        let random = &mut Random(seed);
-        let (mut index, mut leaves) = originals[random.below(4)].clone();
-        mutate(if random.below(4) == 0 { &mut leaves } else { &mut index }, random);
+        let random = &mut Random::new(seed);
+        let (mut index, mut leaves) = originals[random.index(4)].clone();
+        mutate(if random.index(4) == 0 { &mut leaves } else { &mut index }, random);
         match exercise(&index, &leaves) {
             Ok(_) => read += 1,
             Err(e) => {
@@ -290,10 +291,10 @@ fn damaged_files_give_points_or_an_error_within_bounded_memory() {
 
 #[test]
 fn leaves_of_any_bytes_are_read_and_picked_from() {
-    let random = &mut Random(9);
+    let random = &mut Random::new(9);
     let index = load("packed")["index.json"].clone();
     for _ in 0..300 {
-        let bytes: Vec<u8> = (0..85).flat_map(|_| random.next().to_le_bytes()).collect();
+        let bytes: Vec<u8> = (0..85).flat_map(|_| random.next_u64().to_le_bytes()).collect();
         assert_eq!(exercise(&index, &bytes).unwrap(), 17);
     }
 }

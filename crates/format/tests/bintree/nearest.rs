@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use pointmill_format::bintree::{Layout, NearestPoints};
+use pointmill_testkit::Random;
 
-use crate::util::{FAR, Random, corridor, files_of, open, read_all};
+use crate::util::{FAR, corridor, files_of, open, read_all};
 
 #[test]
 fn the_nearest_points_are_those_that_a_look_at_every_point_finds() {
-    let random = &mut Random(11);
+    let random = &mut Random::new(11);
     for (n, capacity) in [(1, 4), (200, 7), (4000, 700)] {
         let files = files_of(&mut corridor(n, 200_000.0, n as u64), capacity, Layout::Packed, FAR);
         let tree = Arc::new(open(&files).unwrap());
@@ -16,9 +17,9 @@ fn the_nearest_points_are_those_that_a_look_at_every_point_finds() {
         let mut nearest = [1 << 30, 0].map(|cache| NearestPoints::new(Arc::clone(&tree), cache));
         assert_eq!(nearest[0].leaf_boxes().size(), tree.leaves().count());
         for _ in 0..200 {
-            let near = points[random.below(points.len())].0;
+            let near = points[random.index(points.len())].0;
             let place = near.map(|v| v + random.between(-20.0, 20.0));
-            let (count, limit) = ([1, 5, 40, 300][random.below(4)], [3.0, 30.0, f64::INFINITY][random.below(3)]);
+            let (count, limit) = ([1, 5, 40, 300][random.index(4)], [3.0, 30.0, f64::INFINITY][random.index(3)]);
             let squared = |p: [f64; 3]| (0..3).map(|a| (p[a] - place[a]).powi(2)).sum::<f64>();
             let mut expected: Vec<_> = points.iter().map(|p| (squared(p.0), p.2, p.3, p.1)).collect();
             expected.retain(|p| p.0 <= limit * limit);

@@ -6,8 +6,9 @@ use pointmill_format::bintree::{
     Bintree, Frustum, Hit, Layout, Material, Picker, Ray, distance_range, switch_distance,
 };
 use pointmill_format::{Aabb, NodePoints};
+use pointmill_testkit::Random;
 
-use crate::util::{FAR, Random, Told, corridor, files_of, open, read_all};
+use crate::util::{FAR, Told, corridor, files_of, open, read_all};
 
 fn cloud(n: usize, capacity: u64, seed: u64) -> Bintree {
     open(&files_of(&mut corridor(n, 400_000.0, seed), capacity, Layout::Packed, FAR)).unwrap()
@@ -20,7 +21,7 @@ fn somewhere(tree: &Bintree, random: &mut Random) -> [f64; 3] {
 }
 
 fn direction(random: &mut Random) -> [f64; 3] {
-    match random.below(6) {
+    match random.index(6) {
         axis @ 0..3 => [0, 1, 2].map(|a| if a == axis { -1.0 } else { 0.0 }),
         _ => [0; 3].map(|_| random.between(-1.0, 1.0)),
     }
@@ -28,7 +29,7 @@ fn direction(random: &mut Random) -> [f64; 3] {
 
 #[test]
 fn boxes_tell_the_leaves_that_a_look_at_every_leaf_tells() {
-    let (tree, random) = (cloud(5000, 60, 1), &mut Random(1));
+    let (tree, random) = (cloud(5000, 60, 1), &mut Random::new(1));
     let all = read_all(&tree).unwrap();
     let (mut some, mut scratch) = (0, NodePoints::default());
     for _ in 0..200 {
@@ -68,7 +69,7 @@ fn frustum(tree: &Bintree, random: &mut Random) -> Frustum {
 
 #[test]
 fn frustums_tell_the_leaves_that_a_look_at_every_leaf_tells() {
-    let (tree, random) = (cloud(5000, 60, 2), &mut Random(2));
+    let (tree, random) = (cloud(5000, 60, 2), &mut Random::new(2));
     let points = read_all(&tree).unwrap();
     let mut seen = 0;
     for _ in 0..200 {
@@ -86,7 +87,7 @@ fn frustums_tell_the_leaves_that_a_look_at_every_leaf_tells() {
 
 #[test]
 fn draw_lists_tell_what_every_leaf_by_itself_tells() {
-    let (tree, random) = (cloud(5000, 60, 3), &mut Random(3));
+    let (tree, random) = (cloud(5000, 60, 3), &mut Random::new(3));
     let points = read_all(&tree).unwrap();
     let mut drawn = [0; 3];
     for i in 0..200 {
@@ -127,7 +128,7 @@ fn first_met(points: &[Told], o: [f64; 3], d: [f64; 3], r: f64, spread: f64) -> 
 
 #[test]
 fn picking_finds_the_point_that_a_look_at_every_point_finds() {
-    let random = &mut Random(4);
+    let random = &mut Random::new(4);
     let (mut hits, mut misses) = (0, 0);
     for (n, capacity) in [(1, 5), (300, 7), (6000, 900)] {
         let tree = Arc::new(cloud(n, capacity, n as u64));
@@ -136,15 +137,15 @@ fn picking_finds_the_point_that_a_look_at_every_point_finds() {
         let mut pickers = [Picker::new(Arc::clone(&tree), 64 << 20), Picker::new(Arc::clone(&tree), 0)];
         for _ in 0..700 {
             // Half of the rays aim at a point.
-            let target = points[random.below(points.len())].0;
-            let (origin, way) = match random.below(2) {
+            let target = points[random.index(points.len())].0;
+            let (origin, way) = match random.index(2) {
                 0 => (somewhere(&tree, random), direction(random)),
                 _ => {
                     let (from, error) = (somewhere(&tree, random), random.between(0.0, 0.3));
                     (from, [0, 1, 2].map(|a| target[a] - from[a] + error))
                 }
             };
-            let (radius, spread) = ([0.0, 0.05, 0.5, 5.0][random.below(4)], [0.0, 0.01][random.below(2)]);
+            let (radius, spread) = ([0.0, 0.05, 0.5, 5.0][random.index(4)], [0.0, 0.01][random.index(2)]);
             let ray = Ray::new(origin, way, radius).unwrap().with_spread(spread);
             let expected = first_met(&points, origin, way, radius, spread);
             let found = pickers.each_mut().map(|picker| picker.pick(&ray).unwrap());
@@ -203,7 +204,7 @@ fn rays_that_are_none_are_refused() {
 #[test]
 fn a_picker_keeps_within_its_memory() {
     let tree = Arc::new(cloud(6000, 300, 7));
-    let (random, limit) = (&mut Random(7), 30_000);
+    let (random, limit) = (&mut Random::new(7), 30_000);
     let mut picker = Picker::new(Arc::clone(&tree), limit);
     for _ in 0..300 {
         let ray = Ray::new(somewhere(&tree, random), direction(random), 0.5).unwrap();

@@ -2,9 +2,10 @@
 
 use pointmill_format::bintree::{Bintree, Layout, NodeKind, SplitRule};
 use pointmill_format::{Aabb, Lattice};
+use pointmill_testkit::Random;
 
 use crate::build::{Builder, Point, header};
-use crate::util::{FAR, Random, class_of, corridor, files_of, open, read_all};
+use crate::util::{FAR, class_of, corridor, files_of, open, read_all};
 
 /// Checks boxes, counts, axes and planes of a dataset whose integers are certain, from its bytes alone; returns the
 /// integers of all points and their classes, sorted.
@@ -153,8 +154,8 @@ fn geometric_outliers_end_in_medians_below_depth_64() {
 #[test]
 fn leaves_of_10_and_16_km_keep_every_millimetre() {
     for length in [10_000_000, 16_000_000, 32_000_000] {
-        let random = &mut Random(length as u64);
-        let mut points = at((0..3000).map(|_| [random.below(length + 1) as i32, random.below(9000) as i32, 0]));
+        let random = &mut Random::new(length as u64);
+        let mut points = at((0..3000).map(|_| [random.index(length + 1) as i32, random.index(9000) as i32, 0]));
         points.extend([Point { q: [0; 3], id: 3000 }, Point { q: [length as i32, 0, 0], id: 3001 }]);
         let tree = opened(&mut points, 65_000);
         assert_eq!(tree.nodes().len(), 1);
@@ -164,9 +165,9 @@ fn leaves_of_10_and_16_km_keep_every_millimetre() {
 
 #[test]
 fn a_leaf_of_the_greatest_extent_keeps_its_bound() {
-    let random = &mut Random(3);
+    let random = &mut Random::new(3);
     let lattice = Lattice { scale: [0.001; 3], offset: [-1.0e6; 3] };
-    let mut points = at((0..3000).map(|_| [0; 3].map(|_| random.next() as i32)));
+    let mut points = at((0..3000).map(|_| [0; 3].map(|_| random.next_u64() as i32)));
     let tree = open(&files_of(&mut points, 65_000, Layout::Files, lattice)).unwrap();
     let mut found: Vec<[f64; 3]> = read_all(&tree).unwrap().into_iter().map(|p| p.0).collect();
     let mut expected: Vec<[f64; 3]> = points.iter().map(|p| lattice.world(p.q.map(i64::from))).collect();

@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use pointmill_format::bintree::{Bintree, Layout};
 use pointmill_format::bytes::Memory;
 use pointmill_format::{Lattice, NodePoints, ReadError};
+use pointmill_testkit::Random;
+use pointmill_testkit::files::fixture;
 
 use crate::build::{Builder, Point, header};
 
 /// The folder of the golden dataset in that layout.
 pub(crate) fn golden(layout: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/bintree").join(layout)
+    fixture("bintree").join(layout)
 }
 
 /// The files of the golden dataset, to be changed.
@@ -21,29 +23,6 @@ pub(crate) fn load(layout: &str) -> Memory {
 
 pub(crate) fn open(files: &Memory) -> Result<Bintree, ReadError> {
     Bintree::from_source(files.clone())
-}
-
-/// A small generator of pseudo-random numbers (SplitMix64): same seed, same numbers, everywhere.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    /// A number below `end`.
-    pub(crate) fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
-
-    /// A number from `min` to `max`.
-    pub(crate) fn between(&mut self, min: f64, max: f64) -> f64 {
-        min + (max - min) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
 }
 
 /// Millimetres around a place far from the origin.
@@ -62,11 +41,11 @@ pub(crate) fn files_of(points: &mut [Point], capacity: u64, layout: Layout, latt
 
 /// Points along a wavy corridor `length` lattice units long: clumps, lines and lonely ones.
 pub(crate) fn corridor(n: usize, length: f64, seed: u64) -> Vec<Point> {
-    let random = &mut Random(seed);
+    let random = &mut Random::new(seed);
     let point = |id| {
         let along = random.between(0.0, length);
-        let wire = random.below(3) as f64;
-        let q = match random.below(10) {
+        let wire = random.index(3) as f64;
+        let q = match random.index(10) {
             0 => [along, random.between(-40_000.0, 40_000.0), random.between(0.0, 30_000.0)],
             1..=4 => [along, (along / 50_000.0).sin() * 9000.0 + wire * 4000.0, 20_000.0 + wire * 100.0],
             _ => [along, random.between(-30_000.0, 30_000.0), random.between(0.0, 2000.0) * (along / 9000.0).cos()],

@@ -1,9 +1,10 @@
 //! Real files of public projects, if the corpus lies beside the repository.
 
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::common;
+use pointmill_testkit::files;
+
+use crate::common::E57;
 
 /// File, points, of these with a position, sum of their x (by libE57Format, within 1e-6), number of warnings.
 type Row = (&'static str, usize, usize, f64, usize);
@@ -30,21 +31,12 @@ const EXPECTED: &[Row] = &[
     ("e57/tiny_spherical.e57", 360, 180, 89.95435666933113, 0),
 ];
 
-fn corpus() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/corpus");
-    if !path.is_dir() {
-        eprintln!("skipped: no corpus at {}", path.display());
-        return None;
-    }
-    Some(path)
-}
-
 #[test]
 fn each_file_of_the_corpus_has_its_known_outcome() {
-    let Some(corpus) = corpus() else { return };
+    let Some(corpus) = files::corpus("") else { return };
     for (file, points, valid, sum_x, warnings) in EXPECTED {
         let start = Instant::now();
-        let cloud = common::read(&corpus.join(file)).unwrap_or_else(|e| panic!("{e}"));
+        let cloud = E57.read(&corpus.join(file)).unwrap_or_else(|e| panic!("{e}"));
         assert!(cloud.errors.is_empty(), "{file}: {:?}", cloud.errors);
         let x: Vec<f64> = cloud.xyz[0].iter().copied().filter(|v| !v.is_nan()).collect();
         assert_eq!((cloud.len(), x.len()), (*points, *valid), "{file}");
@@ -57,10 +49,10 @@ fn each_file_of_the_corpus_has_its_known_outcome() {
 
 #[test]
 fn files_with_bad_checksums_are_refused_or_read_around_them() {
-    let Some(corpus) = corpus() else { return };
-    let error = common::read(&corpus.join("broken/bad-crc.e57")).unwrap_err().to_string();
+    let Some(corpus) = files::corpus("") else { return };
+    let error = E57.read(&corpus.join("broken/bad-crc.e57")).unwrap_err().to_string();
     assert!(error.contains("page 0 does not match its checksum (byte 0)"), "{error}");
-    match common::read(&corpus.join("broken/corrupt_crc.e57")) {
+    match E57.read(&corpus.join("broken/corrupt_crc.e57")) {
         Ok(cloud) => assert!(cloud.errors[0].to_string().contains("checksum"), "{:?}", cloud.errors),
         Err(e) => assert!(e.to_string().contains("does not match its checksum (byte"), "{e}"),
     }
@@ -68,7 +60,7 @@ fn files_with_bad_checksums_are_refused_or_read_around_them() {
 
 #[test]
 fn no_scan_of_the_corpus_is_left_out_of_the_table() {
-    let Some(corpus) = corpus() else { return };
+    let Some(corpus) = files::corpus("") else { return };
     for folder in ["e57", "broken"] {
         for entry in std::fs::read_dir(corpus.join(folder)).unwrap() {
             let name = entry.unwrap().file_name().into_string().unwrap();

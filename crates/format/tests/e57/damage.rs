@@ -1,24 +1,6 @@
 //! Damage of one kind at a time: what is lost is told, what is not is read.
 
-use pointmill_format::ErrorKind;
-
 use crate::common::{fixture, read_bytes, repair, replace};
-
-#[test]
-fn a_file_cut_anywhere_is_one_clear_error() {
-    for name in ["scans.e57", "packets.e57", "no_scans.e57"] {
-        let whole = fixture(name);
-        for i in 0..64 {
-            let len = whole.len() * i / 64;
-            let error = read_bytes(&whole[..len]).unwrap_err();
-            assert!(
-                matches!(error.kind(), ErrorKind::Broken) && error.offset().is_some(),
-                "{name} cut to {len}: {error}"
-            );
-            assert!(!error.to_string().contains('\n'));
-        }
-    }
-}
 
 #[test]
 fn headers_that_lie_are_told_with_their_byte() {

@@ -1,27 +1,14 @@
 //! Files of libE57Format against what it reads from them (`fixtures/e57/expected.tsv`).
 
-use std::collections::BTreeMap;
-
+use pointmill_format::AttributeType;
 use pointmill_format::scan::e57;
-use pointmill_format::{AttributeType, Wanted};
+use pointmill_testkit::reader::{Cloud, columns_are_independent};
+use pointmill_testkit::{files, golden};
 
-use crate::common::{self, Cloud};
+use crate::common::{self, read};
 
-/// Points, of these not NaN; of the latter sum, minimum, maximum, first, last.
+/// Points, of these not NaN; of the latter sum, minimum, maximum, first, last. Exact but for integers beyond 2^53.
 type Row = [f64; 7];
-
-/// By file and column; exact but for integers beyond 2^53.
-fn expected() -> BTreeMap<String, BTreeMap<String, Row>> {
-    let text = std::fs::read_to_string(common::fixtures().join("expected.tsv")).unwrap();
-    let mut files = BTreeMap::<String, BTreeMap<String, Row>>::new();
-    for line in text.lines().filter(|l| !l.starts_with('#')) {
-        let mut fields = line.split('\t');
-        let (file, column) = (fields.next().unwrap(), fields.next().unwrap());
-        let numbers: Vec<f64> = fields.map(|f| f.parse().unwrap()).collect();
-        files.entry(file.to_owned()).or_default().insert(column.to_owned(), numbers.try_into().unwrap());
-    }
-    files
-}
 
 fn row(values: &[f64]) -> Row {
     let ok: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
@@ -40,13 +27,13 @@ fn same(seen: &Row, expected: &Row) -> bool {
 
 #[test]
 fn every_fixture_gives_the_positions_that_libe57format_reads() {
-    let expected = expected();
-    for path in common::all_fixtures() {
-        let name = path.file_name().unwrap().to_str().unwrap();
-        let cloud = common::read(&path).unwrap();
+    let expected = golden::expected::<f64, 7>("e57");
+    for fixture in common::fixtures() {
+        let name = files::file_name(&fixture.path);
+        let cloud = read(&name);
         assert!(cloud.errors.is_empty(), "{name}: {:?}", cloud.errors);
-        let Some(expected) = expected.get(name) else {
-            assert_eq!((cloud.len(), name), (0, "no_scans.e57"));
+        let Some(expected) = expected.get(&name) else {
+            assert_eq!((cloud.len(), name.as_str()), (0, "no_scans.e57"));
             continue;
         };
         for (axis, values) in ["x", "y", "z"].iter().zip(&cloud.xyz) {
@@ -58,16 +45,16 @@ fn every_fixture_gives_the_positions_that_libe57format_reads() {
 
 /// The values of one scan, told apart by the scan index.
 fn of_scan(cloud: &Cloud, name: &str, scan: f64) -> Vec<f64> {
-    let index = cloud.column("point source id");
-    cloud.column(name).iter().zip(index).filter(|(_, i)| **i == scan).map(|(v, _)| *v).collect()
+    let (values, index) = (cloud.values(name), cloud.values("point source id"));
+    values.iter().zip(index).filter(|(_, i)| *i == scan).map(|(v, _)| *v).collect()
 }
 
 #[test]
 fn extra_fields_come_as_they_are_stored() {
-    let expected = expected();
+    let expected = golden::expected::<f64, 7>("e57");
     let mut checked = 0;
     for (file, columns) in &expected {
-        let cloud = common::read(&common::fixtures().join(file)).unwrap();
+        let cloud = read(file);
         for (column, expected) in columns.iter().filter(|(c, _)| c.contains('/')) {
             let (scan, field) = column.split_once('/').unwrap();
             let name = match field {
@@ -89,7 +76,7 @@ fn extra_fields_come_as_they_are_stored() {
 
 #[test]
 fn columns_have_their_names_types_and_meaning() {
-    let attributes = |file: &str| common::read(&common::fixtures().join(file)).unwrap().info.attributes;
+    let attributes = |file: &str| read(file).info.attributes;
     let names = |file: &str| attributes(file).iter().map(|a| a.name.clone()).collect::<Vec<_>>().join(", ");
     assert_eq!(
         names("scans.e57"),
@@ -109,33 +96,20 @@ fn columns_have_their_names_types_and_meaning() {
 
 #[test]
 fn rows_and_columns_come_only_if_asked_for() {
-    let scan = e57::open(&common::fixtures().join("scans.e57")).unwrap();
+    let scan = e57::open(&files::fixture("e57").join("scans.e57")).unwrap();
     assert!(!scan.info().attributes.iter().any(|a| a.name.ends_with("Index") && a.name != "returnIndex"));
 }
 
 #[test]
 fn a_selection_of_columns_leaves_the_others_empty_and_changes_no_value() {
-    for name in ["scans.e57", "normals.e57", "packets.e57"] {
-        let scan = e57::open(&common::fixtures().join(name)).unwrap();
-        let all = common::read_scan(scan.as_ref(), &Wanted::all(scan.info()));
-        for i in 0..all.columns.len() {
-            let mut wanted = Wanted::positions(scan.info());
-            wanted.set(i, true);
-            let one = common::read_scan(scan.as_ref(), &wanted);
-            let bits = |xyz: &[Vec<f64>; 3]| xyz.concat().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-            assert_eq!(bits(&one.xyz), bits(&all.xyz), "{name}");
-            for (j, column) in one.columns.iter().enumerate() {
-                let text = |c: &[f64]| format!("{c:?}");
-                let same = text(column) == text(&all.columns[j]);
-                assert!(if j == i { same } else { column.is_empty() }, "{name}: {}", all.info.attributes[j].name);
-            }
-        }
+    for fixture in common::fixtures() {
+        columns_are_independent(e57::open(&fixture.path).unwrap().as_ref());
     }
 }
 
 #[test]
 fn what_stands_around_the_points_is_told() {
-    let info = |file: &str| e57::open(&common::fixtures().join(file)).unwrap().info().clone();
+    let info = |file: &str| e57::open(&files::fixture("e57").join(file)).unwrap().info().clone();
     let scans = info("scans.e57");
     assert_eq!((scans.format.as_str(), scans.points_declared, scans.lattice), ("E57 1.0, 3 scans", 600, None));
     assert_eq!(scans.bounds_declared, None, "two scans declare none");

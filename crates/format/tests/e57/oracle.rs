@@ -5,7 +5,9 @@ use e57::{
     Translation,
 };
 
-use crate::common::{self, near};
+use pointmill_testkit::files;
+
+use crate::common::{E57, near};
 
 const POINTS: usize = 120_000;
 
@@ -59,12 +61,12 @@ fn write(path: &std::path::Path) {
 
 #[test]
 fn large_scans_equal_the_simple_reader_point_by_point() {
-    let path = common::file(b"");
+    let path = files::temporary(b"");
     write(&path);
-    let cloud = common::read(&path).unwrap();
+    let cloud = E57.check(&path, "a file of many pieces").unwrap();
     assert!(cloud.errors.is_empty() && cloud.info.warnings.is_empty(), "{:?} {:?}", cloud.errors, cloud.info.warnings);
     assert_eq!((cloud.len(), cloud.promised), (2 * POINTS, 2 * POINTS as u64));
-    let (rgb, intensity, index) = (cloud.column("rgb"), cloud.column("intensity"), cloud.column("point source id"));
+    let (rgb, intensity, index) = (cloud.values("rgb"), cloud.values("intensity"), cloud.values("point source id"));
     let bounds = cloud.info.bounds_declared.unwrap();
     let mut reader = E57Reader::from_file(&path).unwrap();
     let mut i = 0;
@@ -94,14 +96,14 @@ fn large_scans_equal_the_simple_reader_point_by_point() {
 
 #[test]
 fn one_bad_page_costs_its_piece_and_names_the_byte() {
-    let path = common::file(b"");
+    let path = files::temporary(b"");
     write(&path);
-    let whole = common::read(&path).unwrap();
+    let whole = E57.read(&path).unwrap();
     let mut bytes = std::fs::read(&path).unwrap();
     // in the middle of a packet of the first scan, away from heads
     let at = 1024 * 1200 + 500;
     bytes[at] ^= 1;
-    let cloud = common::read_bytes(&bytes).unwrap();
+    let cloud = E57.read_bytes(&bytes).unwrap();
     assert_eq!(cloud.promised, whole.promised, "what is lost is still counted");
     assert_eq!(cloud.errors.len(), 1, "{:?}", cloud.errors);
     let error = cloud.errors[0].to_string();

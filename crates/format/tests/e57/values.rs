@@ -5,11 +5,13 @@ use std::io::BufReader;
 
 use e57::{E57Reader, RecordName};
 
-use crate::common;
+use pointmill_testkit::files;
+
+use crate::common::read;
 
 /// Raw values of a scan by the `e57` crate: name in the file, values.
 fn raw(file: &str, scan: usize, name: &str) -> Vec<f64> {
-    let file = File::open(common::fixtures().join(file)).unwrap();
+    let file = File::open(files::fixture("e57").join(file)).unwrap();
     let mut reader = E57Reader::new(BufReader::new(file)).unwrap();
     let cloud = reader.pointclouds()[scan].clone();
     let tag = |n: &RecordName| match n {
@@ -28,7 +30,7 @@ fn to_16(v: f64, low: f64, high: f64) -> f64 {
 
 #[test]
 fn intensity_is_scaled_by_the_limits_or_what_stands_for_them() {
-    let cloud = common::read(&common::fixtures().join("limits.e57")).unwrap();
+    let cloud = read("limits.e57");
     let ranges = [
         (-100.0, 200.0), // declared
         (0.0, 1.0),      // the field's own
@@ -42,7 +44,7 @@ fn intensity_is_scaled_by_the_limits_or_what_stands_for_them() {
         (0.0, 2.0),      // declared as integers for floats
         (0.0, 4095.0),
     ];
-    let intensity = cloud.column("intensity");
+    let intensity = cloud.values("intensity");
     for (scan, (low, high)) in ranges.into_iter().enumerate() {
         let raw = raw("limits.e57", scan, "Intensity");
         let span = raw.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
@@ -59,8 +61,8 @@ fn intensity_is_scaled_by_the_limits_or_what_stands_for_them() {
 
 #[test]
 fn colours_without_limits_share_one_range() {
-    let cloud = common::read(&common::fixtures().join("limits.e57")).unwrap();
-    let rgb = cloud.column("rgb");
+    let cloud = read("limits.e57");
+    let rgb = cloud.values("rgb");
     for (scan, high) in [(9, 1.0), (10, 255.0)] {
         for (element, name) in ["ColorRed", "ColorGreen", "ColorBlue"].into_iter().enumerate() {
             for (i, v) in raw("limits.e57", scan, name).into_iter().enumerate() {
@@ -74,8 +76,8 @@ fn colours_without_limits_share_one_range() {
 
 #[test]
 fn invalid_colours_and_intensities_are_zero_and_valid_ones_exact() {
-    let cloud = common::read(&common::fixtures().join("scans.e57")).unwrap();
-    let (rgb, intensity) = (cloud.column("rgb"), cloud.column("intensity"));
+    let cloud = read("scans.e57");
+    let (rgb, intensity) = (cloud.values("rgb"), cloud.values("intensity"));
     let bad = raw("scans.e57", 0, "IsColorInvalid");
     for (i, red) in raw("scans.e57", 0, "ColorRed").into_iter().enumerate() {
         assert_eq!(rgb[3 * i], if bad[i] == 0.0 { red * 257.0 } else { 0.0 });
@@ -90,21 +92,21 @@ fn invalid_colours_and_intensities_are_zero_and_valid_ones_exact() {
 
 #[test]
 fn invalid_times_are_nan() {
-    let cloud = common::read(&common::fixtures().join("scans.e57")).unwrap();
+    let cloud = read("scans.e57");
     let bad = raw("scans.e57", 1, "IsTimeStampInvalid");
     for (i, v) in raw("scans.e57", 1, "TimeStamp").into_iter().enumerate() {
-        let seen = cloud.column("timeStamp")[200 + i];
+        let seen = cloud.values("timeStamp")[200 + i];
         assert!(if bad[i] == 0.0 { seen == v } else { seen.is_nan() });
     }
-    assert!(cloud.column("timeStamp")[..200].iter().all(|v| *v == 0.0), "a scan without times");
+    assert!(cloud.values("timeStamp")[..200].iter().all(|v| *v == 0.0), "a scan without times");
 }
 
 #[test]
 fn normals_turn_with_their_scan_and_are_not_moved() {
-    let cloud = common::read(&common::fixtures().join("normals.e57")).unwrap();
+    let cloud = read("normals.e57");
     let local = ["normalX", "normalY", "normalZ"].map(|n| raw("normals.e57", 0, n));
     let points = ["CartesianX", "CartesianY", "CartesianZ"].map(|n| raw("normals.e57", 0, n));
-    let seen = ["NormalX", "NormalY", "NormalZ"].map(|n| cloud.column(n));
+    let seen = ["NormalX", "NormalY", "NormalZ"].map(|n| cloud.values(n));
     for i in 0..100 {
         let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         // the angle to the way from point 0 to point i stays, for the whole scan is turned

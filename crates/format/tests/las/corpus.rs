@@ -1,9 +1,11 @@
 //! Real files of public projects, if the corpus lies beside the repository.
 
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::common::{self, Cloud};
+use pointmill_testkit::files;
+use pointmill_testkit::reader::Cloud;
+
+use crate::common::LAS;
 
 /// File, points, sum of the quantized x, what warnings must and may say (by a part of the line).
 type Row = (&'static str, usize, i64, &'static [&'static str]);
@@ -47,24 +49,15 @@ const EXPECTED: &[Row] = &[
     ("broken/spurious.las", 1065, -1_310_691_991_447, &[]),
 ];
 
-fn corpus() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/corpus");
-    if !path.is_dir() {
-        eprintln!("skipped: no corpus at {}", path.display());
-        return None;
-    }
-    Some(path)
-}
-
 #[test]
 fn each_file_of_the_corpus_has_its_known_outcome() {
-    let Some(corpus) = corpus() else { return };
+    let Some(corpus) = files::corpus("") else { return };
     for (file, points, sum_x, warnings) in EXPECTED {
         let start = Instant::now();
-        let cloud = common::read(&corpus.join(file)).unwrap_or_else(|e| panic!("{e}"));
+        let cloud = LAS.read(&corpus.join(file)).unwrap_or_else(|e| panic!("{e}"));
         assert!(cloud.errors.is_empty(), "{file}: {:?}", cloud.errors);
         assert_eq!(cloud.len(), *points, "{file}");
-        assert_eq!(cloud.xyz[0].iter().map(|v| i64::from(*v)).sum::<i64>(), *sum_x, "{file}");
+        assert_eq!(cloud.xyz[0].iter().map(|v| *v as i64).sum::<i64>(), *sum_x, "{file}");
         assert_eq!(cloud.info.warnings.len(), warnings.len(), "{file}: {:?}", cloud.info.warnings);
         assert!(warnings.iter().all(|w| cloud.warned(w)), "{file}: {:?}", cloud.info.warnings);
         assert!(start.elapsed() < Duration::from_secs(20), "{file} took {:?}", start.elapsed());
@@ -73,7 +66,7 @@ fn each_file_of_the_corpus_has_its_known_outcome() {
 
 #[test]
 fn no_scan_of_the_corpus_is_left_out_of_the_table() {
-    let Some(corpus) = corpus() else { return };
+    let Some(corpus) = files::corpus("") else { return };
     for folder in ["las", "las/permutations", "broken"] {
         for entry in std::fs::read_dir(corpus.join(folder)).unwrap() {
             let name = entry.unwrap().file_name().into_string().unwrap();
@@ -87,8 +80,8 @@ fn no_scan_of_the_corpus_is_left_out_of_the_table() {
 
 #[test]
 fn three_encodings_of_one_scan_give_the_same_points() {
-    let Some(corpus) = corpus() else { return };
-    let read = |file: &str| -> Cloud { common::read(&corpus.join(file)).unwrap() };
+    let Some(corpus) = files::corpus("") else { return };
+    let read = |file: &str| -> Cloud { LAS.read(&corpus.join(file)).unwrap() };
     let plain = read("las/1.2-with-color.las");
     for file in ["las/laszip-generated.laz", "broken/simple-laszip-compressor-version-1.2r0.laz"] {
         let other = read(file);

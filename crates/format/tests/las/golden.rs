@@ -1,57 +1,29 @@
 //! Files of laspy, LASzip and PDAL against what laspy reads from them (`fixtures/las/expected.tsv`).
 
-use std::collections::BTreeMap;
-
+use pointmill_format::AttributeType;
 use pointmill_format::scan::las;
-use pointmill_format::{AttributeType, Wanted};
+use pointmill_testkit::reader::{Cloud, columns_are_independent, integers};
+use pointmill_testkit::{files, golden};
 
-use crate::common::{self, Cloud, integers};
+use crate::common::{self, LAS, read};
 
-/// Name → points, sum, minimum, maximum, first, last.
-type Table = BTreeMap<String, [i128; 6]>;
-
-fn expected() -> BTreeMap<String, Table> {
-    let text = std::fs::read_to_string(common::fixtures().join("expected.tsv")).unwrap();
-    let mut files = BTreeMap::<String, Table>::new();
-    for line in text.lines().filter(|l| !l.starts_with('#')) {
-        let mut fields = line.split('\t');
-        let (file, column) = (fields.next().unwrap(), fields.next().unwrap());
-        let numbers: Vec<i128> = fields.map(|f| f.parse().unwrap()).collect();
-        files.entry(file.to_owned()).or_default().insert(column.to_owned(), numbers.try_into().unwrap());
-    }
-    files
-}
-
-fn summary(values: &[i128]) -> [i128; 6] {
+/// Points, sum, minimum, maximum, first, last.
+fn summary(values: &Vec<i128>) -> [i128; 6] {
     let (min, max) = (values.iter().min().unwrap(), values.iter().max().unwrap());
     [values.len() as i128, values.iter().sum(), *min, *max, values[0], values[values.len() - 1]]
 }
 
-fn table(cloud: &Cloud) -> Table {
-    let mut table = Table::new();
-    for (name, axis) in ["x", "y", "z"].iter().zip(&cloud.xyz) {
-        table.insert((*name).to_owned(), summary(&axis.iter().map(|v| i128::from(*v)).collect::<Vec<_>>()));
-    }
-    for (attribute, column) in cloud.info.attributes.iter().zip(&cloud.columns) {
-        let values = integers(column);
-        if attribute.elements == 1 {
-            table.insert(attribute.name.clone(), summary(&values));
-        } else {
-            for e in 0..attribute.elements {
-                let element: Vec<_> = values.iter().skip(e).step_by(attribute.elements).copied().collect();
-                table.insert(format!("{}[{e}]", attribute.name), summary(&element));
-            }
-        }
-    }
-    table
+fn table(cloud: &Cloud) -> golden::Columns<i128, 6> {
+    let columns = golden::columns(cloud, |v| v as i128, integers);
+    columns.iter().map(|(name, values)| (name.clone(), summary(values))).collect()
 }
 
 #[test]
 fn every_fixture_gives_the_columns_that_laspy_reads() {
-    let expected = expected();
-    assert_eq!(expected.len(), common::small_fixtures().len() + 1);
+    let expected = golden::expected("las");
+    assert_eq!(expected.len(), files::scan_fixtures("las").len());
     for (file, expected) in &expected {
-        let cloud = common::read(&common::fixtures().join(file)).unwrap();
+        let cloud = read(file);
         assert!(cloud.errors.is_empty(), "{file}: {:?}", cloud.errors);
         assert_eq!(&table(&cloud), expected, "{file}");
     }
@@ -59,8 +31,8 @@ fn every_fixture_gives_the_columns_that_laspy_reads() {
 
 #[test]
 fn a_laz_file_gives_the_same_values_as_its_las_twin() {
-    for path in common::small_fixtures().iter().filter(|p| p.with_extension("laz").exists()) {
-        let (las, laz) = (common::read(path).unwrap(), common::read(&path.with_extension("laz")).unwrap());
+    for path in common::small_fixtures().iter().map(|f| &f.path).filter(|p| p.with_extension("laz").exists()) {
+        let (las, laz) = (LAS.read(path).unwrap(), LAS.read(&path.with_extension("laz")).unwrap());
         assert_eq!(las.xyz, laz.xyz);
         let values = |c: &Cloud| c.columns.iter().map(integers).collect::<Vec<_>>();
         assert_eq!(values(&las), values(&laz), "{}", path.display());
@@ -70,10 +42,10 @@ fn a_laz_file_gives_the_same_values_as_its_las_twin() {
 
 #[test]
 fn sound_files_give_no_warning_but_that_waveforms_are_left_out() {
-    for path in common::small_fixtures() {
-        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
-        let waveforms = ["format4", "format5", "format9", "format10"].contains(&name.as_str());
-        let cloud = common::read(&path).unwrap();
+    for fixture in common::small_fixtures() {
+        let name = fixture.path.file_stem().unwrap().to_str().unwrap();
+        let waveforms = ["format4", "format5", "format9", "format10"].contains(&name);
+        let cloud = LAS.read(&fixture.path).unwrap();
         assert_eq!(cloud.warned("waveform"), waveforms, "{name}");
         assert_eq!(cloud.info.warnings.len(), usize::from(waveforms), "{name}: {:?}", cloud.info.warnings);
     }
@@ -81,26 +53,15 @@ fn sound_files_give_no_warning_but_that_waveforms_are_left_out() {
 
 #[test]
 fn a_selection_of_columns_leaves_the_others_empty_and_changes_no_value() {
-    for name in ["format3.las", "format8.laz", "extra_bytes_format7.laz", "format2.laz"] {
-        let scan = las::open(&common::fixtures().join(name)).unwrap();
-        let all = common::read_scan(scan.as_ref(), &Wanted::all(scan.info()));
-        for i in 0..all.columns.len() {
-            let mut wanted = Wanted::positions(scan.info());
-            wanted.set(i, true);
-            let one = common::read_scan(scan.as_ref(), &wanted);
-            assert_eq!(one.xyz, all.xyz, "{name}");
-            for (j, column) in one.columns.iter().enumerate() {
-                let same = integers(column) == integers(&all.columns[j]);
-                assert!(if j == i { same } else { column.is_empty() }, "{name}: {}", all.info.attributes[j].name);
-            }
-        }
+    for fixture in common::small_fixtures() {
+        columns_are_independent(las::open(&fixture.path).unwrap().as_ref());
     }
 }
 
 #[test]
 fn colour_comes_first_then_the_standard_attributes_then_extra_bytes() {
     let names = |file: &str| -> Vec<String> {
-        let cloud = common::read(&common::fixtures().join(file)).unwrap();
+        let cloud = read(file);
         cloud.info.attributes.iter().map(|a| a.name.clone()).collect()
     };
     assert_eq!(
@@ -120,7 +81,7 @@ fn colour_comes_first_then_the_standard_attributes_then_extra_bytes() {
 
 #[test]
 fn extra_bytes_keep_type_scale_offset_and_no_data() {
-    let cloud = common::read(&common::fixtures().join("extra_bytes_format3.las")).unwrap();
+    let cloud = read("extra_bytes_format3.las");
     let get = |name: &str| cloud.info.attributes.iter().find(|a| a.name == name).unwrap();
     assert_eq!((get("extra u2").scale[0], get("extra u2").offset[0]), (0.5, -100.0));
     assert_eq!(get("extra u2").description, "of type u2");
@@ -128,14 +89,14 @@ fn extra_bytes_keep_type_scale_offset_and_no_data() {
     assert_eq!(get("extra i2").no_data, Some(vec![-1.0]));
     assert_eq!(get("extra i8").ty, AttributeType::Int64);
     assert_eq!((get("extra f8").scale[0], get("extra f8").no_data.clone()), (1.0, None));
-    let arrays = common::read(&common::fixtures().join("extra_byte_arrays.las")).unwrap();
+    let arrays = read("extra_byte_arrays.las");
     let shape: Vec<_> = arrays.info.attributes.iter().rev().take(2).map(|a| (a.ty, a.elements)).collect();
     assert_eq!(shape, [(AttributeType::Float32, 3), (AttributeType::UInt16, 2)]);
 }
 
 #[test]
 fn the_coordinate_system_is_found_wherever_it_stands() {
-    let crs = |file: &str| las::open(&common::fixtures().join(file)).unwrap().info().crs.clone();
+    let crs = |file: &str| las::open(&files::fixture("las").join(file)).unwrap().info().crs.clone();
     let wkt = "PROJCS[\"Höhe \\\"quoted\\\"\",GEOGCS[\"WGS 84\"],UNIT[\"metre\",1]]";
     for file in ["wkt_vlr.las", "evlrs.las", "evlrs.laz"] {
         assert_eq!(crs(file).wkt.as_deref(), Some(wkt), "{file}");
@@ -148,7 +109,7 @@ fn the_coordinate_system_is_found_wherever_it_stands() {
 
 #[test]
 fn the_header_is_told_as_it_is() {
-    let scan = las::open(&common::fixtures().join("autzen_trim.laz")).unwrap();
+    let scan = las::open(&files::fixture("las").join("autzen_trim.laz")).unwrap();
     let info = scan.info();
     assert_eq!((info.format.as_str(), info.points_declared), ("LAZ 1.2, point format 3", 110_000));
     let bounds = info.bounds_declared.unwrap();
@@ -158,6 +119,6 @@ fn the_header_is_told_as_it_is() {
     );
     assert_eq!(info.lattice.unwrap().scale, [0.01; 3]);
     assert_eq!(scan.pieces().iter().map(|p| p.points).collect::<Vec<_>>(), [50_000, 50_000, 10_000]);
-    let scan = las::open(&common::fixtures().join("las_1_5.las")).unwrap();
+    let scan = las::open(&files::fixture("las").join("las_1_5.las")).unwrap();
     assert_eq!(scan.info().format, "LAS 1.5, point format 6");
 }

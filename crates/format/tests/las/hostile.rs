@@ -1,8 +1,9 @@
 //! Headers made to break a reader: each is one clear error, or is read without believing it.
 
 use pointmill_format::ErrorKind;
+use pointmill_testkit::damage::{put, u32_at};
 
-use crate::common::{fixture, points_start, put, read_bytes, u32_at};
+use crate::common::{fixture, points_start, read_bytes};
 
 const POINTS_START: usize = 96;
 const RECORD_LEN: usize = 105;

@@ -8,8 +8,9 @@ use pointmill_format::potree2::{
     BrotliScratch, Dataset, Encoding, Metadata, NodeEntry, encode_brotli, encode_hierarchy,
 };
 use pointmill_format::{Attribute, Column, NodeKey, NodePoints, with_column};
+use pointmill_testkit::files::corpus;
 
-use crate::util::{corpus, memory};
+use crate::util::memory;
 
 /// What tells points of a scan apart, nearly: bits of the GPS time, intensity, return number.
 type Label = (u64, u16, u8);

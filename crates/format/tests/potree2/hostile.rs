@@ -6,8 +6,10 @@ use pointmill_format::potree2::{
     encode_brotli,
 };
 use pointmill_format::{Attribute, AttributeType, NodeKey, NodePoints, ReadError};
+use pointmill_testkit::Random;
+use pointmill_testkit::files::corpus;
 
-use crate::util::{Random, attributes, corpus, file_mut, golden, load, memory, metadata, one_node, open};
+use crate::util::{attributes, file_mut, golden, load, memory, metadata, one_node, open};
 
 /// Everything that a reader does with a dataset; the number of points.
 fn read_all(files: &Memory) -> Result<usize, ReadError> {
@@ -46,19 +48,19 @@ fn assert_fault(files: &Memory, part: &str) {
 }
 
 fn mutate(files: &mut Memory, random: &mut Random) {
-    let file = file_mut(files, [METADATA_FILE, HIERARCHY_FILE, OCTREE_FILE][random.below(3)]);
-    let at = random.below(file.len());
-    match random.below(5) {
+    let file = file_mut(files, [METADATA_FILE, HIERARCHY_FILE, OCTREE_FILE][random.index(3)]);
+    let at = random.index(file.len());
+    match random.index(5) {
         0 => file.truncate(at),
         1 => {
-            let extreme = [u64::MAX, 1 << 63, u64::from(u32::MAX), 1 << 40, 0][random.below(5)].to_le_bytes();
-            let end = (at + 1 + random.below(8)).min(file.len());
+            let extreme = [u64::MAX, 1 << 63, u64::from(u32::MAX), 1 << 40, 0][random.index(5)].to_le_bytes();
+            let end = (at + 1 + random.index(8)).min(file.len());
             file[at..end].copy_from_slice(&extreme[..end - at]);
         }
-        2 => file[at] = b"0123456789.-e\",[]{}"[random.below(19)],
-        _ => (0..1 + random.below(4)).for_each(|_| {
-            let at = random.below(file.len());
-            file[at] ^= 1 << random.below(8);
+        2 => file[at] = b"0123456789.-e\",[]{}"[random.index(19)],
+        _ => (0..1 + random.index(4)).for_each(|_| {
+            let at = random.index(file.len());
+            file[at] ^= 1 << random.index(8);
         }),
     }
 }
@@ -76,8 +78,8 @@ fn damaged_files_give_points_or_an_error_within_bounded_memory() {
     originals.extend(corpus("potree2/color_1065_BROTLI").map(|path| load(&path)));
     let (mut read, mut refused) = (0, 0);
     for seed in 0..4_000 {
-        let random = &mut Random(seed);
-        let mut files = originals[random.below(originals.len())].clone();
+        let random = &mut Random::new(seed);
+        let mut files = originals[random.index(originals.len())].clone();
         mutate(&mut files, random);
         match read_all(&files) {
             Ok(_) => read += 1,

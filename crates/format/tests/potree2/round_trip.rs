@@ -5,8 +5,9 @@ use std::collections::{BTreeSet, HashSet};
 use pointmill_format::bytes::Memory;
 use pointmill_format::potree2::{BrotliScratch, Encoding, Node, NodeEntry, encode_brotli, encode_hierarchy};
 use pointmill_format::{NodeKey, NodePoints};
+use pointmill_testkit::Random;
 
-use crate::util::{Random, attributes, memory, metadata, one_node, open};
+use crate::util::{attributes, memory, metadata, one_node, open};
 
 /// Entries for `leaves` and all their ancestors, with numbers of their own, shuffled.
 fn entries(leaves: impl IntoIterator<Item = NodeKey>, random: &mut Random) -> Vec<NodeEntry> {
@@ -16,9 +17,9 @@ fn entries(leaves: impl IntoIterator<Item = NodeKey>, random: &mut Random) -> Ve
         .into_iter()
         .map(|key| NodeEntry {
             key,
-            points: random.next() as u32,
-            byte_offset: random.next(),
-            byte_size: random.next(),
+            points: random.next_u64() as u32,
+            byte_offset: random.next_u64(),
+            byte_size: random.next_u64(),
         })
         .collect();
     shuffle(&mut entries, random);
@@ -27,7 +28,7 @@ fn entries(leaves: impl IntoIterator<Item = NodeKey>, random: &mut Random) -> Ve
 
 fn shuffle<T>(items: &mut [T], random: &mut Random) {
     for i in (1..items.len()).rev() {
-        items.swap(i, random.below(i + 1));
+        items.swap(i, random.index(i + 1));
     }
 }
 
@@ -60,7 +61,7 @@ fn round_trip(entries: &mut [NodeEntry], step: u32) -> (Vec<Node>, Vec<u8>) {
 
 #[test]
 fn a_root_alone_is_one_leaf() {
-    let (nodes, bytes) = round_trip(&mut entries([], &mut Random(1)), 4);
+    let (nodes, bytes) = round_trip(&mut entries([], &mut Random::new(1)), 4);
     assert_eq!((nodes.len(), bytes.len()), (1, 22));
 }
 
@@ -69,7 +70,7 @@ fn chains_down_to_the_deepest_level_come_back_for_every_step_size() {
     for digit in ["0", "7"] {
         let leaf = name(&format!("r{}", digit.repeat(31)));
         for step in [1, 2, 4, 5, 30, 31, 32] {
-            let (nodes, _) = round_trip(&mut entries([leaf], &mut Random(2)), step);
+            let (nodes, _) = round_trip(&mut entries([leaf], &mut Random::new(2)), step);
             assert_eq!(nodes.len(), 32);
         }
     }
@@ -78,7 +79,7 @@ fn chains_down_to_the_deepest_level_come_back_for_every_step_size() {
 #[test]
 fn a_node_at_the_border_of_a_chunk_is_a_proxy_only_if_it_has_children() {
     let leaves = ["r0000", "r0001", "r00020", "r7777", "r77777777"].map(name);
-    let mut entries = entries(leaves, &mut Random(3));
+    let mut entries = entries(leaves, &mut Random::new(3));
     let (_, bytes) = round_trip(&mut entries, 4);
     // r · r0 r7 · r00 r77 · r000 r777 · r0000 r0001 r0002* r7777*, then r0002 r00020, then r7777 … r77777777
     let types: Vec<u8> = bytes.chunks_exact(22).map(|r| r[0]).collect();
@@ -88,13 +89,13 @@ fn a_node_at_the_border_of_a_chunk_is_a_proxy_only_if_it_has_children() {
 #[test]
 fn random_trees_come_back_and_their_bytes_do_not_depend_on_order() {
     for seed in 0..30 {
-        let random = &mut Random(seed);
-        let count = 1 + random.below(300);
-        let deepest = 1 + random.below(31);
+        let random = &mut Random::new(seed);
+        let count = 1 + random.index(300);
+        let deepest = 1 + random.index(31);
         let leaf = |random: &mut Random| {
-            let level = 1 + random.below(deepest);
+            let level = 1 + random.index(deepest);
             // Few digits near the root, so that paths share ancestors.
-            let digits = |l| if l < 6 { random.below(2) } else { random.below(8) };
+            let digits = |l| if l < 6 { random.index(2) } else { random.index(8) };
             (0..level).map(digits).fold(NodeKey::ROOT, |key, d| key.child(d as u8).unwrap())
         };
         let leaves: Vec<NodeKey> = (0..count).map(|_| leaf(random)).collect();
@@ -122,12 +123,12 @@ fn records(points: usize, random: &mut Random) -> Vec<u8> {
     let record_len: usize = attributes().iter().map(|a| a.size()).sum();
     let mut bytes = Vec::new();
     for _ in 0..points {
-        let kind = random.below(8);
-        let mut few = Random(random.below(3) as u64);
+        let kind = random.index(8);
+        let mut few = Random::new(random.index(3) as u64);
         let (position, rest) = (kind < 2, kind < 1);
         for at in 0..record_len {
             let repeat = if at < 12 { position } else { rest };
-            bytes.push(if repeat { few.next() } else { random.next() } as u8);
+            bytes.push(if repeat { few.next_u64() } else { random.next_u64() } as u8);
         }
     }
     bytes
@@ -144,8 +145,8 @@ fn read(files: &Memory) -> NodePoints {
 fn brotli_payloads_hold_the_same_points_as_default_ones_in_morton_order() {
     let mut scratch = BrotliScratch::default();
     for seed in 0..40 {
-        let random = &mut Random(seed);
-        let count = random.below(2000);
+        let random = &mut Random::new(seed);
+        let count = random.index(2000);
         let bytes = records(count, random);
         let record_len = bytes.len().checked_div(count).unwrap_or(1);
 

@@ -8,20 +8,11 @@ use pointmill_format::potree2::{
     encode_hierarchy,
 };
 use pointmill_format::{Aabb, Attribute, AttributeType, Lattice, NodeKey, ReadError};
+use pointmill_testkit::files::fixture;
 
 /// The folder of the golden dataset in that encoding.
 pub(crate) fn golden(encoding: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/potree2").join(encoding)
-}
-
-/// A folder of the corpus of real files, which lies beside the project where it is at hand.
-pub(crate) fn corpus(path: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/corpus").join(path);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there", path.display());
-    None
+    fixture("potree2").join(encoding)
 }
 
 /// A dataset's files in memory, to be changed.
@@ -38,24 +29,6 @@ pub(crate) fn memory(metadata: Vec<u8>, hierarchy: Vec<u8>, octree: Vec<u8>) -> 
 
 pub(crate) fn file_mut<'a>(files: &'a mut Memory, name: &str) -> &'a mut Vec<u8> {
     files.get_mut(name).unwrap()
-}
-
-/// A small generator of pseudo-random numbers (SplitMix64): same seed, same numbers, everywhere.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    /// A number below `end`.
-    pub(crate) fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
 }
 
 /// `position`, `rgb` and one attribute of every other kind of size.

@@ -1,21 +1,12 @@
 //! Real files of other projects, when they are at hand.
 
-use std::path::{Path, PathBuf};
+use pointmill_testkit::files;
 
-use crate::common;
-
-fn corpus() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/corpus");
-    if !path.exists() {
-        eprintln!("skipped: {} is absent", path.display());
-        return None;
-    }
-    Some(path)
-}
+use crate::common::ROWS;
 
 #[test]
 fn sound_files_give_their_points() {
-    let Some(corpus) = corpus() else { return };
+    let Some(corpus) = files::corpus("") else { return };
     for (file, points, attributes) in [
         ("ply/issue_2421.ply", 1, "i int32x1"),
         ("ply/mesh.ply", 4, ""),
@@ -51,7 +42,7 @@ fn sound_files_give_their_points() {
         ("text/test.pts", 19, "rgb uint16x3, intensity uint16x1"),
         ("text/utm17_1.txt", 10, ""),
     ] {
-        let cloud = common::read(&corpus.join(file)).unwrap();
+        let cloud = ROWS.read(&corpus.join(file)).unwrap();
         assert!(cloud.errors.is_empty(), "{file}: {:?}", cloud.errors);
         assert_eq!((cloud.len(), cloud.attributes().as_str()), (points, attributes), "{file}");
     }
@@ -59,13 +50,13 @@ fn sound_files_give_their_points() {
 
 #[test]
 fn what_cannot_be_told_is_refused_with_advice() {
-    let Some(corpus) = corpus() else { return };
+    let Some(corpus) = files::corpus("") else { return };
     for (file, what) in [
         ("ply/no_vertex.ply", "there is no element vertex"),
         ("broken/no_vertex.ply", "there is no element vertex"),
         ("text/badheader.txt", "no z"),
     ] {
-        let result = common::read(&corpus.join(file));
+        let result = ROWS.read(&corpus.join(file));
         match result {
             Err(e) => assert!(e.to_string().contains(what) && e.advice().is_some(), "{e}"),
             Ok(cloud) => assert!(cloud.warned(what), "{file}: {:?}", cloud.info),

@@ -1,57 +1,31 @@
 //! Files of plyfile, Open3D and numpy against what these read from them (`fixtures/rows/expected.tsv`).
 
-use std::collections::BTreeMap;
+use pointmill_testkit::golden;
+use pointmill_testkit::reader::{Cloud, columns_are_independent, doubles};
 
-use pointmill_format::Wanted;
+use crate::common::{self, ROWS, read};
 
-use crate::common::{self, Cloud};
-
-/// Column → points, sum, least, greatest, first, last.
-type Table = BTreeMap<String, [f64; 6]>;
-
-fn expected() -> BTreeMap<String, Table> {
-    let text = std::fs::read_to_string(common::fixtures().join("expected.tsv")).unwrap();
-    let mut files = BTreeMap::<String, Table>::new();
-    for line in text.lines().filter(|l| !l.starts_with('#')) {
-        let mut fields = line.split('\t');
-        let (file, column) = (fields.next().unwrap(), fields.next().unwrap());
-        let numbers: Vec<f64> = fields.map(|f| f.parse().unwrap()).collect();
-        files.entry(file.to_owned()).or_default().insert(column.to_owned(), numbers.try_into().unwrap());
-    }
-    files
-}
-
-fn summary(values: impl Iterator<Item = f64>) -> [f64; 6] {
-    let values: Vec<f64> = values.collect();
+/// Points, sum, least, greatest, first, last.
+fn summary(values: &[f64]) -> [f64; 6] {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let (least, greatest) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
     [values.len() as f64, finite().sum(), least, greatest, values[0], values[values.len() - 1]]
 }
 
-fn table(cloud: &Cloud) -> Table {
-    let mut table = Table::new();
-    for (name, axis) in ["x", "y", "z"].iter().zip(&cloud.xyz) {
-        table.insert((*name).to_owned(), summary(axis.iter().copied()));
-    }
-    for (attribute, values) in cloud.info.attributes.iter().zip(&cloud.columns) {
-        let elements = attribute.elements;
-        for e in 0..elements {
-            let name = if elements == 1 { attribute.name.clone() } else { format!("{}[{e}]", attribute.name) };
-            table.insert(name, summary(values.iter().skip(e).step_by(elements).copied()));
-        }
-    }
-    table
+fn table(cloud: &Cloud) -> golden::Columns<f64, 6> {
+    let columns = golden::columns(cloud, |v| v, doubles);
+    columns.iter().map(|(name, values)| (name.clone(), summary(values))).collect()
 }
 
 #[test]
 fn every_fixture_gives_the_columns_that_other_readers_give() {
-    let expected = expected();
-    assert_eq!(expected.len(), common::all_fixtures().len());
+    let expected = golden::expected::<f64, 6>("rows");
+    assert_eq!(expected.len(), common::fixtures().len());
     for (file, expected) in &expected {
-        let cloud = common::read(&common::fixtures().join(file)).unwrap();
+        let cloud = read(file);
         assert!(cloud.errors.is_empty(), "{file}: {:?}", cloud.errors);
         let found = table(&cloud);
-        let names = |t: &Table| t.keys().cloned().collect::<Vec<_>>();
+        let names = |t: &golden::Columns<f64, 6>| t.keys().cloned().collect::<Vec<_>>();
         assert_eq!(names(&found), names(expected), "{file}");
         for (column, expected) in expected {
             for (k, (found, expected)) in found[column].iter().zip(expected).enumerate() {
@@ -66,8 +40,8 @@ fn every_fixture_gives_the_columns_that_other_readers_give() {
 
 #[test]
 fn sound_files_give_no_warning_but_that_a_viewpoint_is_not_applied() {
-    for path in common::all_fixtures() {
-        let cloud = common::read(&path).unwrap();
+    for fixture in common::fixtures() {
+        let (path, cloud) = (&fixture.path, ROWS.read(&fixture.path).unwrap());
         let viewpoint = path.ends_with("padding_and_counts.pcd");
         assert_eq!(cloud.warned("viewpoint (1 2 3 1 0 0 0) is not applied"), viewpoint);
         assert_eq!(cloud.info.warnings.len(), usize::from(viewpoint), "{path:?}: {:?}", cloud.info.warnings);
@@ -78,7 +52,7 @@ fn sound_files_give_no_warning_but_that_a_viewpoint_is_not_applied() {
 #[test]
 fn the_encodings_of_one_cloud_give_the_same_points() {
     let pair = |a: &str, b: &str| {
-        let [a, b] = [a, b].map(|name| common::read(&common::fixtures().join(name)).unwrap());
+        let [a, b] = [a, b].map(read);
         assert_eq!((a.xyz, a.columns, a.info.attributes), (b.xyz, b.columns, b.info.attributes));
     };
     pair("all_little.ply", "all_big.ply");
@@ -93,25 +67,14 @@ fn the_encodings_of_one_cloud_give_the_same_points() {
 
 #[test]
 fn a_selection_of_columns_leaves_the_others_empty_and_changes_no_value() {
-    for path in common::all_fixtures() {
-        let scan = common::open(&path).unwrap();
-        let all = common::read_scan(scan.as_ref(), &Wanted::all(scan.info()));
-        for i in 0..all.columns.len() {
-            let mut wanted = Wanted::positions(scan.info());
-            wanted.set(i, true);
-            let one = common::read_scan(scan.as_ref(), &wanted);
-            let bits = |c: &Cloud| c.xyz.iter().flatten().map(|v| v.to_bits()).collect::<Vec<_>>();
-            assert_eq!(bits(&one), bits(&all), "{path:?}");
-            for (j, column) in one.columns.iter().enumerate() {
-                assert!(if j == i { *column == all.columns[j] } else { column.is_empty() }, "{path:?}");
-            }
-        }
+    for fixture in common::fixtures() {
+        columns_are_independent((ROWS.open)(&fixture.path).unwrap().as_ref());
     }
 }
 
 #[test]
 fn attributes_have_the_names_and_types_of_the_field() {
-    let attributes = |file: &str| common::read(&common::fixtures().join(file)).unwrap().attributes();
+    let attributes = |file: &str| read(file).attributes();
     assert_eq!(
         attributes("all_big.ply"),
         "rgb uint16x3, intensity uint16x1, classification uint8x1, NormalX floatx1, NormalY floatx1, NormalZ floatx1, \

@@ -5,7 +5,10 @@ use std::ops::ControlFlow;
 use pointmill_format::scan::text::{self, TextOptions};
 use pointmill_format::{ReadError, Wanted};
 
-use crate::common::{self, Cloud, read_bytes};
+use pointmill_testkit::files;
+use pointmill_testkit::reader::{self, Cloud};
+
+use crate::common::{ROWS, read_bytes};
 
 fn ply(kind: &str, rest: &str) -> String {
     format!("ply\nformat {kind} 1.0\n{rest}")
@@ -15,8 +18,8 @@ fn with(bytes: &str, columns: &[&str], separator: Option<char>) -> Result<Cloud,
     let mut options = TextOptions::default();
     options.columns = (!columns.is_empty()).then(|| columns.iter().map(|c| (*c).to_owned()).collect());
     options.separator = separator;
-    let scan = text::open(common::file(bytes.as_bytes()), &options)?;
-    Ok(common::read_scan(scan.as_ref(), &Wanted::all(scan.info())))
+    let scan = text::open(&files::temporary(bytes.as_bytes()), &options)?;
+    Ok(reader::read(scan.as_ref(), &Wanted::all(scan.info())))
 }
 
 #[test]
@@ -64,7 +67,7 @@ fn a_bad_number_is_named_with_its_byte_and_the_points_of_other_pieces_stay() {
 fn float_colours_above_one_are_integers() {
     let header = "element vertex 2\nproperty float x\nproperty float y\nproperty float red\nproperty float green\n\
                   property float blue\nend_header\n";
-    let colours = |rows: &str| read_bytes(ply("ascii", header) + rows).unwrap().column("rgb").to_vec();
+    let colours = |rows: &str| read_bytes(ply("ascii", header) + rows).unwrap().values("rgb");
     assert_eq!(colours("0 0 0 0.5 1\n0 0 1 0 0\n"), [0.0, 32768.0, 65535.0, 65535.0, 0.0, 0.0]);
     assert_eq!(colours("0 0 0 127.5 255\n0 0 1 0 0\n"), [0.0, 128.0, 255.0, 1.0, 0.0, 0.0]);
 }
@@ -119,7 +122,7 @@ impl KindName for ReadError {
 fn words_in_a_column_leave_it_out_with_a_warning() {
     let cloud = read_bytes("x,y,z,name,i\n1,2,3,oak,7\n4,5,6,\"a, b\",8\n").unwrap();
     assert!(cloud.warned("column 4 (name) holds no numbers"));
-    assert_eq!((cloud.attributes().as_str(), cloud.column("intensity")), ("intensity uint16x1", [7.0, 8.0].as_slice()));
+    assert_eq!((cloud.attributes().as_str(), cloud.values("intensity")), ("intensity uint16x1", vec![7.0, 8.0]));
 }
 
 #[test]
@@ -184,7 +187,7 @@ fn very_wide_rows_are_refused_or_come_in_small_batches() {
     let mut header = "element vertex 100000\nproperty float x\nproperty float y\n".to_owned();
     (0..4000).for_each(|i| header += &format!("property double p{i}\n"));
     let scan =
-        common::open(&common::file((ply("ascii", &header) + "end_header\n" + &"1\n".repeat(100_000)).as_bytes()))
+        (ROWS.open)(&files::temporary((ply("ascii", &header) + "end_header\n" + &"1\n".repeat(100_000)).as_bytes()))
             .unwrap();
     let mut scratch = pointmill_format::Scratch::default();
     let result = scan.decode(0, &Wanted::all(scan.info()), &mut scratch, &mut |_| ControlFlow::Continue(()));

@@ -86,8 +86,11 @@ pub fn check_error(error: &ReadError) {
     assert!(!error.what().is_empty(), "an error without a word: {line:?}");
 }
 
-/// [`check_error`], and that a broken scan is told with its byte and what to do.
-fn check_scan_error(error: &ReadError) {
+/// [`check_error`], and that the error of a broken scan names the byte and what to do.
+///
+/// # Panics
+/// If it does not.
+pub fn check_scan_error(error: &ReadError) {
     check_error(error);
     if matches!(error.kind(), ErrorKind::Broken) {
         assert!(error.offset().is_some(), "an error without its byte: {error}");

@@ -183,15 +183,14 @@ pub(crate) fn square(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
 
     /// A cheap sequence without pattern.
     fn scatter(n: usize, side: u64) -> Vec<[i32; 3]> {
-        let mut state = 1u64;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 33) % side) as i32
-        };
+        let mut random = Random::new(1);
+        let mut next = || random.below(side) as i32;
         (0..n).map(|_| [next(), next(), next()]).collect()
     }
 

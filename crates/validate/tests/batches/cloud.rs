@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
+use pointmill_testkit::Random;
 use pointmill_validate::{Check, Options, Outcome, validate};
 use serde_json::{Value, json};
 
@@ -34,11 +35,8 @@ pub(crate) struct Cloud {
 
 /// A terrain of 5 × 5 × 1 units: three full batches and a part of one.
 pub(crate) fn terrain() -> Cloud {
-    let mut state = 9u64;
-    let mut next = move |below: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) % below) as i64
-    };
+    let mut random = Random::new(9);
+    let mut next = |below: u64| random.below(below) as i64;
     let points = (0..3 * BATCH + 1000)
         .map(|_| {
             let (x, y) = (next(5000) - 1700, next(5000));

@@ -1,5 +1,6 @@
 //! Faults of the index and of files.
 
+use pointmill_testkit::Random;
 use pointmill_validate::{Check, Severity};
 use serde_json::json;
 
@@ -155,11 +156,7 @@ fn files_that_belong_to_no_leaf() {
 /// Whatever the bytes say: an outcome or an error, and time and memory within bounds.
 #[test]
 fn no_changed_byte_makes_the_validator_panic() {
-    let mut state = 99u64;
-    let mut next = move |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % below
-    };
+    let mut random = Random::new(99);
     let points = Cloud::default().points.split_off(690);
     let cloud = Cloud { points, packed: true, ..Cloud::default() };
     let folder = tempfile::tempdir().unwrap();
@@ -170,8 +167,11 @@ fn no_changed_byte_makes_the_validator_panic() {
         let good = std::fs::read(&path).unwrap();
         for _ in 0..400 {
             let mut bytes = good.clone();
-            let at = next(bytes.len());
-            bytes[at] = if file == "index.json" { b"0123456789-e.,:[]{}\"nt"[next(22)] } else { next(256) as u8 };
+            let at = random.index(bytes.len());
+            bytes[at] = match file {
+                "index.json" => random.pick(b"0123456789-e.,:[]{}\"nt"),
+                _ => random.below(256) as u8,
+            };
             std::fs::write(&path, &bytes).unwrap();
             faults += usize::from(!check(folder.path()).ok);
         }

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use pointmill_testkit::Random;
+use pointmill_testkit::las::{self, Las};
 use pointmill_validate::{Check, Options, Outcome, validate};
 use serde_json::{Map, Value, json};
 
@@ -56,11 +58,8 @@ pub(crate) struct Cloud {
 
 /// A sloping corridor with a place of 50 points: depth 7 or so.
 pub(crate) fn scene() -> Vec<Point> {
-    let mut state = 7u64;
-    let mut next = move |below: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) % below) as i64
-    };
+    let mut random = Random::new(7);
+    let mut next = |below: u64| random.below(below) as i64;
     let mut points = Vec::new();
     for i in 0..700 {
         let x = if i % 5 == 0 { next(200_000) } else { next(30_000) } - 40_000;
@@ -325,29 +324,14 @@ pub(crate) fn assert_only(outcome: &Outcome, expected: &[(Check, u64)]) {
     assert_eq!(outcome.ok, expected.is_empty());
 }
 
-/// A LAS 1.2 file of point format 3, byte by byte from the LAS 1.2 specification.
+/// A LAS file of these points.
 fn las(cloud: &Cloud, points: &[Point]) -> Vec<u8> {
-    let mut out = vec![0; 227];
-    let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
-    put(0, b"LASF");
-    put(24, &[1, 2]);
-    put(94, &227u16.to_le_bytes());
-    put(96, &227u32.to_le_bytes());
-    put(104, &[3]);
-    put(105, &34u16.to_le_bytes());
-    put(107, &(points.len() as u32).to_le_bytes());
-    for axis in 0..3 {
-        put(131 + 8 * axis, &cloud.scale[axis].to_le_bytes());
-        put(155 + 8 * axis, &cloud.offset[axis].to_le_bytes());
-        put(179 + 16 * axis, &(cloud.offset[axis] + 1000.0).to_le_bytes());
-        put(187 + 16 * axis, &(cloud.offset[axis] - 1000.0).to_le_bytes());
-    }
-    for p in points {
-        p.step.iter().for_each(|v| out.extend((*v as i32).to_le_bytes()));
-        out.extend(p.intensity.to_le_bytes());
-        out.extend([0b001_001, p.class as u8, 0, 0, 0, 0]);
-        out.extend(p.gps_time.to_le_bytes());
-        p.rgb.iter().for_each(|v| out.extend(v.to_le_bytes()));
-    }
-    out
+    let point = |p: &Point| las::Point {
+        intensity: p.intensity,
+        class: p.class as u8,
+        gps_time: p.gps_time,
+        rgb: p.rgb,
+        ..las::Point::at(p.step.map(|v| v as i32))
+    };
+    Las { scale: cloud.scale, offset: cloud.offset, ..Las::new(points.iter().map(point).collect()) }.bytes()
 }

@@ -8,6 +8,8 @@ use pointmill_format::potree2::{
     AttributeStats, BrotliScratch, Encoding, Metadata, NodeEntry, NodeRecord, encode_brotli, encode_hierarchy,
 };
 use pointmill_format::{Aabb, Attribute, AttributeType, Lattice, NodeKey};
+use pointmill_testkit::Random;
+use pointmill_testkit::las::{self, Las};
 use pointmill_validate::{Check, Options, Outcome, validate};
 
 /// Side of the cube in lattice steps; the spacing of the root is 128 steps.
@@ -50,11 +52,8 @@ pub enum Sampler {
 
 /// A dense hill in one corner of a plain: five levels, sparse and dense places.
 pub fn scene() -> Vec<Point> {
-    let mut state = 7u64;
-    let mut next = move |below: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) % below) as i32
-    };
+    let mut random = Random::new(7);
+    let mut next = |below: u64| random.below(below) as i32;
     let mut points = Vec::new();
     for i in 0..6000 {
         let reach = if i % 6 == 0 { SIDE as u64 } else { 1400 };
@@ -323,29 +322,15 @@ pub fn assert_only(outcome: &Outcome, check: Check, count: u64) {
     assert!(!outcome.ok);
 }
 
-/// A LAS 1.2 file of point format 3, byte by byte from the LAS 1.2 specification.
+/// A LAS file of these points; classes above 31 do not fit.
 pub fn las(points: &[Point]) -> Vec<u8> {
-    let mut out = vec![0; 227];
-    let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
-    put(0, b"LASF");
-    put(24, &[1, 2]);
-    put(94, &227u16.to_le_bytes());
-    put(96, &227u32.to_le_bytes());
-    put(104, &[3]);
-    put(105, &34u16.to_le_bytes());
-    put(107, &(points.len() as u32).to_le_bytes());
-    for (axis, offset) in OFFSET.into_iter().enumerate() {
-        put(131 + 8 * axis, &SCALE.to_le_bytes());
-        put(155 + 8 * axis, &offset.to_le_bytes());
-        put(179 + 16 * axis, &(offset + f64::from(SIDE) * SCALE).to_le_bytes());
-        put(187 + 16 * axis, &offset.to_le_bytes());
-    }
-    for p in points {
-        p.position.iter().for_each(|v| out.extend(v.to_le_bytes()));
-        out.extend(p.intensity.to_le_bytes());
-        out.extend([0b001_001, p.classification & 31, p.scan_angle as u8, 0, 0, 0]);
-        out.extend(p.gps_time.to_le_bytes());
-        p.rgb.iter().for_each(|v| out.extend(v.to_le_bytes()));
-    }
-    out
+    let point = |p: &Point| las::Point {
+        intensity: p.intensity,
+        class: p.classification & 31,
+        scan_angle: p.scan_angle,
+        gps_time: p.gps_time,
+        rgb: p.rgb,
+        ..las::Point::at(p.position)
+    };
+    Las { scale: [SCALE; 3], offset: OFFSET, ..Las::new(points.iter().map(point).collect()) }.bytes()
 }

@@ -21,7 +21,7 @@ pub(super) fn read_xml(source: &Source, warnings: &mut Vec<ScanWarning>) -> Resu
     let field = |at: usize| head[at..].first_chunk::<8>().map_or(0, |b| u64::from_le_bytes(*b));
     let broken = |at: u64, what: String| ReadError::broken(source.path(), at, Fault::Header(what));
     if !head.starts_with(SIGNATURE) {
-        return Err(broken(0, "this is not an E57 file".to_owned()));
+        return Err(broken(0, "this is not an E57 file".to_owned()).advise(Advice::WrongFile));
     }
     let (version, page) = (field(8), field(40));
     let (major, minor) = (version as u32, version >> 32);
@@ -30,7 +30,9 @@ pub(super) fn read_xml(source: &Source, warnings: &mut Vec<ScanWarning>) -> Resu
         return Err(ReadError::unsupported(source.path(), fault));
     }
     if page != PAGE {
-        return Err(broken(40, format!("pages of {page} bytes; E57 1.0 has pages of {PAGE}")));
+        return Err(
+            broken(40, format!("pages of {page} bytes; E57 1.0 has pages of {PAGE}")).advise(Advice::ExportAgain)
+        );
     }
     let mut pages = Pages::new(source, &mut window, 64);
     // the header stands in a page with a checksum, too

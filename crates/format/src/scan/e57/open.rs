@@ -17,7 +17,7 @@ use super::schema::{Roles, ScanFields, Schema, fields};
 use super::streams::Streams;
 use super::{E57Options, E57Scan, ScanPlan, header, xml};
 use crate::scan::source::Source;
-use crate::{Aabb, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning};
+use crate::{Aabb, Advice, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning};
 
 /// Records of a piece: a batch of its own; a multiple of 8, so that packed values start at a byte border.
 const PIECE_RECORDS: u64 = 50_000;
@@ -43,7 +43,7 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     let xml_bytes = header::read_xml(&source, &mut warnings)?;
     let document = xml::parse(&xml_bytes).map_err(|why| {
         let what = format!("the XML section cannot be read: {why}");
-        ReadError::broken(path, 24, Fault::Header(what))
+        ReadError::broken(path, 24, Fault::Header(what)).advise(Advice::ExportAgain)
     })?;
     warn_of_the_rest(&document, &mut warnings);
     let mut notes = Notes::default();

@@ -70,7 +70,9 @@ impl<'a> Streams<'a> {
         }
         if missing > 0 {
             let what = "packets are missing that were there when the file was opened";
-            return Err(ReadError::broken(source.path(), physical(at), what));
+            return Err(
+                ReadError::broken(source.path(), physical(at), what).advise("convert it once nothing writes to it")
+            );
         }
         Ok(Self { bytes: out, places })
     }

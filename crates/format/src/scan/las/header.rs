@@ -47,7 +47,8 @@ impl Header {
         let bytes = source.vec_at(0, HEADER_1_4)?;
         if !super::is_las(&bytes) {
             let not_las = || Fault::Header("not a LAS or LAZ file (no LASF signature)".to_owned());
-            return Err(ReadError::broken(path, 0, if bytes.is_empty() { Fault::Empty } else { not_las() }));
+            let fault = if bytes.is_empty() { Fault::Empty } else { not_las() };
+            return Err(ReadError::broken(path, 0, fault).advise(Advice::WrongFile));
         }
         if source.len() < MIN_HEADER {
             let what = format!("the header has {} of at least {MIN_HEADER} bytes", source.len());

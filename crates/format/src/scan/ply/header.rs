@@ -55,7 +55,7 @@ impl Header {
         if !super::is_ply(&bytes) {
             let what =
                 if bytes.is_empty() { "the file is empty" } else { "not a PLY file (it does not start with ply)" };
-            return Err(ReadError::broken(source.path(), 0, Fault::Header(what.to_owned())));
+            return Err(ReadError::broken(source.path(), 0, Fault::Header(what.to_owned())).advise(Advice::WrongFile));
         }
         let mut parser = Parser { encoding: None, elements: Vec::new(), warnings: Vec::new() };
         for (at, line) in crate::scan::tabular::lines::lines(&bytes).skip(1) {

@@ -308,6 +308,8 @@ pub(crate) fn parse(token: &[u8]) -> Result<f64, String> {
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
 
     fn numbers(line: &str, separator: Separator) -> Result<Vec<f64>, String> {
@@ -352,11 +354,10 @@ mod tests {
 
     #[test]
     fn the_short_way_gives_the_bits_of_the_long_one() {
-        let mut state = 7u64;
+        let mut random = Random::new(7);
         for _ in 0..20_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let decimals = (state >> 60) as usize;
-            let text = format!("{:.decimals$}", (state >> 20) as f64 / 1e9 - 5000.0);
+            let decimals = random.index(16);
+            let text = format!("{:.decimals$}", random.between(-5000.0, 12_592.0));
             if let Some((v, len)) = short_decimal(text.as_bytes(), None) {
                 assert_eq!((v.to_bits(), len), (text.parse::<f64>().unwrap().to_bits(), text.len()), "{text}");
             }

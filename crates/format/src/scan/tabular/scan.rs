@@ -215,6 +215,7 @@ impl Decoder<'_> {
                 rows.compact(bytes, &mut at, decoded).ok_or_else(|| {
                     let place = piece.byte_offset + at as u64;
                     ReadError::broken(self.source.path(), place, "a row ends outside its piece; the file has changed")
+                        .advise("convert it once nothing writes to it")
                 })?;
             }
             self.prepare(batch, first_point, points);
@@ -278,6 +279,7 @@ impl Decoder<'_> {
                 let (at, line) = lines.next().ok_or_else(|| {
                     let what = format!("{row} of {points} lines are left; the file has changed");
                     ReadError::broken(self.source.path(), piece.byte_offset, what)
+                        .advise("convert it once nothing writes to it")
                 })?;
                 parser.row(line, row, batch).map_err(|m| self.misfit(piece.byte_offset + (at + m.at) as u64, m))?;
             }

@@ -39,7 +39,7 @@ use std::path::Path;
 use crate::scan::source::Source;
 use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::lines;
-use crate::{Fault, ReadError, Scan};
+use crate::{Advice, Fault, ReadError, Scan};
 
 /// What the file does not say of itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -138,13 +138,13 @@ pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Sca
     let source = Source::open(path)?;
     let first = source.vec_at(0, 64 << 10)?;
     if first.is_empty() {
-        return Err(ReadError::broken(path, 0, Fault::Empty));
+        return Err(ReadError::broken(path, 0, Fault::Empty).advise(Advice::WrongFile));
     }
     if first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff]) {
         return Err(ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8"));
     }
     if let Some(at) = first.iter().position(|b| *b == 0) {
-        return Err(ReadError::broken(path, at as u64, "not text: it has zero bytes"));
+        return Err(ReadError::broken(path, at as u64, "not text: it has zero bytes").advise(Advice::WrongFile));
     }
     match kind(&first) {
         Some(TextKind::Off) => off::open(source),

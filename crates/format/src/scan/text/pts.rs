@@ -7,7 +7,7 @@ use super::xyz::{named, wanted_separator};
 use super::{BOM, TextOptions, fields, is_count, is_data, is_number, separator};
 use crate::scan::source::Source;
 use crate::scan::tabular::{LineRule, lines, reconcile};
-use crate::{ReadError, Scan, ScanWarning};
+use crate::{Advice, ReadError, Scan, ScanWarning};
 
 pub(super) fn open(source: Source, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
     let from = if source.vec_at(0, 3)? == BOM { 3 } else { 0 };
@@ -29,7 +29,7 @@ pub(super) fn open(source: Source, options: &TextOptions) -> Result<Box<dyn Scan
     }
     let first = lines::first_filled(&source, from, 64)?;
     let Some((first_row, row)) = first.into_iter().find(|(_, line)| is_row(line)) else {
-        return Err(ReadError::broken(source.path(), from, "there are no rows of points"));
+        return Err(ReadError::broken(source.path(), from, "there are no rows of points").advise(Advice::WrongFile));
     };
     let separator = wanted_separator(options).unwrap_or_else(|| separator(&row));
     let numeric: Vec<bool> = fields(&row, separator).iter().map(|f| is_number(f)).collect();

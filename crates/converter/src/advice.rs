@@ -1,0 +1,84 @@
+//! What the user can do about an error or a warning, as data: a command line names its flags, a library call its fields.
+
+use std::fmt;
+
+use pointmill_format::Aabb;
+
+/// What the user can do. `Display` says it in words that name no command line.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Advice {
+    /// Choose another output, or allow the existing one to be replaced.
+    ReplaceOutput,
+    /// Allow at least this many MiB of memory.
+    RaiseMemory {
+        /// Smallest ceiling that is enough, MiB.
+        mib: u64,
+    },
+    /// Free disk space, or use another folder for temporary files.
+    FreeDisk,
+    /// Drop duplicates.
+    DropDuplicates,
+    /// Keep the duplicates, or convert to the octree alone.
+    KeepDuplicates,
+    /// Keep only the points inside a box that leaves out the far ones.
+    CutBounds {
+        /// The box, world units; `None`: the user must choose it.
+        bounds: Option<Aabb>,
+    },
+    /// Skip points without a valid position.
+    SkipInvalid,
+    /// Use the colour depth that was detected.
+    DetectRgbDepth,
+    /// State the colour depth.
+    SetRgbDepth,
+    /// Name the coordinate reference system by its EPSG code.
+    NameEpsg,
+    /// Give the coordinate reference system as a proj4 definition.
+    GiveProj4,
+    /// Reproject the inputs, or name one coordinate reference system for all.
+    Reproject,
+    /// Name the attributes to keep.
+    NameAttributes,
+    /// Leave out this attribute.
+    LeaveOutAttribute,
+    /// Put all leaves into one file.
+    PackLeaves,
+    /// Leave out the input whose offset or scale is wrong, or convert the inputs separately.
+    ConvertApart,
+    /// Move the file away, or choose another output.
+    MoveAway,
+    /// Choose another output.
+    OtherOutput,
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let words = match self {
+            Self::RaiseMemory { mib } => return write!(f, "allow {mib} MiB or more"),
+            Self::CutBounds { bounds: Some(b) } => {
+                return write!(f, "keep only the points from {:?} to {:?} to leave them out", b.min, b.max);
+            }
+            Self::ReplaceOutput => "choose another output, or allow it to be replaced",
+            Self::FreeDisk => "free some space, or put temporary files elsewhere",
+            Self::DropDuplicates => "drop duplicates",
+            Self::KeepDuplicates => "keep duplicates, or convert to potree2",
+            Self::CutBounds { bounds: None } => "limit the bounds to leave them out, or correct the input",
+            Self::SkipInvalid => "skip invalid points to leave such points out",
+            Self::DetectRgbDepth => "let the colour depth be detected",
+            Self::SetRgbDepth => "state the colour depth to override this",
+            Self::NameEpsg => "name the EPSG code if viewers need the projection",
+            Self::GiveProj4 => "give a proj4 definition if viewers need the projection",
+            Self::Reproject => "reproject the inputs, or name one system for all",
+            Self::NameAttributes => "name the attributes to keep",
+            Self::LeaveOutAttribute => "leave it out",
+            Self::PackLeaves => "the packed layout puts all leaves into one file",
+            Self::ConvertApart => {
+                "leave out the input whose offset or scale is wrong, or convert the inputs separately"
+            }
+            Self::MoveAway => "move it away, or choose another output",
+            Self::OtherOutput => "choose another output",
+        };
+        f.write_str(words)
+    }
+}

@@ -1,0 +1,114 @@
+//! An order-independent checksum of records: the sum of one strong-enough hash a record.
+//!
+//! It proves to ourselves, on every run, that what was decoded is what was written. The validator has its own.
+
+use std::fmt;
+
+/// Sum of record hashes, and how many.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Checksum {
+    sum: u128,
+    count: u64,
+}
+
+// Odd constants with balanced bits (digits of the golden ratio and of √2, √3, …).
+const K: [u64; 5] =
+    [0x9e37_79b9_7f4a_7c15, 0x6a09_e667_f3bc_c909, 0xbb67_ae85_84ca_a73b, 0x3c6e_f372_fe94_f82b, 0x1f83_d9ab_fb41_bd6b];
+
+#[inline]
+fn fold(a: u64, b: u64) -> u64 {
+    let p = u128::from(a) * u128::from(b);
+    (p as u64) ^ (p >> 64) as u64
+}
+
+/// Mixes 16 bytes; `i` tells their place.
+#[inline]
+fn mix(bytes: &[u8; 16], i: u64) -> u64 {
+    let v = u128::from_le_bytes(*bytes);
+    let salt = i.wrapping_mul(K[4]);
+    fold(v as u64 ^ K[0] ^ salt, (v >> 64) as u64 ^ K[1].wrapping_add(salt))
+}
+
+/// Hash of one record: products of pairs of words, independent of one another so that they overlap in the pipeline.
+/// The last 16 bytes may overlap those before, so that there is no tail.
+#[inline]
+fn hash(record: &[u8]) -> u64 {
+    let mut h = record.len() as u64;
+    let last = match record.last_chunk::<16>() {
+        Some(last) => *last,
+        None => {
+            let mut padded = [0; 16];
+            padded[..record.len()].copy_from_slice(record);
+            padded
+        }
+    };
+    for (i, bytes) in record.as_chunks::<16>().0.iter().enumerate() {
+        h = h.wrapping_add(mix(bytes, i as u64));
+    }
+    fold(h.wrapping_add(mix(&last, u64::MAX)) ^ K[2], K[3])
+}
+
+impl Checksum {
+    /// Adds every record of `records` (`stride` bytes each).
+    pub(crate) fn add_all(&mut self, records: &[u8], stride: usize) {
+        for record in records.chunks_exact(stride) {
+            self.add(record);
+        }
+    }
+
+    #[inline]
+    pub(crate) fn add(&mut self, record: &[u8]) {
+        self.sum = self.sum.wrapping_add(u128::from(hash(record)));
+        self.count += 1;
+    }
+
+    /// Number of records.
+    pub(crate) fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Takes out what `other` holds.
+    pub(crate) fn remove(&mut self, other: &Self) {
+        self.sum = self.sum.wrapping_sub(other.sum);
+        self.count = self.count.wrapping_sub(other.count);
+    }
+
+    /// Takes out `old` and puts in `new`.
+    pub(crate) fn replace(&mut self, old: &Self, new: &Self) {
+        self.remove(old);
+        self.merge(new);
+    }
+
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.sum = self.sum.wrapping_add(other.sum);
+        self.count = self.count.wrapping_add(other.count);
+    }
+}
+
+impl fmt::Display for Checksum {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:032x}", self.sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_order_gives_the_same_sum_and_any_changed_byte_another() {
+        let records: Vec<u8> = (0..35u32 * 100).map(|i| ((i * 7919) >> 3) as u8).collect();
+        let mut forward = Checksum::default();
+        forward.add_all(&records, 35);
+        let mut backward = Checksum::default();
+        records.chunks_exact(35).rev().for_each(|r| backward.add(r));
+        assert_eq!(forward, backward);
+        for at in 0..35 {
+            let mut changed = records.clone();
+            changed[35 * 50 + at] ^= 1;
+            let mut other = Checksum::default();
+            other.add_all(&changed, 35);
+            assert_ne!(forward, other, "byte {at}");
+        }
+    }
+}

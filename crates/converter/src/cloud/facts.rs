@@ -1,0 +1,77 @@
+//! What is known once every point was read, beside counts: what colours mean, ranges as outputs have them, the
+//! coordinate reference system.
+
+use super::intake::Intake;
+use super::stats::{Range, SourceStats, Stats};
+use crate::error::{ConvertError, InputFault};
+use crate::plan::{Plan, RgbDepth};
+use crate::sources::{ResolvedCrs, Sources, resolve_crs};
+use crate::warning::Warning;
+
+/// Facts about all points.
+pub(crate) struct Facts {
+    /// For each source: byte offset in a stored record of a colour that is 8 bits deep.
+    pub(crate) widen_rgb: Vec<Option<usize>>,
+    /// Byte offset of the classification in a stored record, if it is one byte.
+    pub(crate) class: Option<usize>,
+    /// Ranges as outputs have them, by index of the schema.
+    pub(crate) ranges: Vec<Range>,
+    pub(crate) crs: ResolvedCrs,
+}
+
+impl Facts {
+    pub(super) fn new(
+        plan: &Plan,
+        sources: &Sources,
+        intake: &Intake,
+        stats: &Stats,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Self, ConvertError> {
+        if stats.rounded_values > 0 {
+            warnings.push(Warning::IntegersRounded { values: stats.rounded_values });
+        }
+        let schema = &intake.schema;
+        let mut ranges = stats.ranges.clone();
+        let mut widen_rgb = vec![None; sources.all.len()];
+        if let Some(rgb) = schema.rgb() {
+            let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, s)).collect();
+            for (i, source) in stats.sources.iter().enumerate().filter(|(_, s)| s.kept > 0) {
+                let mut range = source.rgb.clone();
+                if intake.sources[i].has(Some(rgb)) && depths[i] {
+                    if plan.rgb_depth == RgbDepth::Eight && range.max.iter().any(|v| *v > 255.0) {
+                        let path = sources.all[i].scan.info().path.clone();
+                        return Err(InputFault::DeepColours { path }.into());
+                    }
+                    widen_rgb[i] = Some(schema.offsets[rgb]);
+                    range.min.iter_mut().chain(&mut range.max).for_each(|v| *v *= 257.0);
+                }
+                ranges[rgb].merge(&range);
+            }
+            warnings.extend(mixed_depths(sources, intake, stats, &depths, rgb));
+        }
+        let crs = resolve_crs(plan, &sources.all, warnings)?;
+        let class = schema.find("classification").filter(|&i| schema.attributes[i].size() == 1);
+        Ok(Self { widen_rgb, class: class.map(|i| schema.offsets[i]), ranges, crs })
+    }
+}
+
+/// True if the colour values of a source have 8 bits.
+fn is_eight_bit(policy: RgbDepth, source: &SourceStats) -> bool {
+    let deepest = source.rgb.max.iter().chain(&source.rgb_unfiltered.max);
+    match policy {
+        RgbDepth::Eight => true,
+        RgbDepth::Sixteen => false,
+        RgbDepth::Auto => !source.rgb.is_empty() && deepest.into_iter().all(|v| *v <= 255.0),
+    }
+}
+
+fn mixed_depths(sources: &Sources, intake: &Intake, stats: &Stats, eight: &[bool], rgb: usize) -> Option<Warning> {
+    let coloured = |i: &usize| intake.sources[*i].has(Some(rgb)) && stats.sources[*i].kept > 0;
+    // A file without any colour value above 0 is no sign of anything.
+    let lit = |i: &usize| stats.sources[*i].rgb.max.iter().any(|v| *v > 0.0);
+    let coloured: Vec<usize> = (0..sources.all.len()).filter(coloured).filter(lit).collect();
+    let narrow: Vec<usize> = coloured.iter().copied().filter(|i| eight[*i]).collect();
+    let first = *narrow.first().filter(|_| narrow.len() < coloured.len())?;
+    let first = sources.all[first].scan.info().path.clone();
+    Some(Warning::MixedRgbDepth { eight_bit: narrow.len(), coloured: coloured.len(), first })
+}

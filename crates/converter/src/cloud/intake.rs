@@ -1,0 +1,50 @@
+//! What is read of the sources: the attributes that some output needs, and nothing else.
+
+use pointmill_format::Wanted;
+
+use crate::plan::Plan;
+use crate::sources::{Schema, Sources};
+
+/// The attributes that are read, and where each source has them.
+pub(crate) struct Intake {
+    /// The layout of stored records.
+    pub(crate) schema: Schema,
+    /// Names of the attributes of the inputs that no output needs.
+    pub(crate) unread: Vec<String>,
+    /// By source.
+    pub(crate) sources: Vec<SourceIntake>,
+}
+
+/// What is read of a source.
+pub(crate) struct SourceIntake {
+    /// Where each of its columns goes in the schema; `None`: no output needs it.
+    pub(crate) columns: Vec<Option<usize>>,
+    /// The columns to decode: those, and what the filter looks at.
+    pub(crate) wanted: Wanted,
+}
+
+impl SourceIntake {
+    /// True if the source has the attribute with that index in the schema.
+    pub(crate) fn has(&self, attribute: Option<usize>) -> bool {
+        attribute.is_some() && self.columns.contains(&attribute)
+    }
+}
+
+impl Intake {
+    /// `needed`: for each attribute of the sources, whether some output needs it.
+    pub(crate) fn new(plan: &Plan, sources: &Sources, needed: &[bool]) -> Self {
+        let all = &sources.attributes;
+        let (schema, places) = all.reduce(needed);
+        let unread = all.attributes.iter().zip(needed).filter(|(_, needed)| !**needed);
+        let unread = unread.map(|(a, _)| a.name.clone()).collect();
+        let of_source = |source: &crate::sources::Source| {
+            let columns: Vec<Option<usize>> = source.columns.iter().map(|c| places[*c]).collect();
+            let attributes = &source.scan.info().attributes;
+            let is_filtered = |i: usize| plan.filter.classes.is_some() && attributes[i].name == "classification";
+            let wanted = columns.iter().enumerate().map(|(i, c)| c.is_some() || is_filtered(i)).collect::<Wanted>();
+            SourceIntake { columns, wanted }
+        };
+        let of_sources = sources.all.iter().map(of_source).collect();
+        Self { schema, unread, sources: of_sources }
+    }
+}

@@ -1,0 +1,121 @@
+//! All points, once they are read: records grouped by cell in the store, and everything that an output may ask about
+//! them. Made by `gather`, unchanged afterwards.
+
+mod cell;
+mod checksum;
+mod cube;
+mod facts;
+mod frames;
+mod grouping;
+mod intake;
+mod lattice;
+mod ledger;
+mod moments;
+pub(crate) mod morton;
+mod morton_sort;
+mod record;
+mod regroup;
+mod segments;
+mod stats;
+mod store;
+
+pub(crate) use cell::Cell;
+pub(crate) use checksum::Checksum;
+pub(crate) use cube::{ANCHOR_BITS, Cube, TREE_BITS, tidy_world};
+pub(crate) use facts::Facts;
+pub(crate) use frames::{JobBounds, JobColumns, JobPoint, StoredOrigin, StoredPoint, TreePoint};
+pub(crate) use grouping::{CellHash, Grouping};
+pub(crate) use intake::Intake;
+pub(crate) use lattice::{Basis, JobLattice, LatticeReason, Steps};
+pub(crate) use ledger::Ledger;
+pub(crate) use moments::Moments;
+pub(crate) use morton_sort::MortonSorter;
+pub(crate) use record::{RecordFrame, copy_record, position};
+pub(crate) use regroup::Regrouper;
+pub(crate) use segments::{Segment, Segments};
+pub(crate) use stats::{Range, Stats};
+pub(crate) use store::{BLOCK_BYTES, Store};
+
+use pointmill_format::Resolution;
+
+use crate::error::ConvertError;
+use crate::plan::Plan;
+use crate::sources::{Schema, Sources};
+use crate::warning::Warning;
+
+/// All points of a run, and what every output is made from.
+pub(crate) struct Cloud<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) sources: &'a Sources,
+    pub(crate) intake: &'a Intake,
+    pub(crate) lattice: JobLattice,
+    /// Every position is a point of the lattice as it was read.
+    pub(crate) is_lossless: bool,
+    /// How stored records are read; the root cube.
+    pub(crate) frame: RecordFrame,
+    pub(crate) store: Store,
+    /// Every occupied cell of the partition's octree level, in Morton order.
+    pub(crate) cells: Vec<Cell>,
+    pub(crate) stats: Stats,
+    pub(crate) facts: Facts,
+    /// Of headers and points, in order of discovery.
+    pub(crate) warnings: Vec<Warning>,
+}
+
+/// What a pass over the sources has gathered.
+pub(crate) struct Gathered {
+    pub(crate) lattice: JobLattice,
+    pub(crate) is_lossless: bool,
+    pub(crate) frame: RecordFrame,
+    pub(crate) store: Store,
+    pub(crate) cells: Vec<Cell>,
+    pub(crate) stats: Stats,
+}
+
+impl<'a> Cloud<'a> {
+    /// Works out the facts. `warnings`: those so far.
+    ///
+    /// # Errors
+    /// Colours that contradict the plan.
+    pub(crate) fn new(
+        plan: &'a Plan,
+        sources: &'a Sources,
+        intake: &'a Intake,
+        gathered: Gathered,
+        mut warnings: Vec<Warning>,
+    ) -> Result<Self, ConvertError> {
+        let Gathered { lattice, is_lossless, frame, store, cells, stats } = gathered;
+        warnings.extend_from_slice(&stats.warnings);
+        let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
+        Ok(Self { plan, sources, intake, lattice, is_lossless, frame, store, cells, stats, facts, warnings })
+    }
+
+    /// The layout of stored records.
+    pub(crate) fn schema(&self) -> &Schema {
+        &self.intake.schema
+    }
+
+    /// Points that passed the filter.
+    pub(crate) fn points(&self) -> u64 {
+        self.stats.points
+    }
+
+    /// "position" and the names of attributes of the schema.
+    pub(crate) fn names(&self, attributes: impl Iterator<Item = usize>) -> Vec<String> {
+        let names = attributes.map(|i| self.schema().attributes[i].name.clone());
+        std::iter::once("position".to_owned()).chain(names).collect()
+    }
+
+    /// Least step of the coordinates of the sources, world units; that of the lattice where a source states none.
+    pub(crate) fn source_step(&self) -> [f64; 3] {
+        let step = |source: &crate::sources::Source, a: usize| match (
+            source.scan.info().lattice,
+            source.scan.info().resolution,
+        ) {
+            (Some(lattice), _) => lattice.scale[a],
+            (None, Resolution::Step(step)) => step,
+            (None, _) => self.lattice.lattice.scale[a],
+        };
+        std::array::from_fn(|a| self.sources.all.iter().map(|s| step(s, a)).fold(f64::INFINITY, f64::min))
+    }
+}

@@ -1,0 +1,90 @@
+//! Records put back into the store in another grouping: how a cell that is too large, or that does not fit the grid of an
+//! output, is divided.
+
+use super::grouping::Grouping;
+use super::segments::Segment;
+use super::store::Store;
+use crate::error::ConvertError;
+
+/// Records looked at together: many, so that the groups come in long segments.
+const POINTS: usize = 65_536;
+
+/// Regroups records; keeps its memory from one use to the next.
+pub(crate) struct Regrouper<'a> {
+    store: &'a Store,
+    stride: usize,
+    grouping: Grouping,
+    records: Vec<u8>,
+    codes: Vec<u64>,
+    sorted: Vec<u8>,
+}
+
+impl<'a> Regrouper<'a> {
+    pub(crate) fn new(store: &'a Store, stride: usize) -> Self {
+        let (records, codes, sorted) = (Vec::new(), Vec::new(), Vec::new());
+        Self { store, stride, grouping: Grouping::default(), records, codes, sorted }
+    }
+
+    /// Takes the records of `segments` and puts them back grouped by `code` (a Morton code: groups that are near in space
+    /// are near in the store). `found` gets the code of each group, its first record, and where it is; a code may come
+    /// several times.
+    pub(crate) fn regroup<'s>(
+        &mut self,
+        segments: impl IntoIterator<Item = &'s Segment>,
+        mut code: impl FnMut(&[u8]) -> u64,
+        mut found: impl FnMut(u64, &[u8], Segment),
+    ) -> Result<(), ConvertError> {
+        let mut source = None;
+        for segment in segments {
+            let mut start = 0;
+            while start < segment.count {
+                let before = self.records.len();
+                let room = POINTS - before / self.stride;
+                let count = (segment.count - start).min(room as u32);
+                let part = Segment { block: segment.block, start: segment.start + start, count };
+                start += count;
+                let from = self.store.take(part, &mut self.records)?;
+                if let Some(source) = source.filter(|s| *s != from) {
+                    // A block holds records of one source.
+                    let rest = self.records.split_off(before);
+                    self.put_back(source, &mut code, &mut found)?;
+                    self.records = rest;
+                }
+                source = Some(from);
+                if self.records.len() >= POINTS * self.stride {
+                    self.put_back(from, &mut code, &mut found)?;
+                }
+            }
+        }
+        source.map_or(Ok(()), |source| self.put_back(source, &mut code, &mut found))
+    }
+
+    /// Puts the records of one source into a block of their own.
+    fn put_back(
+        &mut self,
+        source: u32,
+        code: &mut impl FnMut(&[u8]) -> u64,
+        found: &mut impl FnMut(u64, &[u8], Segment),
+    ) -> Result<(), ConvertError> {
+        let stride = self.stride;
+        if self.records.is_empty() {
+            return Ok(());
+        }
+        self.codes.clear();
+        self.codes.extend(self.records.chunks_exact(stride).map(code));
+        self.grouping.group(&self.codes, |code| code);
+        self.sorted.clear();
+        self.sorted.reserve_exact(self.records.len());
+        for &i in &self.grouping.order {
+            self.sorted.extend_from_slice(&self.records[i as usize * stride..][..stride]);
+        }
+        let block = self.store.open(source)?;
+        let mut start = 0;
+        for &(code, count) in &self.grouping.groups {
+            found(code, &self.sorted[start as usize * stride..][..stride], Segment { block, start, count });
+            start += count;
+        }
+        self.records.clear();
+        self.store.refill(block, &mut self.sorted)
+    }
+}

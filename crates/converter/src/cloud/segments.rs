@@ -1,0 +1,94 @@
+//! Where records are: runs of consecutive records of one block.
+
+/// A run of records of one block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Segment {
+    pub(crate) block: u32,
+    pub(crate) start: u32,
+    pub(crate) count: u32,
+}
+
+impl Segment {
+    /// True if `next` begins where this ends.
+    fn is_followed_by(&self, next: &Self) -> bool {
+        next.block == self.block && next.start == self.start + self.count
+    }
+}
+
+/// The records of a cell, a chunk or any other part of the cloud.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Segments(Vec<Segment>);
+
+impl Segments {
+    /// Adds a segment; one that continues the last is joined to it.
+    pub(crate) fn push(&mut self, segment: Segment) {
+        match self.0.last_mut() {
+            Some(last) if last.is_followed_by(&segment) => last.count += segment.count,
+            _ => self.0.push(segment),
+        }
+    }
+
+    /// Adds all of `other`.
+    pub(crate) fn append(&mut self, other: &mut Self) {
+        self.0.append(&mut other.0);
+    }
+
+    /// Puts the segments in order of block and joins those that follow each other.
+    pub(crate) fn sort(&mut self) {
+        self.0.sort_unstable_by_key(|s| (s.block, s.start));
+        self.0.dedup_by(|next, previous| {
+            let joins = previous.is_followed_by(next);
+            if joins {
+                previous.count += next.count;
+            }
+            joins
+        });
+    }
+
+    /// Number of records.
+    pub(crate) fn points(&self) -> u64 {
+        self.0.iter().map(|s| u64::from(s.count)).sum()
+    }
+
+    pub(crate) fn iter(&self) -> std::slice::Iter<'_, Segment> {
+        self.0.iter()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl<'a> IntoIterator for &'a Segments {
+    type Item = &'a Segment;
+    type IntoIter = std::slice::Iter<'a, Segment>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.iter()
+    }
+}
+
+impl Extend<Segment> for Segments {
+    fn extend<I: IntoIterator<Item = Segment>>(&mut self, segments: I) {
+        segments.into_iter().for_each(|s| self.push(s));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn segment(block: u32, start: u32, count: u32) -> Segment {
+        Segment { block, start, count }
+    }
+
+    #[test]
+    fn neighbours_are_joined_and_nothing_else() {
+        let mut segments = Segments::default();
+        segments.extend([segment(1, 0, 5), segment(1, 5, 2), segment(0, 7, 1), segment(1, 9, 1), segment(0, 4, 3)]);
+        assert_eq!(segments.points(), 12);
+        segments.sort();
+        let found: Vec<Segment> = segments.iter().copied().collect();
+        assert_eq!(found, [segment(0, 4, 4), segment(1, 0, 7), segment(1, 9, 1)]);
+    }
+}

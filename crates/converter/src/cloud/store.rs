@@ -1,0 +1,206 @@
+//! Where records wait between being read and being built into nodes: memory first, one spill file when it must.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::segments::Segment;
+use crate::error::ConvertError;
+use crate::runtime::{DiskFile, TempFiles, os_hints};
+
+/// Blocks grow to this size: a few large pages, and one long write when they go to disk.
+pub(crate) const BLOCK_BYTES: usize = 8 << 20;
+
+/// Blocks of records. A block holds records of one source and never changes; it is dropped once all of it was taken.
+pub(crate) struct Store {
+    stride: usize,
+    /// How often each record is taken.
+    uses: u32,
+    memory_limit: u64,
+    in_memory: AtomicU64,
+    blocks: Mutex<Vec<Block>>,
+    temp: TempFiles,
+    spill: Mutex<Option<Arc<DiskFile>>>,
+    spilled: AtomicU64,
+}
+
+struct Block {
+    source: u32,
+    /// Records that were not taken yet, once for each use.
+    remaining: u64,
+    place: Place,
+}
+
+#[derive(Clone)]
+enum Place {
+    Memory(Arc<Vec<u8>>),
+    Disk { offset: u64 },
+    Gone,
+}
+
+impl Store {
+    /// An empty store that keeps up to `memory_limit` bytes in memory and puts the rest into a temporary file, for `uses`
+    /// outputs that each take every record once.
+    pub(crate) fn new(temp: TempFiles, stride: usize, uses: u32, memory_limit: u64) -> Self {
+        Self {
+            stride,
+            uses,
+            memory_limit,
+            in_memory: AtomicU64::new(0),
+            blocks: Mutex::default(),
+            temp,
+            spill: Mutex::default(),
+            spilled: AtomicU64::new(0),
+        }
+    }
+
+    /// Bytes that went to the spill file.
+    pub(crate) fn spilled_bytes(&self) -> u64 {
+        self.spilled.load(Ordering::Relaxed)
+    }
+
+    /// Bytes of the memory limit that no block takes up now.
+    pub(crate) fn unused_bytes(&self) -> u64 {
+        self.memory_limit.saturating_sub(self.in_memory.load(Ordering::Relaxed))
+    }
+
+    /// The index that the next block will have; it must be added with [`Self::fill`].
+    pub(crate) fn open(&self, source: u32) -> Result<u32, ConvertError> {
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        blocks.push(Block { source, remaining: 0, place: Place::Gone });
+        Ok((blocks.len() - 1) as u32)
+    }
+
+    /// Adds the records of a block. The buffer comes back empty, with or without its memory.
+    pub(crate) fn fill(&self, block: u32, records: &mut Vec<u8>) -> Result<(), ConvertError> {
+        self.fill_for(block, records, self.uses)
+    }
+
+    /// [`Self::fill`] with records that one output has taken and puts back in another order, for itself.
+    pub(crate) fn refill(&self, block: u32, records: &mut Vec<u8>) -> Result<(), ConvertError> {
+        self.fill_for(block, records, 1)
+    }
+
+    fn fill_for(&self, block: u32, records: &mut Vec<u8>, uses: u32) -> Result<(), ConvertError> {
+        let bytes = records.len() as u64;
+        let keeps_buffer = records.len() * 2 > records.capacity();
+        let cost = if keeps_buffer { records.capacity() as u64 } else { bytes };
+        let before = self.in_memory.fetch_add(cost, Ordering::Relaxed);
+        let place = if before + cost <= self.memory_limit {
+            let kept = if keeps_buffer { std::mem::take(records) } else { records.as_slice().to_vec() };
+            Place::Memory(Arc::new(kept))
+        } else {
+            self.in_memory.fetch_sub(cost, Ordering::Relaxed);
+            let offset = self.spilled.fetch_add(bytes, Ordering::Relaxed);
+            self.spill_file()?.write_at(records, offset, "writing the spill file")?;
+            Place::Disk { offset }
+        };
+        records.clear();
+        let remaining = bytes / self.stride as u64 * u64::from(uses);
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let slot = &mut blocks[block as usize];
+        (slot.remaining, slot.place) = (remaining, place);
+        Ok(())
+    }
+
+    /// Appends the records of a segment to `out` and returns its source. Each output may take each record once.
+    pub(crate) fn take(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        let source = self.read(segment, out)?;
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let block = &mut blocks[segment.block as usize];
+        block.remaining = block.remaining.saturating_sub(u64::from(segment.count));
+        if block.remaining == 0
+            && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
+        {
+            self.in_memory.fetch_sub(bytes.capacity() as u64, Ordering::Relaxed);
+        }
+        Ok(source)
+    }
+
+    /// [`Self::take`], but the records can be taken still.
+    pub(crate) fn read(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        let (place, source) = {
+            let blocks = self.blocks.lock().map_err(|_| poisoned())?;
+            let block = &blocks[segment.block as usize];
+            (block.place.clone(), block.source)
+        };
+        let (start, len) = (segment.start as usize * self.stride, segment.count as usize * self.stride);
+        match place {
+            Place::Memory(bytes) => out.extend_from_slice(&bytes[start..start + len]),
+            Place::Disk { offset } => {
+                let at = out.len();
+                os_hints::reserve(out, len);
+                out.resize(at + len, 0);
+                let spill = self.spill_file()?;
+                spill.read_at(&mut out[at..], offset + start as u64, "reading the spill file")?;
+            }
+            Place::Gone => return Err(ConvertError::Internal("a record was taken twice".into())),
+        }
+        Ok(source)
+    }
+
+    /// The spill file, made when first needed.
+    fn spill_file(&self) -> Result<Arc<DiskFile>, ConvertError> {
+        let mut spill = self.spill.lock().map_err(|_| poisoned())?;
+        if let Some(file) = &*spill {
+            return Ok(Arc::clone(file));
+        }
+        Ok(Arc::clone(spill.insert(Arc::new(self.temp.make()?))))
+    }
+}
+
+fn poisoned() -> ConvertError {
+    ConvertError::Internal("a worker thread failed while it held the store".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runtime::SystemDisk;
+
+    fn store(uses: u32) -> (tempfile::TempDir, Store) {
+        let dir = tempfile::tempdir().unwrap();
+        let temp = TempFiles::new(dir.path().to_path_buf(), Arc::new(SystemDisk));
+        (dir, Store::new(temp, 4, uses, 40))
+    }
+
+    #[test]
+    fn memory_and_disk_give_back_the_same_records() {
+        let (_dir, store) = store(1);
+        let a = store.open(0).unwrap();
+        let b = store.open(1).unwrap();
+        store.fill(a, &mut (0..40u8).collect()).unwrap();
+        store.fill(b, &mut (100..140u8).collect()).unwrap();
+        assert_eq!(store.spilled_bytes(), 40);
+        let mut out = Vec::new();
+        assert_eq!(store.take(Segment { block: b, start: 2, count: 3 }, &mut out).unwrap(), 1);
+        assert_eq!(store.take(Segment { block: a, start: 9, count: 1 }, &mut out).unwrap(), 0);
+        assert_eq!(out, (108..120).chain(36..40).collect::<Vec<u8>>());
+    }
+
+    #[test]
+    fn a_block_leaves_memory_once_all_of_it_was_taken() {
+        let (_dir, store) = store(1);
+        let a = store.open(0).unwrap();
+        store.fill(a, &mut vec![1; 40]).unwrap();
+        let mut out = Vec::new();
+        store.take(Segment { block: a, start: 0, count: 4 }, &mut out).unwrap();
+        assert_eq!(store.in_memory.load(Ordering::Relaxed), 40);
+        store.take(Segment { block: a, start: 4, count: 6 }, &mut out).unwrap();
+        assert_eq!(store.in_memory.load(Ordering::Relaxed), 0);
+        assert!(store.take(Segment { block: a, start: 0, count: 1 }, &mut out).is_err());
+    }
+
+    #[test]
+    fn with_two_uses_a_block_stays_until_both_have_taken_it() {
+        let (_dir, store) = store(2);
+        let a = store.open(0).unwrap();
+        store.fill(a, &mut vec![1; 40]).unwrap();
+        let (all, mut out) = (Segment { block: a, start: 0, count: 10 }, Vec::new());
+        store.take(all, &mut out).unwrap();
+        store.read(all, &mut out).unwrap();
+        assert_eq!(store.in_memory.load(Ordering::Relaxed), 40);
+        store.take(all, &mut out).unwrap();
+        assert_eq!((store.in_memory.load(Ordering::Relaxed), out.len()), (0, 120));
+        assert!(store.take(all, &mut out).is_err());
+    }
+}

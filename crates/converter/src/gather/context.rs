@@ -1,0 +1,43 @@
+//! What all threads of a pass share.
+
+use std::collections::HashMap;
+use std::sync::atomic::AtomicBool;
+
+use super::axis::SourceMap;
+use super::partition::Partition;
+use crate::cloud::{CellHash, Intake, Moments, Segments, Store};
+use crate::plan::Plan;
+use crate::sources::Sources;
+
+/// What the outputs need of the cloud beside attributes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Demand {
+    /// Sums and extremes of the cells.
+    pub(crate) moments: bool,
+    /// How many outputs take each record once.
+    pub(crate) uses: u32,
+}
+
+/// What all threads of a pass share.
+pub(super) struct Context<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) sources: &'a Sources,
+    pub(super) intake: &'a Intake,
+    /// From the coordinates of each source to the lattice of the pass.
+    pub(super) maps: Vec<SourceMap>,
+    pub(super) partition: Partition,
+    pub(super) store: Store,
+    pub(super) wants_moments: bool,
+    /// True once a point did not fit the partition: from then on only bounds are wanted.
+    pub(super) misled: AtomicBool,
+}
+
+/// The parts of cells that were seen, by packed cell.
+pub(super) type CellParts = HashMap<u64, CellPart, CellHash>;
+
+/// One thread's part of a cell.
+#[derive(Debug, Default)]
+pub(super) struct CellPart {
+    pub(super) segments: Segments,
+    pub(super) moments: Moments,
+}

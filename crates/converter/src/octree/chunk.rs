@@ -1,0 +1,194 @@
+//! One chunk: load, sort, divide, sample, write into a buffer.
+
+use std::ops::Range;
+
+use pointmill_format::NodeKey;
+
+use super::divide::Chunk;
+use super::order::{OrderScratch, Point, order};
+use super::raise::{Nodes, Pending};
+use super::sample::Sampler;
+use super::sink::{FinishedNode, NodeEncoder, finish_node};
+use crate::cloud::{Checksum, Cloud, Ledger, TreePoint, morton};
+use crate::error::ConvertError;
+use crate::plan::Duplicates;
+use crate::runtime::os_hints;
+
+/// What all chunks share.
+pub(super) struct ChunkPlan<'a> {
+    pub(super) cloud: &'a Cloud<'a>,
+    pub(super) leaf_capacity: u32,
+    /// Buffers are made for chunks of this size at once; what is not touched costs nothing.
+    pub(super) usual_points: u64,
+}
+
+/// A chunk, built: final nodes as bytes, and what the nodes above may still change.
+pub(super) struct BuiltChunk {
+    pub(super) payloads: Vec<u8>,
+    /// Byte offsets are relative to `payloads`.
+    pub(super) nodes: Vec<FinishedNode>,
+    /// Points are indices into `pending_points`.
+    pub(super) root: Pending<u32>,
+    /// Tree coordinates and records (as stored) of the pending points.
+    pub(super) pending_trees: Vec<TreePoint>,
+    pub(super) pending_records: Vec<u8>,
+    pub(super) ledger: Ledger,
+    pub(super) overfull_leaves: u64,
+}
+
+/// One thread's memory for building chunks.
+pub(super) struct ChunkBuilder<'a, E> {
+    plan: &'a ChunkPlan<'a>,
+    sampler: Sampler,
+    encoder: E,
+    records: Vec<u8>,
+    points: Vec<Point>,
+    scratch: OrderScratch,
+}
+
+impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
+    pub(super) fn new(plan: &'a ChunkPlan<'a>, sampler: Sampler, encoder: E) -> Self {
+        let (records, points, scratch) = (Vec::new(), Vec::new(), OrderScratch::default());
+        Self { plan, sampler, encoder, records, points, scratch }
+    }
+
+    /// Builds a chunk; `payloads` is a buffer to use again.
+    pub(super) fn build(&mut self, chunk: &Chunk, payloads: Vec<u8>) -> Result<BuiltChunk, ConvertError> {
+        let frame = &self.plan.cloud.frame;
+        let mut ledger = Ledger::default();
+        self.load(chunk, &mut ledger)?;
+        order(&self.records, frame, chunk.key.level, &mut self.scratch, &mut self.points);
+        if self.plan.cloud.plan.duplicates == Duplicates::Drop {
+            self.drop_duplicates(&mut ledger);
+        }
+        let mut nodes = ChunkNodes {
+            points: &self.points,
+            records: &self.records,
+            stride: frame.stride,
+            encoder: &mut self.encoder,
+            payloads,
+            nodes: Vec::new(),
+            written: Checksum::default(),
+        };
+        nodes.payloads.clear();
+        let room = self.points.len().max(self.plan.usual_points as usize) * frame.stride;
+        os_hints::reserve(&mut nodes.payloads, room);
+        let mut subtree =
+            Subtree { capacity: self.plan.leaf_capacity as usize, sampler: &mut self.sampler, overfull_leaves: 0 };
+        let mut root = subtree.node(chunk.key, 0..self.points.len(), &mut nodes)?;
+        let overfull_leaves = subtree.overfull_leaves;
+        ledger.written = nodes.written;
+        let (payloads, nodes) = (nodes.payloads, nodes.nodes);
+        let pending = count(&root);
+        let mut pending_trees = Vec::with_capacity(pending);
+        let mut pending_records = Vec::with_capacity(pending * frame.stride);
+        self.detach(&mut root, &mut pending_trees, &mut pending_records);
+        Ok(BuiltChunk { payloads, nodes, root, pending_trees, pending_records, ledger, overfull_leaves })
+    }
+
+    fn load(&mut self, chunk: &Chunk, ledger: &mut Ledger) -> Result<(), ConvertError> {
+        let Cloud { store, facts, frame, .. } = self.plan.cloud;
+        self.records.clear();
+        os_hints::reserve(&mut self.records, chunk.points.max(self.plan.usual_points) as usize * frame.stride);
+        for segment in &chunk.segments {
+            ledger.load(store, *segment, frame.stride, &facts.widen_rgb, &mut self.records)?;
+        }
+        Ok(())
+    }
+
+    /// Of records that are equal in every byte one stays.
+    fn drop_duplicates(&mut self, ledger: &mut Ledger) {
+        let (records, stride) = (&self.records, self.plan.cloud.frame.stride);
+        let class = self.plan.cloud.facts.class;
+        let bytes = |p: &Point| &records[p.record as usize * stride..][..stride];
+        self.points.dedup_by(|next, previous| {
+            let same = next.t == previous.t && bytes(next) == bytes(previous);
+            if same {
+                let record = bytes(next);
+                ledger.drop_duplicate(record, class.map(|at| record[at]));
+            }
+            same
+        });
+    }
+
+    /// Copies what the pending nodes refer to, so that the chunk's memory can be used again.
+    fn detach(&self, node: &mut Pending<u32>, trees: &mut Vec<TreePoint>, records: &mut Vec<u8>) {
+        let stride = self.plan.cloud.frame.stride;
+        for point in &mut node.points {
+            let p = self.points[*point as usize];
+            *point = trees.len() as u32;
+            trees.push(p.t);
+            records.extend_from_slice(&self.records[p.record as usize * stride..][..stride]);
+        }
+        for child in &mut node.children {
+            self.detach(child, trees, records);
+        }
+    }
+}
+
+/// Points of a node and of everything below it that was not written.
+fn count(node: &Pending<u32>) -> usize {
+    node.points.len() + node.children.iter().map(count).sum::<usize>()
+}
+
+/// Final nodes of a chunk.
+struct ChunkNodes<'a, E> {
+    points: &'a [Point],
+    records: &'a [u8],
+    stride: usize,
+    encoder: &'a mut E,
+    payloads: Vec<u8>,
+    nodes: Vec<FinishedNode>,
+    written: Checksum,
+}
+
+impl<E: NodeEncoder> Nodes<u32> for ChunkNodes<'_, E> {
+    #[inline]
+    fn tree(&self, point: u32) -> TreePoint {
+        self.points[point as usize].t
+    }
+
+    fn write(&mut self, key: NodeKey, points: &[u32]) -> Result<(), ConvertError> {
+        let records = points.iter().map(|p| {
+            let at = self.points[*p as usize].record as usize * self.stride;
+            &self.records[at..at + self.stride]
+        });
+        let node = finish_node(self.encoder, key, records, &mut self.written, &mut self.payloads)?;
+        self.nodes.push(node);
+        Ok(())
+    }
+}
+
+/// The division of a chunk into nodes.
+struct Subtree<'a> {
+    capacity: usize,
+    sampler: &'a mut Sampler,
+    overfull_leaves: u64,
+}
+
+impl Subtree<'_> {
+    fn node(
+        &mut self,
+        key: NodeKey,
+        range: Range<usize>,
+        nodes: &mut ChunkNodes<'_, impl NodeEncoder>,
+    ) -> Result<Pending<u32>, ConvertError> {
+        let points = &nodes.points[range.clone()];
+        let is_one_place = points.first().map(|p| p.t) == points.last().map(|p| p.t);
+        if points.len() <= self.capacity || is_one_place {
+            self.overfull_leaves += u64::from(points.len() > self.capacity);
+            return Ok(Pending::leaf(key, (range.start as u32..range.end as u32).collect()));
+        }
+        let mut children = Vec::with_capacity(8);
+        let mut start = range.start;
+        for (index, child) in (0..8).filter_map(|c| Some((c, key.child(c)?))) {
+            let rest = &nodes.points[start..range.end];
+            let count = rest.partition_point(|p| morton::child_index(p.t, key.level) <= index);
+            if count > 0 {
+                children.push(self.node(child, start..start + count, nodes)?);
+                start += count;
+            }
+        }
+        Pending::above(key, children, self.sampler, nodes)
+    }
+}

@@ -1,0 +1,96 @@
+//! Cuts the cloud into chunks: octree nodes small enough to be built in memory, alone. Which nodes these are changes
+//! nothing in the output; it is a matter of memory and load.
+
+use pointmill_format::NodeKey;
+
+use crate::cloud::{Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, morton};
+use crate::error::ConvertError;
+
+/// A subtree that is built alone.
+#[derive(Debug)]
+pub(super) struct Chunk {
+    pub(super) key: NodeKey,
+    pub(super) points: u64,
+    /// Where its records are, in order of block.
+    pub(super) segments: Segments,
+}
+
+/// Levels by which a cell that is too large is divided at once.
+const SPLIT_LEVELS: u32 = 3;
+
+/// The chunks of the cloud, in Morton order, none larger than `max_points` unless its points share one place.
+pub(super) fn divide(cloud: &Cloud<'_>, max_points: u64) -> Result<Vec<Chunk>, ConvertError> {
+    let mut regrouper = Regrouper::new(&cloud.store, cloud.frame.stride);
+    let mut cells = Vec::with_capacity(cloud.cells.len());
+    // The stack returns the last first.
+    let mut stack: Vec<Cell> = cloud.cells.iter().rev().cloned().collect();
+    while let Some(cell) = stack.pop() {
+        if cell.points <= max_points || cell.is_one_place {
+            cells.push(cell);
+        } else {
+            stack.extend(divide_cell(&cell, &cloud.frame, &mut regrouper)?.into_iter().rev());
+        }
+    }
+    let mut chunks = Vec::new();
+    choose(NodeKey::ROOT, &mut cells, max_points, &mut chunks);
+    Ok(chunks)
+}
+
+/// The parts of a cell some levels below it, in Morton order.
+fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) -> Result<Vec<Cell>, ConvertError> {
+    let level = (u32::from(cell.key.level) + SPLIT_LEVELS).min(TREE_BITS);
+    let node = |t: TreePoint| {
+        let [x, y, z] = t.cell(TREE_BITS - level);
+        NodeKey { level: level as u8, x, y, z }
+    };
+    let mut extremes: Option<(TreePoint, TreePoint)> = None;
+    let code = |record: &[u8]| {
+        let t = frame.tree(record);
+        let (lo, hi) = extremes.get_or_insert((t, t));
+        for a in 0..3 {
+            lo[a] = lo[a].min(t[a]);
+            hi[a] = hi[a].max(t[a]);
+        }
+        morton::interleave(t.cell(TREE_BITS - level).map(|c| c & 0x1f_ffff))
+    };
+    let mut parts: Vec<Cell> = Vec::new();
+    regrouper.regroup(&cell.segments, code, |_, first, segment| {
+        let key = node(frame.tree(first));
+        let at = parts.iter().position(|p| p.key == key).unwrap_or_else(|| {
+            let (segments, moments) = (Segments::default(), Moments::default());
+            parts.push(Cell { key, points: 0, segments, is_one_place: false, moments });
+            parts.len() - 1
+        });
+        parts[at].points += u64::from(segment.count);
+        parts[at].segments.push(segment);
+    })?;
+    if extremes.is_some_and(|(lo, hi)| lo == hi) {
+        parts.iter_mut().for_each(|p| p.is_one_place = true);
+    }
+    parts.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));
+    Ok(parts)
+}
+
+/// The highest nodes that are small enough (or hold one place only) become chunks.
+fn choose(node: NodeKey, cells: &mut [Cell], max_points: u64, out: &mut Vec<Chunk>) {
+    let points: u64 = cells.iter().map(|c| c.points).sum();
+    if points == 0 {
+        return;
+    }
+    let is_last = cells.len() == 1 && (cells[0].is_one_place || cells[0].key == node);
+    if points <= max_points || is_last {
+        let mut segments = Segments::default();
+        cells.iter_mut().for_each(|c| segments.append(&mut c.segments));
+        segments.sort();
+        out.push(Chunk { key: node, points, segments });
+        return;
+    }
+    let mut rest = cells;
+    for child in (0..8).filter_map(|c| node.child(c)) {
+        let inside = rest.iter().take_while(|c| c.key.ancestor(child.level) == Some(child)).count();
+        let (mine, others) = rest.split_at_mut(inside);
+        choose(child, mine, max_points, out);
+        rest = others;
+    }
+    debug_assert!(rest.is_empty());
+}

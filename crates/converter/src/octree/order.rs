@@ -1,0 +1,70 @@
+//! The points of a chunk in Morton order.
+
+use crate::cloud::{MortonSorter, RecordFrame, TREE_BITS, TreePoint, morton};
+
+/// A point of a chunk: where it is, and which record it has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Point {
+    pub(crate) t: TreePoint,
+    /// Index of the record in the chunk.
+    pub(crate) record: u32,
+}
+
+/// Memory that is reused from chunk to chunk.
+#[derive(Debug, Default)]
+pub(crate) struct OrderScratch {
+    trees: Vec<TreePoint>,
+    sorter: MortonSorter,
+}
+
+/// Sorts the records of a chunk below a node of `level` into `out`: Morton order, and records that share a place by
+/// their bytes, so that the order depends on the points alone.
+pub(crate) fn order(records: &[u8], frame: &RecordFrame, level: u8, scratch: &mut OrderScratch, out: &mut Vec<Point>) {
+    let stride = frame.stride;
+    let OrderScratch { trees, sorter } = scratch;
+    trees.clear();
+    trees.extend(records.chunks_exact(stride).map(|r| frame.tree(r)));
+    let level = u32::from(level);
+    let room = MortonSorter::room(trees.len());
+    let levels = (room / 3).min(frame.cube.resolved_level().saturating_sub(level)).min(21);
+    let shift = TREE_BITS - level - levels;
+    let mask = (1 << levels) - 1;
+    sorter.codes(trees.len()).extend(trees.iter().map(|t| morton::interleave(t.cell(shift).map(|c| c & mask))));
+    let bytes = |i: usize| &records[i * stride..][..stride];
+    sorter.sort(3 * levels, 0, |a, b| morton::compare(trees[a].0, trees[b].0).then_with(|| bytes(a).cmp(bytes(b))));
+    out.clear();
+    out.extend(sorter.indices(0..sorter.len()).map(|i| Point { t: trees[i], record: i as u32 }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::{Cube, JobBounds, JobPoint, StoredOrigin};
+    use pointmill_format::Lattice;
+    use std::cmp::Ordering;
+
+    #[test]
+    fn every_point_once_in_path_order_and_ties_by_bytes() {
+        let bounds = JobBounds::new([0; 3], [100_000; 3]);
+        let cube = Cube::around(&bounds, &Lattice { scale: [0.01; 3], offset: [0.0; 3] }).unwrap();
+        let frame = RecordFrame { stride: 14, cube, origin: StoredOrigin(JobPoint([0; 3])) };
+        let mut records = Vec::new();
+        let mut state = 7u64;
+        for i in 0..5000u32 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let q = [(state >> 50) as i32, (state >> 40) as i32 & 0xff, i as i32 % 3];
+            records.extend(q.iter().flat_map(|v| v.to_le_bytes()));
+            records.extend((i as u16 % 50).to_le_bytes());
+        }
+        let mut out = Vec::new();
+        order(&records, &frame, 0, &mut OrderScratch::default(), &mut out);
+        let mut seen: Vec<u32> = out.iter().map(|p| p.record).collect();
+        seen.sort_unstable();
+        assert_eq!(seen, (0..5000).collect::<Vec<u32>>());
+        let bytes = |p: &Point| &records[p.record as usize * 14..][..14];
+        for pair in out.windows(2) {
+            let order = morton::compare(pair[0].t.0, pair[1].t.0).then_with(|| bytes(&pair[0]).cmp(bytes(&pair[1])));
+            assert_ne!(order, Ordering::Greater);
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Where finished nodes go: the octree knows no format.
+
+use pointmill_format::NodeKey;
+
+use crate::cloud::Checksum;
+use crate::error::ConvertError;
+
+/// A node that nothing changes any more, and where its bytes are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct FinishedNode {
+    pub(crate) key: NodeKey,
+    pub(crate) points: u32,
+    /// Among the bytes of the whole tree.
+    pub(crate) byte_offset: u64,
+    pub(crate) byte_size: u64,
+}
+
+/// What a format does with finished nodes. Threads encode them alone; the octree decides the order of the bytes, which
+/// depends on the tree alone.
+pub(crate) trait NodeSink: Sync {
+    /// One thread's means to encode nodes.
+    type Encoder: NodeEncoder + Send;
+
+    /// Means for one more thread.
+    fn encoder(&self) -> Self::Encoder;
+
+    /// Takes the bytes of `nodes`, which begin at `offset` among the bytes of the whole tree. Called from several threads,
+    /// in any order; every byte comes once.
+    ///
+    /// # Errors
+    /// Whatever writing them meets.
+    fn write(&self, nodes: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError>;
+}
+
+/// Makes the bytes of nodes.
+pub(crate) trait NodeEncoder {
+    /// Appends the bytes of a node to `out`. `records` are as stored; every one is added to `written` as it is read.
+    ///
+    /// # Errors
+    /// A node that the format cannot hold.
+    fn encode<'r>(
+        &mut self,
+        key: NodeKey,
+        records: impl ExactSizeIterator<Item = &'r [u8]>,
+        written: &mut Checksum,
+        out: &mut Vec<u8>,
+    ) -> Result<(), ConvertError>;
+}
+
+/// Appends the bytes of a node to `out`; its offset counts from the start of `out`.
+pub(super) fn finish_node<'r>(
+    encoder: &mut impl NodeEncoder,
+    key: NodeKey,
+    records: impl ExactSizeIterator<Item = &'r [u8]>,
+    written: &mut Checksum,
+    out: &mut Vec<u8>,
+) -> Result<FinishedNode, ConvertError> {
+    let (count, start) = (records.len(), out.len());
+    let points = u32::try_from(count)
+        .map_err(|_| crate::error::Unsupported::CrowdedNode { points: count as u64, max: u64::from(u32::MAX) })?;
+    encoder.encode(key, records, written, out)?;
+    Ok(FinishedNode { key, points, byte_offset: start as u64, byte_size: (out.len() - start) as u64 })
+}

@@ -1,0 +1,215 @@
+//! What stands beside the positions: the colour, and the extra attributes.
+
+use pointmill_format::batches::{ColourSource, colour_word, eight_bit, grey};
+use pointmill_format::{Attribute, AttributeType};
+
+use super::settings::colour_of;
+use crate::cloud::Cloud;
+use crate::outputs::attributes::{choose, left_out};
+use crate::plan::AttributeChoice;
+use crate::report::{DropReason, DroppedAttribute};
+use crate::warning::Warning;
+
+/// Where colours come from, and which attributes have sections of their own.
+pub(super) struct Content {
+    colour: Colour,
+    /// In the order of their sections.
+    pub(super) extras: Vec<Extra>,
+    /// Names for the report, the position not among them.
+    pub(super) kept: Vec<usize>,
+    pub(super) dropped: Vec<DroppedAttribute>,
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// An attribute with a section of its own.
+#[derive(Debug, Clone)]
+pub(super) struct Extra {
+    pub(super) attribute: Attribute,
+    /// Index in the schema.
+    pub(super) index: usize,
+    /// Its bytes in a stored record.
+    pub(super) from: usize,
+    pub(super) to: usize,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Colour {
+    /// Byte offset in a stored record; for each source, if its values are 8 bits deep.
+    Rgb {
+        at: usize,
+        is_eight_bit: Vec<bool>,
+    },
+    /// Byte offset in a stored record, type, and the range of all points.
+    Intensity {
+        at: usize,
+        ty: AttributeType,
+        least: f64,
+        greatest: f64,
+    },
+    None,
+}
+
+impl Content {
+    pub(super) fn choose(cloud: &Cloud<'_>) -> Self {
+        let (schema, facts, requested) = (cloud.schema(), &cloud.facts, &cloud.plan.attributes);
+        let colour_index = colour_of(schema);
+        let is_rgb = schema.rgb().is_some();
+        let choice = match requested {
+            AttributeChoice::Usual => Vec::new(),
+            other => choose(other, schema, &cloud.intake.unread, &facts.ranges).kept,
+        };
+        let extras: Vec<usize> = choice.into_iter().filter(|i| !(is_rgb && Some(*i) == colour_index)).collect();
+        let mut kept: Vec<usize> = colour_index.filter(|_| is_rgb).into_iter().collect();
+        kept.extend(&extras);
+        let is_usual = *requested == AttributeChoice::Usual;
+        let unwanted = if is_usual { DropReason::NotUsual } else { DropReason::NotRequested };
+        let left = |i: usize| {
+            let constant = facts.ranges[i].constant().filter(|_| *requested == AttributeChoice::Scene);
+            let why = match constant {
+                Some(values) => DropReason::Constant(values.to_vec()),
+                None if !is_rgb && Some(i) == colour_index => DropReason::ShownAsGrey,
+                None => unwanted.clone(),
+            };
+            DroppedAttribute { name: schema.attributes[i].name.clone(), why }
+        };
+        let not_kept = (0..schema.attributes.len()).filter(|i| !kept.contains(i));
+        let mut dropped: Vec<DroppedAttribute> = not_kept.map(left).collect();
+        dropped.extend(left_out(schema, &cloud.intake.unread, |_| true, &unwanted));
+        let colour = match colour_index {
+            Some(i) if is_rgb => Colour::Rgb {
+                at: schema.offsets[i],
+                is_eight_bit: facts.widen_rgb.iter().map(Option::is_some).collect(),
+            },
+            Some(i) => {
+                let range = &facts.ranges[i];
+                let (least, greatest) = if range.is_empty() { (0.0, 0.0) } else { (range.min[0], range.max[0]) };
+                Colour::Intensity { at: schema.offsets[i], ty: schema.attributes[i].ty, least, greatest }
+            }
+            None => Colour::None,
+        };
+        let extra = |index: usize| {
+            let (attribute, from) = (schema.attributes[index].clone(), schema.offsets[index]);
+            let to = from + attribute.size();
+            Extra { attribute, index, from, to }
+        };
+        let extras = extras.into_iter().map(extra).collect();
+        let mut content = Self { colour, extras, kept, dropped, warnings: Vec::new() };
+        content.warnings = content.warnings(cloud);
+        content
+    }
+
+    fn warnings(&self, cloud: &Cloud<'_>) -> Vec<Warning> {
+        match &self.colour {
+            Colour::Rgb { is_eight_bit, .. } => {
+                let rgb = cloud.schema().rgb();
+                let used = |i: &usize| cloud.stats.sources[*i].kept > 0;
+                let coloured = |i: &usize| cloud.intake.sources[*i].has(rgb);
+                let sources: Vec<usize> = (0..is_eight_bit.len()).filter(used).collect();
+                let is_narrowed = sources.iter().any(|i| coloured(i) && !is_eight_bit[*i]);
+                let (without, inputs) = (sources.iter().filter(|i| !coloured(i)).count(), sources.len());
+                let narrowed = is_narrowed.then_some(Warning::ColoursNarrowed);
+                let black = (without > 0).then_some(Warning::InputsWithoutColour { without, inputs });
+                narrowed.into_iter().chain(black).collect()
+            }
+            Colour::Intensity { least, greatest, .. } => {
+                vec![Warning::GreyIntensity { least: *least, greatest: *greatest }]
+            }
+            Colour::None => vec![Warning::NoColour],
+        }
+    }
+
+    pub(super) fn source(&self) -> ColourSource {
+        match self.colour {
+            Colour::Rgb { .. } => ColourSource::Rgb,
+            Colour::Intensity { .. } => ColourSource::Intensity,
+            Colour::None => ColourSource::None,
+        }
+    }
+
+    /// Range of the integers that grey stands for.
+    pub(super) fn intensity_range(&self) -> Option<[u64; 2]> {
+        match self.colour {
+            Colour::Intensity { ty, least, greatest, .. } if ty != AttributeType::Float32 => {
+                Some([least as u64, greatest as u64])
+            }
+            _ => None,
+        }
+    }
+
+    /// Appends the colour words of records of one source, levels 0.
+    pub(super) fn words(&self, records: &[u8], stride: usize, source: u32, out: &mut Vec<u32>) {
+        let records = records.chunks_exact(stride);
+        match &self.colour {
+            Colour::Rgb { at, is_eight_bit } => {
+                let is_eight_bit = is_eight_bit.get(source as usize).copied().unwrap_or(false);
+                let channels = |r: &[u8]| match r.get(*at..).and_then(|r| r.first_chunk::<6>()) {
+                    Some(&[a, b, c, d, e, f]) => [[a, b], [c, d], [e, f]].map(u16::from_le_bytes),
+                    None => [0; 3],
+                };
+                if is_eight_bit {
+                    out.extend(records.map(|r| colour_word(channels(r).map(|v| v as u8), 0)));
+                } else {
+                    out.extend(records.map(|r| colour_word(channels(r).map(eight_bit), 0)));
+                }
+            }
+            Colour::Intensity { at, ty, least, greatest } => {
+                let grey = |r: &[u8]| grey_of(&r[*at..], *ty, *least, *greatest);
+                out.extend(records.map(|r| colour_word([grey(r); 3], 0)));
+            }
+            Colour::None => out.extend(records.map(|_| colour_word([255; 3], 0))),
+        }
+    }
+}
+
+/// The grey of one intensity, given as stored bytes.
+fn grey_of(bytes: &[u8], ty: AttributeType, least: f64, greatest: f64) -> u8 {
+    match (ty, bytes) {
+        (AttributeType::UInt8, [v, ..]) => grey(u16::from(*v), least as u16, greatest as u16),
+        (AttributeType::UInt16, [a, b, ..]) => grey(u16::from_le_bytes([*a, *b]), least as u16, greatest as u16),
+        (AttributeType::Float32, [a, b, c, d, ..]) => {
+            let v = f64::from(f32::from_le_bytes([*a, *b, *c, *d]));
+            let range = greatest - least;
+            if range > 0.0 { ((v - least) / range * 255.0 + 0.5) as u8 } else { 255 }
+        }
+        _ => 255,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn content(colour: Colour) -> Content {
+        Content { colour, extras: vec![], kept: vec![], dropped: vec![], warnings: vec![] }
+    }
+
+    #[test]
+    fn colours_are_taken_by_the_depth_of_their_source() {
+        let c = content(Colour::Rgb { at: 1, is_eight_bit: vec![true, false] });
+        let record = [9, 200, 0, 1, 0, 255, 0, 9, 0x34, 0x12, 0xff, 0xff, 0x80, 0];
+        let mut out = Vec::new();
+        c.words(&record, 7, 0, &mut out);
+        assert_eq!(out[0], colour_word([200, 1, 255], 0));
+        out.clear();
+        c.words(&record, 7, 1, &mut out);
+        assert_eq!(out, [colour_word([1, 0, 1], 0), colour_word([eight_bit(0x1234), 255, 0], 0)]);
+    }
+
+    #[test]
+    fn intensities_of_every_usual_type_become_grey_and_nothing_is_white() {
+        let of = |ty, bytes: &[u8], least, greatest| {
+            let mut out = Vec::new();
+            content(Colour::Intensity { at: 0, ty, least, greatest }).words(bytes, bytes.len(), 0, &mut out);
+            out[0]
+        };
+        let grey = |v| colour_word([v; 3], 0);
+        assert_eq!(of(AttributeType::UInt8, &[20], 10.0, 30.0), grey(128));
+        assert_eq!(of(AttributeType::UInt16, &1000u16.to_le_bytes(), 0.0, 1000.0), grey(255));
+        assert_eq!(of(AttributeType::Float32, &0.5f32.to_le_bytes(), 0.0, 1.0), grey(128));
+        assert_eq!(of(AttributeType::Float32, &f32::NAN.to_le_bytes(), 0.0, 1.0), grey(0));
+        assert_eq!(of(AttributeType::Float32, &3f32.to_le_bytes(), 3.0, 3.0), grey(255));
+        let mut out = Vec::new();
+        content(Colour::None).words(&[0; 24], 12, 0, &mut out);
+        assert_eq!(out, [grey(255); 2]);
+    }
+}

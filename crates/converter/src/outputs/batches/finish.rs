@@ -1,0 +1,219 @@
+//! The end of a file: open cells, records, originals, description, header.
+
+use std::collections::BTreeMap;
+
+use pointmill_format::Attribute;
+use pointmill_format::batches::{
+    AttributeEntry, BATCH_POINTS, BatchRecord, Description, ErrorSums, Finish, Flags, Layout, Precision,
+    SECTION_ALIGNMENT, lod_of,
+};
+use serde_json::json;
+
+use super::content::Content;
+use super::frame::{Frame, refused};
+use super::lod::{LEVELS, join, shown_word};
+use super::output::{ORIGINAL_BYTES, Output, State};
+use super::settings::BatchesSettings;
+use super::task::TaskResults;
+use crate::cloud::Cloud;
+use crate::error::ConvertError;
+use crate::outputs::origin::own_key;
+
+/// Bytes of originals that are written at once.
+const WRITE_BYTES: usize = 4 << 20;
+
+/// A point whose cell was finished after its task.
+#[derive(Debug, Clone, Copy)]
+struct Patch {
+    /// Colour word before averaging.
+    word: u32,
+    /// What the file holds so far, and what it shall hold.
+    written: u32,
+    shown: u32,
+}
+
+/// What the finished file is.
+pub(super) struct Finished {
+    pub(super) precision: Precision,
+    pub(super) records: Vec<BatchRecord>,
+    /// Of all plane counts, whether they are in the file or not.
+    pub(super) errors: ErrorSums,
+    pub(super) lod_points: [u64; LEVELS + 1],
+    pub(super) layout: Layout,
+    pub(super) originals_bytes: u64,
+    /// Header and description.
+    pub(super) end: Finish,
+    pub(super) bytes: u64,
+}
+
+/// Writes all that can only be known when every task is done.
+pub(super) fn finish(
+    cloud: &Cloud<'_>,
+    settings: &BatchesSettings,
+    frame: &Frame,
+    content: &Content,
+    output: &Output<'_>,
+    results: &TaskResults,
+) -> Result<Finished, ConvertError> {
+    let state = output.take_state()?;
+    let mut lod_points = results.lod_points;
+    let patches = patches(output.layout, results, &mut lod_points);
+    for (index, patch) in &patches {
+        output.put_values(output.layout.colour, 4, *index, &patch.shown.to_le_bytes())?;
+    }
+    let records: Vec<BatchRecord> = state.records.iter().flatten().copied().collect();
+    let mut layout = output.layout.clone();
+    if settings.planes.is_none() {
+        let needed = Precision::for_steps(&records, frame.lattice.scale);
+        if needed < layout.precision() {
+            layout = layout.with_precision(needed);
+            output.file.set_len(layout.end_of_points(), "leaving out a plane")?;
+        }
+    }
+    output.write(&record_bytes(&records), layout.records.offset)?;
+    let count = if settings.originals { put_originals(output, &layout, &state, &patches)? } else { 0 };
+    let mut errors = ErrorSums::default();
+    state.errors.iter().for_each(|e| errors.merge(e));
+    let mut description = describe(cloud, frame, content);
+    description.errors = errors.figures();
+    let mut end = layout.finish(&frame.grid, &frame.tight, count, description).map_err(refused)?;
+    if !settings.originals {
+        leave_out_originals(&layout, &mut end);
+    }
+    output.write(&end.description_bytes, end.description_offset)?;
+    output.write(&end.header_bytes, 0)?;
+    let bytes = end.description_offset + end.header.description_bytes;
+    let originals_bytes = if settings.originals { Layout::originals_bytes(count) } else { 0 };
+    Ok(Finished { precision: layout.precision(), records, errors, lod_points, layout, originals_bytes, end, bytes })
+}
+
+/// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.
+fn patches(layout: &Layout, results: &TaskResults, lod_points: &mut [u64; LEVELS + 1]) -> BTreeMap<u32, Patch> {
+    let mut patches: BTreeMap<u32, Patch> = BTreeMap::new();
+    // coarser levels come later and win
+    for level in (0..LEVELS).rev() {
+        join(results.edges.iter().filter_map(|(_, edges)| edges[level]), |cell| {
+            let shown = shown_word(&cell, level);
+            let size = u64::from(BATCH_POINTS);
+            let index = layout.slot((cell.candidate / size) as u32).1 + (cell.candidate % size) as u32;
+            let patch = Patch { word: cell.word, written: cell.shown, shown };
+            patches.entry(index).and_modify(|p| p.shown = shown).or_insert(patch);
+        });
+    }
+    for patch in patches.values() {
+        let level = |word| usize::from(lod_of(word)).min(LEVELS);
+        lod_points[level(patch.written)] -= 1;
+        lod_points[level(patch.shown)] += 1;
+    }
+    patches
+}
+
+fn record_bytes(records: &[BatchRecord]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(32 * records.len());
+    for r in records {
+        bytes.extend(r.min.iter().flat_map(|v| v.to_le_bytes()));
+        bytes.extend(r.first_point.to_le_bytes());
+        bytes.extend(r.max.iter().flat_map(|v| v.to_le_bytes()));
+        bytes.extend(r.points.to_le_bytes());
+    }
+    bytes
+}
+
+/// Writes the originals in storage order and returns their number.
+fn put_originals(
+    output: &Output<'_>,
+    layout: &Layout,
+    state: &State,
+    patches: &BTreeMap<u32, Patch>,
+) -> Result<u64, ConvertError> {
+    let mut parts = state.originals.clone();
+    parts.sort_unstable_by_key(|(first, _)| *first);
+    let chosen_late = |(index, p): (&u32, &Patch)| {
+        (usize::from(lod_of(p.written)) >= LEVELS).then(|| u64::from(*index) | u64::from(p.word) << 32)
+    };
+    let mut late = patches.iter().filter_map(chosen_late).peekable();
+    let index_of = |entry: u64| entry as u32;
+    let mut writer = Sequence { output, at: layout.originals + 8, bytes: Vec::new(), count: 0 };
+    let mut part = Vec::new();
+    for (_, segment) in parts {
+        part.clear();
+        output.originals.take(segment, &mut part)?;
+        let entries = part.as_chunks::<ORIGINAL_BYTES>().0;
+        let last = entries.last().map_or(0, |e| index_of(u64::from_le_bytes(*e)));
+        if late.peek().is_none_or(|entry| index_of(*entry) > last) {
+            writer.put(&part)?;
+            continue;
+        }
+        for bytes in entries {
+            let index = index_of(u64::from_le_bytes(*bytes));
+            while let Some(entry) = late.next_if(|entry| index_of(*entry) < index) {
+                writer.put(&entry.to_le_bytes())?;
+            }
+            writer.put(bytes)?;
+        }
+    }
+    for entry in late {
+        writer.put(&entry.to_le_bytes())?;
+    }
+    writer.flush()?;
+    output.write(&writer.count.to_le_bytes(), layout.originals)?;
+    Ok(writer.count)
+}
+
+/// Entries of the originals, one behind the other.
+struct Sequence<'a> {
+    output: &'a Output<'a>,
+    at: u64,
+    bytes: Vec<u8>,
+    count: u64,
+}
+
+impl Sequence<'_> {
+    fn put(&mut self, entries: &[u8]) -> Result<(), ConvertError> {
+        self.bytes.extend_from_slice(entries);
+        self.count += (entries.len() / ORIGINAL_BYTES) as u64;
+        if self.bytes.len() >= WRITE_BYTES { self.flush() } else { Ok(()) }
+    }
+
+    fn flush(&mut self) -> Result<(), ConvertError> {
+        self.output.write(&self.bytes, self.at)?;
+        self.at += self.bytes.len() as u64;
+        self.bytes.clear();
+        Ok(())
+    }
+}
+
+/// The header of a file without that section: the description takes its place.
+fn leave_out_originals(layout: &Layout, end: &mut Finish) {
+    end.description_offset = layout.end_of_points().next_multiple_of(SECTION_ALIGNMENT);
+    end.header.sections.description = end.description_offset;
+    end.header.sections.originals = None;
+    end.header.flags = Flags(end.header.flags.0 & !Flags::ORIGINALS);
+    end.header_bytes = end.header.encode();
+}
+
+fn describe(cloud: &Cloud<'_>, frame: &Frame, content: &Content) -> Description {
+    let mut description = Description::new(frame.lattice);
+    description.version = env!("CARGO_PKG_VERSION").into();
+    description.name = cloud.plan.cloud_name();
+    description.projection.clone_from(&cloud.facts.crs.projection);
+    description.colour = content.source();
+    description.source_step = cloud.source_step();
+    let entry = |attribute: &Attribute, index: usize| {
+        let mut entry = AttributeEntry::new(attribute, 0, 0);
+        let range = &cloud.facts.ranges[index];
+        if range.min.iter().chain(&range.max).all(|v| v.is_finite()) {
+            entry.min.clone_from(&range.min);
+            entry.max.clone_from(&range.max);
+        }
+        entry
+    };
+    description.attributes = content.extras.iter().map(|e| entry(&e.attribute, e.index)).collect();
+    let mut own = own_key(cloud, &[]);
+    if let Some(range) = content.intensity_range() {
+        own.insert("intensityRange".into(), json!(range));
+    }
+    let keys = ["intensityRange", "filter", "duplicates", "rgbDepth", "wkt"];
+    description.extra.extend(keys.iter().filter_map(|key| Some(((*key).to_owned(), own.remove(*key)?))));
+    description
+}

@@ -1,0 +1,187 @@
+//! Quantised batches: the cloud is cut into runs of the batches' Morton order, which threads sort and encode one by
+//! one. Batches and cells that two runs share are put together by whoever comes last, and at the end.
+
+mod buckets;
+mod compress;
+mod content;
+mod figures;
+mod finish;
+mod frame;
+mod lod;
+mod order;
+mod output;
+mod settings;
+mod task;
+#[cfg(test)]
+mod tests;
+
+use pointmill_format::DatasetKind;
+use pointmill_format::batches::{BatchRecord, Layout, Precision, f32_above, f32_below};
+use serde_json::{Map, Value};
+
+pub use settings::BatchesSettings;
+
+use super::output::{DiskSize, Output as Format, Target, Wants};
+use super::staging::StagedDataset;
+use crate::cloud::{Cloud, Store};
+use crate::error::{ConvertError, Unsupported};
+use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
+use crate::report::OutputReport;
+use crate::runtime::Runtime;
+use crate::sources::Schema;
+use buckets::Task;
+use content::Content;
+use finish::finish;
+use frame::{Frame, refused};
+use output::{ORIGINAL_BYTES, Output};
+use settings::colour_of;
+use task::{TaskResults, Worker, Workshop, bytes_per_point};
+
+/// Tasks per thread, so that threads end together; their sizes. Small ones share too much with each other, large ones
+/// leave the caches.
+const TASKS_PER_THREAD: u64 = 6;
+const MAX_TASK_POINTS: u64 = 800_000;
+const MIN_TASK_POINTS: u64 = 50_000;
+
+/// Bytes of the record of a batch.
+const BATCH_BYTES: u64 = 32;
+
+impl From<BatchesSettings> for Target {
+    fn from(settings: BatchesSettings) -> Self {
+        Self::new(settings)
+    }
+}
+
+impl Format for BatchesSettings {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Batches
+    }
+
+    fn check(&self, plan: &Plan) -> Result<(), ConvertError> {
+        let refuse = |setting, fault| Err(PlanError::new(setting, fault).into());
+        if plan.duplicates == Duplicates::Drop {
+            return Err(Unsupported::DropDuplicates(self.kind()).into());
+        }
+        if self.lod_cell.is_some_and(|c| !(c.is_finite() && c > 0.0)) {
+            return refuse(Setting::LodCell, PlanFault::NotPositive);
+        }
+        if self.planes.is_some_and(|p| !(1..=3).contains(&p)) {
+            return refuse(Setting::Planes, PlanFault::NotOneOf("10, 20, 30 or auto"));
+        }
+        Ok(())
+    }
+
+    fn wants(&self, plan: &Plan, all: &Schema) -> Wants {
+        let mut wants = Wants::chosen(plan, all, false);
+        wants.add(colour_of(all));
+        wants
+    }
+
+    fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize {
+        let colour = colour_of(schema).map_or(0, |i| schema.attributes[i].size() as u64);
+        let is_usual = plan.attributes == AttributeChoice::Usual;
+        let extras = if is_usual { 0 } else { kept.saturating_sub(colour) };
+        let planes = u64::from(self.planes.unwrap_or(3));
+        // Colour word, and index and word of an original for points of the coarser levels.
+        let originals = if self.originals { 8 } else { 0 };
+        DiskSize { per_point: 4 * planes + 4 + originals + extras, per_1000_points: BATCH_BYTES }
+    }
+
+    fn describe_settings(&self, settings: &mut Map<String, Value>) {
+        settings.insert("lod-cell".into(), self.lod_cell.map_or("auto".into(), Value::from));
+        settings.insert("planes".into(), self.planes.map_or("auto".into(), |p| (u32::from(p) * 10).into()));
+        settings.insert("originals".into(), self.originals.into());
+        if let Some(level) = self.zstd_level {
+            settings.insert("zstd-level".into(), level.into());
+        }
+    }
+
+    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let (points, per_point) = (cloud.points(), bytes_per_point(cloud.frame.stride));
+        let most = rt.budget.task_points(per_point, MAX_TASK_POINTS);
+        let task_points = (points / (rt.threads as u64 * TASKS_PER_THREAD)).max(MIN_TASK_POINTS).min(most);
+        let content = Content::choose(cloud);
+        let frame = Frame::new(cloud, self.lod_cell)?;
+        let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();
+        let layout = Layout::new(points, &attributes, planes_at_most(&frame, self.planes)).map_err(refused)?;
+        let tasks = buckets::tasks(cloud, rt, &frame, task_points)?;
+        for task in &tasks {
+            rt.budget.check_task(task.points, task_points, per_point)?;
+        }
+        let file = to.create(self.kind().marker_file())?;
+        // what is compressed is written raw first, elsewhere
+        let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
+        let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, cloud.store.unused_bytes());
+        let output = Output::new(raw.as_ref().unwrap_or(&file), &layout, originals);
+        let results = encode(cloud, rt, &frame, &content, &output, self.originals, &tasks, task_points)?;
+        results.ledger.check(&cloud.stats.checksum)?;
+        let mut finished = finish(cloud, self, &frame, &content, &output, &results)?;
+        if let (Some(raw), Some(level)) = (&raw, self.zstd_level) {
+            compress::compress(rt, raw, &file, level, &mut finished)?;
+        }
+        file.sync("syncing the batches")?;
+        Ok(OutputReport {
+            points: results.ledger.points(),
+            attributes: cloud.names(content.kept.iter().copied()),
+            attributes_dropped: content.dropped,
+            bytes: finished.bytes,
+            checksum: results.ledger.unaltered().to_string(),
+            details: figures::details(&frame, &finished, self),
+            warnings: content.warnings,
+            ..OutputReport::default()
+        })
+    }
+}
+
+/// The planes that are written at first; more are never needed.
+fn planes_at_most(frame: &Frame, planes: Option<u8>) -> Precision {
+    if let Some(planes) = planes {
+        return Precision::from_bits(10 * u32::from(planes)).unwrap_or(Precision::Thirty);
+    }
+    // no batch is larger than the cloud
+    let far = frame.grid.relative(frame.tight.max);
+    let near = frame.grid.relative(frame.tight.min);
+    let cloud = BatchRecord { min: near.map(f32_below), first_point: 0, max: far.map(f32_above), points: 1 };
+    Precision::for_steps([&cloud], frame.lattice.scale)
+}
+
+/// Encodes all tasks; edges come back in the order of the tasks.
+#[allow(clippy::too_many_arguments)]
+fn encode(
+    cloud: &Cloud<'_>,
+    rt: &Runtime<'_>,
+    frame: &Frame,
+    content: &Content,
+    output: &Output<'_>,
+    keeps_originals: bool,
+    tasks: &[Task],
+    task_points: u64,
+) -> Result<TaskResults, ConvertError> {
+    let shop = Workshop {
+        frame,
+        content,
+        store: &cloud.store,
+        stride: cloud.frame.stride,
+        output,
+        keeps_originals,
+        usual_points: task_points.min(cloud.points()),
+    };
+    let each = rt.in_parallel(
+        tasks.len(),
+        || Worker::new(&shop),
+        |worker, index| {
+            worker.run(index, &tasks[index])?;
+            rt.advance(tasks[index].points);
+            Ok(())
+        },
+        Worker::finish,
+    )?;
+    let mut all = TaskResults::default();
+    for mut results in each {
+        all.ledger.merge(&results.ledger);
+        all.lod_points.iter_mut().zip(results.lod_points).for_each(|(a, b)| *a += b);
+        all.edges.append(&mut results.edges);
+    }
+    all.edges.sort_unstable_by_key(|(index, _)| *index);
+    Ok(all)
+}

@@ -1,0 +1,189 @@
+//! The file while tasks are written: batches go to their slots as soon as they are complete.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard};
+
+use pointmill_format::batches::{
+    BATCH_POINTS, BatchRecord, EncodedBatch, ErrorSums, Layout, Section, batch_points, encode_batch, le_bytes,
+};
+
+use super::frame::refused;
+use crate::cloud::{Segment, Store};
+use crate::error::ConvertError;
+use crate::runtime::DiskFile;
+
+/// Bytes of an entry of the originals: storage index and colour word.
+pub(super) const ORIGINAL_BYTES: usize = 8;
+
+/// Where tasks put what they made, in any order, from any thread.
+pub(super) struct Output<'a> {
+    pub(super) file: &'a DiskFile,
+    pub(super) layout: &'a Layout,
+    state: Mutex<State>,
+    /// Entries of the originals, as they came.
+    pub(super) originals: Store,
+}
+
+/// What is kept until the end.
+#[derive(Default)]
+pub(super) struct State {
+    /// By slot.
+    pub(super) records: Vec<Option<BatchRecord>>,
+    /// By Morton batch.
+    pub(super) errors: Vec<ErrorSums>,
+    /// Parts of batches that tasks share, by Morton batch.
+    fragments: HashMap<u32, Vec<Fragment>>,
+    /// First storage index, and where the entries are.
+    pub(super) originals: Vec<(u32, Segment)>,
+}
+
+/// Consecutive points of a batch.
+struct Fragment {
+    start: u32,
+    relative: [Vec<f64>; 3],
+}
+
+/// Points of one task in one batch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Piece {
+    /// Index of the batch in Morton order.
+    pub(super) batch: u32,
+    /// Index in the batch of its first point.
+    pub(super) start: u32,
+    /// Its points, counted from the first of the task.
+    pub(super) range: std::ops::Range<usize>,
+}
+
+/// The pieces of a task.
+pub(super) fn pieces(first_point: u64, points: u64) -> impl Iterator<Item = Piece> {
+    let size = u64::from(BATCH_POINTS);
+    let batches = first_point / size..(first_point + points).div_ceil(size);
+    batches.map(move |batch| {
+        let from = first_point.max(batch * size);
+        let to = (first_point + points).min((batch + 1) * size);
+        let range = (from - first_point) as usize..(to - first_point) as usize;
+        Piece { batch: batch as u32, start: (from - batch * size) as u32, range }
+    })
+}
+
+/// One thread's memory for encoding batches.
+#[derive(Default)]
+pub(super) struct Encoder {
+    batch: EncodedBatch,
+    joined: [Vec<f64>; 3],
+}
+
+impl<'a> Output<'a> {
+    pub(super) fn new(file: &'a DiskFile, layout: &'a Layout, originals: Store) -> Self {
+        let batches = layout.batches as usize;
+        let state =
+            State { records: vec![None; batches], errors: vec![ErrorSums::default(); batches], ..State::default() };
+        Self { file, layout, state: Mutex::new(state), originals }
+    }
+
+    /// The storage index of the first point of a piece.
+    pub(super) fn storage_index(&self, piece: &Piece) -> u32 {
+        self.layout.slot(piece.batch).1 + piece.start
+    }
+
+    /// Takes the positions of a piece, relative to the origin; encodes the batch if it is complete now.
+    pub(super) fn put(&self, piece: &Piece, relative: [&[f64]; 3], encoder: &mut Encoder) -> Result<(), ConvertError> {
+        let points = batch_points(piece.batch, self.layout.points) as usize;
+        if piece.range.len() == points {
+            return self.encode(piece.batch, relative, &mut encoder.batch);
+        }
+        let mut fragments = {
+            let mut state = self.lock()?;
+            let fragments = state.fragments.entry(piece.batch).or_default();
+            fragments.push(Fragment { start: piece.start, relative: relative.map(<[f64]>::to_vec) });
+            if fragments.iter().map(|f| f.relative[0].len()).sum::<usize>() < points {
+                return Ok(());
+            }
+            state.fragments.remove(&piece.batch).unwrap_or_default()
+        };
+        fragments.sort_unstable_by_key(|f| f.start);
+        for (a, joined) in encoder.joined.iter_mut().enumerate() {
+            joined.clear();
+            fragments.iter().for_each(|f| joined.extend_from_slice(&f.relative[a]));
+        }
+        let [x, y, z] = &encoder.joined;
+        self.encode(piece.batch, [x, y, z], &mut encoder.batch)
+    }
+
+    fn encode(&self, batch: u32, relative: [&[f64]; 3], encoded: &mut EncodedBatch) -> Result<(), ConvertError> {
+        let (slot, first_point) = self.layout.slot(batch);
+        encode_batch(first_point, relative, encoded).map_err(refused)?;
+        self.put_values(self.layout.hi10, 4, first_point, &le_bytes(&encoded.hi10))?;
+        for (section, words) in [(self.layout.mid10, &encoded.mid10), (self.layout.lo10, &encoded.lo10)] {
+            if let Some(section) = section {
+                self.put_values(section, 4, first_point, &le_bytes(words))?;
+            }
+        }
+        let mut state = self.lock()?;
+        state.records[slot as usize] = Some(encoded.record);
+        state.errors[batch as usize] = encoded.errors;
+        Ok(())
+    }
+
+    /// Writes consecutive values of a section with `size` bytes per point.
+    pub(super) fn put_values(&self, section: Section, size: u64, first: u32, bytes: &[u8]) -> Result<(), ConvertError> {
+        self.write(bytes, Layout::point_offset(section, size, first))
+    }
+
+    pub(super) fn write(&self, bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
+        self.file.write_at(bytes, offset, "writing the batches")
+    }
+
+    /// Keeps the originals of one task: bytes of all entries, and for each piece its first storage index and the number
+    /// of entries.
+    pub(super) fn put_originals(&self, entries: &mut Vec<u8>, pieces: &[(u32, u32)]) -> Result<(), ConvertError> {
+        if entries.is_empty() {
+            return Ok(());
+        }
+        let block = self.originals.open(0)?;
+        self.originals.fill(block, entries)?;
+        let mut start = 0;
+        let mut state = self.lock()?;
+        for &(first, count) in pieces.iter().filter(|(_, count)| *count > 0) {
+            state.originals.push((first, Segment { block, start, count }));
+            start += count;
+        }
+        Ok(())
+    }
+
+    /// What was kept, once all tasks are done.
+    pub(super) fn take_state(&self) -> Result<State, ConvertError> {
+        let state = std::mem::take(&mut *self.lock()?);
+        if state.fragments.is_empty() && state.records.iter().all(Option::is_some) {
+            return Ok(state);
+        }
+        let missing = state.records.iter().filter(|r| r.is_none()).count();
+        Err(ConvertError::Internal(format!("{missing} of {} batches were never complete", state.records.len())))
+    }
+
+    fn lock(&self) -> Result<MutexGuard<'_, State>, ConvertError> {
+        self.state.lock().map_err(|_| ConvertError::Internal("a worker thread failed while it wrote batches".into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_end_at_the_borders_of_batches_and_hold_every_point() {
+        let found: Vec<Piece> = pieces(10_000, 20_721).collect();
+        let piece = |batch, start, range| Piece { batch, start, range };
+        assert_eq!(
+            found,
+            [
+                piece(0, 10_000, 0..240),
+                piece(1, 0, 240..10_480),
+                piece(2, 0, 10_480..20_720),
+                piece(3, 0, 20_720..20_721)
+            ]
+        );
+        assert_eq!(pieces(10_240, 1).collect::<Vec<_>>(), [piece(1, 0, 0..1)]);
+        assert_eq!(pieces(10_240, 10_240).count(), 1);
+    }
+}

@@ -1,0 +1,36 @@
+//! What can be chosen of quantised batches.
+
+use pointmill_format::AttributeType;
+
+use crate::sources::Schema;
+
+/// Settings of quantised batches (`docs/formats/batches.md`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BatchesSettings {
+    /// Cell of the coarsest level of detail, world units; `None`: from the scene's extent and density.
+    pub lod_cell: Option<f64>,
+    /// Position planes of ten bits to write, 1 to 3; `None`: those that the scene needs.
+    pub planes: Option<u8>,
+    /// Zstandard level of the sections; `None`: stored as they are, ready to be mapped.
+    pub zstd_level: Option<i32>,
+    /// Keep the colours that averaging replaces.
+    pub originals: bool,
+}
+
+impl Default for BatchesSettings {
+    fn default() -> Self {
+        Self { lod_cell: Some(1.0), planes: None, zstd_level: None, originals: true }
+    }
+}
+
+/// What batches are coloured by: the colour, else the intensity.
+pub(super) fn colour_of(schema: &Schema) -> Option<usize> {
+    let intensity = || {
+        let is_usual = |&i: &usize| {
+            let a = &schema.attributes[i];
+            a.elements == 1 && matches!(a.ty, AttributeType::UInt16 | AttributeType::UInt8 | AttributeType::Float32)
+        };
+        schema.find("intensity").filter(is_usual)
+    };
+    schema.rgb().or_else(intensity)
+}

@@ -1,0 +1,194 @@
+//! The mean-split binary tree: upper splits from exact sums of cells, everything below in memory, leaves where they belong.
+//!
+//! 1. [`upper`] splits nodes that are too large for memory. A node is a list of cells whose sums and extremes are known
+//!    from the one pass over the inputs, so axis and plane are exact without reading a point; only cells that the plane
+//!    crosses are read, and divided.
+//! 2. [`subtree`] takes what is small enough into memory, and partitions it down to leaves, one subtree a thread.
+//! 3. [`leaf`] puts the points of a leaf in order and encodes them; [`files`] puts the bytes at their place, which is
+//!    known from the number of points before them.
+//!
+//! Planes come from exact integers, so the tree is the same for any order of points, number of threads and memory.
+
+mod assemble;
+mod files;
+mod item;
+mod leaf;
+mod order;
+mod rule;
+mod settings;
+mod subtree;
+mod upper;
+
+use std::io::BufWriter;
+
+use pointmill_format::DatasetKind;
+use pointmill_format::bintree::{CORE_BYTES, Header, INDEX_FILE, IndexWriter, Layout, Node};
+use serde_json::{Map, Value};
+
+pub use self::settings::BintreeSettings;
+
+use self::assemble::{assemble, figures};
+use self::files::Leaves;
+use self::leaf::Columns;
+use self::settings::{RGBA, class_of};
+use self::subtree::{Builder, Built};
+use self::upper::Upper;
+use super::origin::own_key;
+use super::output::{DiskSize, Output, Target, Wants};
+use super::staging::StagedDataset;
+use crate::cloud::{Cloud, Ledger};
+use crate::error::{ConvertError, Unsupported};
+use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
+use crate::report::OutputReport;
+use crate::runtime::{Runtime, Sequential};
+use crate::sources::Schema;
+use crate::warning::Warning;
+
+/// Tasks of this size keep all threads busy to the end, and few cells are cut above them.
+const MAX_TASK_POINTS: u64 = 2_000_000;
+
+/// This many files are slow to write, to copy and to list.
+const MANY_FILES: usize = 20_000;
+
+/// Bytes of a node in the index.
+const INDEX_NODE_BYTES: u64 = 220;
+
+impl From<BintreeSettings> for Target {
+    fn from(settings: BintreeSettings) -> Self {
+        Self::new(settings)
+    }
+}
+
+impl Output for BintreeSettings {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Bintree
+    }
+
+    fn check(&self, plan: &Plan) -> Result<(), ConvertError> {
+        if plan.duplicates == Duplicates::Drop {
+            return Err(Unsupported::DropDuplicates(self.kind()).into());
+        }
+        match self.capacity {
+            0 => Err(PlanError::new(Setting::Capacity, PlanFault::Zero).into()),
+            _ => Ok(()),
+        }
+    }
+
+    fn wants(&self, plan: &Plan, all: &Schema) -> Wants {
+        let mut wants = Wants::chosen(plan, all, false);
+        wants.add(class_of(all));
+        wants.moments = true;
+        if let Some(rgb) = all.rgb() {
+            wants.other_names = &[RGBA];
+            if matches!(&plan.attributes, AttributeChoice::List(names) if names.iter().any(|n| n == RGBA)) {
+                wants.add(Some(rgb));
+            }
+        }
+        wants
+    }
+
+    fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize {
+        // Leaves are two thirds full, and there is an inner node for each.
+        let nodes = 3000 / u64::from(self.capacity).max(1) + 1;
+        let class = class_of(schema).map_or(0, |i| schema.attributes[i].size() as u64);
+        let is_usual = plan.attributes == AttributeChoice::Usual;
+        let extras = if is_usual { 0 } else { kept.saturating_sub(class).next_multiple_of(4) };
+        DiskSize { per_point: CORE_BYTES as u64 + extras, per_1000_points: nodes * INDEX_NODE_BYTES }
+    }
+
+    fn describe_settings(&self, settings: &mut Map<String, Value>) {
+        settings.insert("capacity".into(), self.capacity.into());
+        settings.insert("split".into(), self.split.name().into());
+        settings.insert("layout".into(), self.layout.name().into());
+    }
+
+    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let columns = Columns::choose(cloud)?;
+        let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
+        let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
+        let upper = upper::split(cloud, rt, self, task_points)?;
+        for task in &upper.tasks {
+            rt.budget.check_task(task.points(), task_points, bytes_per_point)?;
+        }
+        let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
+        let built = build(cloud, rt, self, &columns, &upper, &leaves)?;
+        let leaf_bytes = leaves.finish(rt)?;
+
+        let mut ledger = Ledger::default();
+        built.iter().for_each(|b| ledger.merge(&b.ledger));
+        ledger.check(&cloud.stats.checksum)?;
+        let nodes = assemble(&upper, built);
+        let index_bytes = write_index(cloud, self, &columns, &nodes, to)?;
+        let (tree, details) = figures(&nodes);
+        let leaves = nodes.iter().filter(|n| n.is_leaf()).count();
+        let is_many = self.layout == Layout::Files && leaves > MANY_FILES;
+        Ok(OutputReport {
+            points: ledger.points(),
+            attributes: columns.names(),
+            attributes_dropped: columns.dropped,
+            bytes: leaf_bytes + index_bytes,
+            checksum: ledger.unaltered().to_string(),
+            tree,
+            details,
+            warnings: is_many.then_some(Warning::ManyFiles { leaves }).into_iter().collect(),
+            ..OutputReport::default()
+        })
+    }
+}
+
+/// Builds all subtrees, in parallel; they come back in order.
+fn build(
+    cloud: &Cloud<'_>,
+    rt: &Runtime<'_>,
+    settings: &BintreeSettings,
+    columns: &Columns,
+    upper: &Upper,
+    leaves: &Leaves<'_>,
+) -> Result<Vec<Built>, ConvertError> {
+    let done = rt.in_parallel(
+        upper.tasks.len(),
+        || (Builder::new(cloud, settings, columns, leaves), Vec::new()),
+        |(builder, built), index| {
+            let task = &upper.tasks[index];
+            built.push((index, builder.build(task)?));
+            rt.advance(task.points());
+            Ok(())
+        },
+        |(_, built)| built,
+    )?;
+    let mut built: Vec<(usize, Built)> = done.into_iter().flatten().collect();
+    built.sort_unstable_by_key(|(index, _)| *index);
+    Ok(built.into_iter().map(|(_, built)| built).collect())
+}
+
+fn write_index(
+    cloud: &Cloud<'_>,
+    settings: &BintreeSettings,
+    columns: &Columns,
+    nodes: &[Node],
+    staged: &StagedDataset,
+) -> Result<u64, ConvertError> {
+    let header = Header {
+        generator: format!("pointmill {}", env!("CARGO_PKG_VERSION")),
+        name: cloud.plan.cloud_name(),
+        points: nodes.first().map_or(0, |root| root.count),
+        capacity: u64::from(settings.capacity),
+        layout: settings.layout,
+        split: settings.split,
+        origin: nodes.first().map_or([0.0; 3], |root| root.bounds.min.map(f64::floor)),
+        projection: cloud.facts.crs.projection.clone(),
+        lattice: cloud.lattice.lattice,
+        pointmill: own_key(cloud, &columns.dropped),
+        record: columns.record.clone(),
+    };
+    let file = staged.create(INDEX_FILE)?;
+    let fail = |e| file.failed("writing the index", e);
+    let mut index =
+        IndexWriter::new(BufWriter::with_capacity(1 << 20, Sequential::new(&file)), &header).map_err(fail)?;
+    for node in nodes {
+        index.node(node).map_err(fail)?;
+    }
+    let written = index.finish().map_err(fail)?.into_inner().map_err(|e| fail(e.into_error()))?;
+    file.sync("writing the index")?;
+    Ok(written.len())
+}

@@ -1,0 +1,71 @@
+//! The order of points in a leaf: Morton order relative to the leaf's least integers.
+
+use std::cmp::Ordering;
+
+use super::item::Item;
+use crate::cloud::{MortonSorter, morton};
+
+/// Puts indices of `items` into Morton order, all bits of the coordinates; points of one place by `tails`, which compares
+/// the bytes of their records behind the position.
+pub(super) fn order(
+    items: &[Item],
+    min: [i32; 3],
+    max: [i32; 3],
+    sorter: &mut MortonSorter,
+    out: &mut Vec<u32>,
+    tails: impl Fn(&Item, &Item) -> Ordering,
+) {
+    let extent = (0..3).map(|a| max[a].abs_diff(min[a])).max().unwrap_or(0);
+    let width = u32::BITS - extent.leading_zeros();
+    let levels = (MortonSorter::room(items.len()) / 3).min(width).min(21);
+    let shift = width - levels;
+    let relative = |item: &Item| -> [u32; 3] { std::array::from_fn(|a| item.q[a].abs_diff(min[a])) };
+    let code = |item: &Item| morton::interleave(relative(item).map(|r| r >> shift));
+    sorter.codes(items.len()).extend(items.iter().map(code));
+    sorter.sort(3 * levels, 0, |a, b| {
+        let (a, b) = (&items[a], &items[b]);
+        morton::compare(relative(a), relative(b)).then_with(|| tails(a, b))
+    });
+    out.clear();
+    out.extend(sorter.indices(0..sorter.len()).map(|i| i as u32));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::StoredPoint;
+
+    fn sorted(items: &[Item]) -> Vec<u32> {
+        let ends = |f: fn(i32, i32) -> i32| [0, 1, 2].map(|a| items.iter().map(|i| i.q[a]).reduce(f).unwrap());
+        let mut out = Vec::new();
+        let tails = |a: &Item, b: &Item| (a.record % 5).cmp(&(b.record % 5));
+        order(items, ends(i32::min), ends(i32::max), &mut MortonSorter::default(), &mut out, tails);
+        out
+    }
+
+    #[test]
+    fn all_bits_count_however_wide_the_leaf_and_ties_go_by_bytes() {
+        let mut state = 3u64;
+        for spread in [0, 3, 12, 31] {
+            let mut items = Vec::new();
+            for record in 0..4000 {
+                let q = StoredPoint(std::array::from_fn(|_| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    (state >> 32) as u32 as i32 >> (31 - spread).min(31)
+                }));
+                items.push(Item { q, record });
+            }
+            let min: [i32; 3] = std::array::from_fn(|a| items.iter().map(|i| i.q[a]).min().unwrap());
+            let out = sorted(&items);
+            let mut seen = out.clone();
+            seen.sort_unstable();
+            assert_eq!(seen, (0..4000).collect::<Vec<u32>>());
+            for pair in out.windows(2) {
+                let [a, b] = [pair[0], pair[1]].map(|i| &items[i as usize]);
+                let at = |i: &Item| -> [u32; 3] { std::array::from_fn(|k| i.q[k].abs_diff(min[k])) };
+                let order = morton::compare(at(a), at(b)).then((a.record % 5).cmp(&(b.record % 5)));
+                assert_ne!(order, Ordering::Greater);
+            }
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! The formats that are written, a folder each; [`output`] is what they have in common.
+
+mod attributes;
+pub(crate) mod batches;
+pub(crate) mod bintree;
+mod origin;
+mod output;
+pub(crate) mod potree2;
+mod staging;
+
+pub(crate) use attributes::choose as choose_attributes;
+pub use output::Target;
+pub(crate) use output::{DiskSize, check, wants};
+pub(crate) use staging::StagedFolder;

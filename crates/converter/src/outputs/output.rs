@@ -1,0 +1,136 @@
+//! What a format is to the converter: the one extension point.
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use pointmill_format::DatasetKind;
+use serde_json::{Map, Value};
+
+use super::staging::StagedDataset;
+use crate::cloud::Cloud;
+use crate::error::ConvertError;
+use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
+use crate::report::OutputReport;
+use crate::runtime::Runtime;
+use crate::sources::Schema;
+
+/// A format to write, with its settings.
+pub(crate) trait Output: Debug + Send + Sync {
+    /// Which format.
+    fn kind(&self) -> DatasetKind;
+
+    /// Refuses settings that cannot be used, before anything is read.
+    fn check(&self, plan: &Plan) -> Result<(), ConvertError>;
+
+    /// What it needs of the cloud; `all`: the attributes of the inputs.
+    fn wants(&self, plan: &Plan, all: &Schema) -> Wants;
+
+    /// Points that it must have in memory together, at the least.
+    fn least_points(&self) -> u64 {
+        0
+    }
+
+    /// What it takes on disk; `kept`: bytes per point of the attributes that the plan keeps.
+    fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize;
+
+    /// Adds the settings that shape the dataset to those of the report.
+    fn describe_settings(&self, settings: &mut Map<String, Value>);
+
+    /// Builds and writes the dataset.
+    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError>;
+}
+
+/// A dataset to make: the settings of one of the formats. Made from [`crate::Potree2Settings`],
+/// [`crate::BintreeSettings`] or [`crate::BatchesSettings`] by `into()`.
+#[derive(Debug, Clone)]
+pub struct Target(Arc<dyn Output>);
+
+impl Target {
+    pub(super) fn new(output: impl Output + 'static) -> Self {
+        Self(Arc::new(output))
+    }
+
+    /// Its format.
+    pub fn kind(&self) -> DatasetKind {
+        self.0.kind()
+    }
+
+    pub(crate) fn output(&self) -> &dyn Output {
+        &*self.0
+    }
+}
+
+/// What an output needs of the cloud.
+#[derive(Debug, Clone)]
+pub(crate) struct Wants {
+    /// For each attribute of the inputs: is it needed?
+    pub(crate) attributes: Vec<bool>,
+    /// Names that the output understands besides those of the attributes.
+    pub(crate) other_names: &'static [&'static str],
+    /// Sums and extremes of the cells.
+    pub(crate) moments: bool,
+}
+
+impl Wants {
+    /// The attributes that the plan asks for; `is_usual`: whether the format keeps an attribute where the plan leaves it
+    /// to the format.
+    pub(super) fn chosen(plan: &Plan, all: &Schema, is_usual: bool) -> Self {
+        let is_chosen = |name: &String| match &plan.attributes {
+            AttributeChoice::Usual => is_usual,
+            AttributeChoice::All | AttributeChoice::Scene => true,
+            AttributeChoice::List(names) => names.contains(name),
+        };
+        let attributes = all.attributes.iter().map(|a| is_chosen(&a.name)).collect();
+        Self { attributes, other_names: &[], moments: false }
+    }
+
+    /// Needs one more attribute, if there is one.
+    pub(super) fn add(&mut self, attribute: Option<usize>) {
+        if let Some(i) = attribute {
+            self.attributes[i] = true;
+        }
+    }
+}
+
+/// What an output takes on disk, at most: bytes of each point, and of nodes or batches for a thousand points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DiskSize {
+    pub(crate) per_point: u64,
+    pub(crate) per_1000_points: u64,
+}
+
+/// What all outputs need together.
+///
+/// # Errors
+/// An attribute that was asked for and that no input has.
+pub(crate) fn wants(plan: &Plan, targets: &[Target], all: &Schema) -> Result<Wants, PlanError> {
+    let each: Vec<Wants> = targets.iter().map(|t| t.output().wants(plan, all)).collect();
+    if let AttributeChoice::List(names) = &plan.attributes {
+        let is_known = |n: &&String| {
+            let n = n.as_str();
+            n == "position" || all.find(n).is_some() || each.iter().any(|w| w.other_names.contains(&n))
+        };
+        if let Some(name) = names.iter().find(|n| !is_known(n)) {
+            let known = all.attributes.iter().map(|a| a.name.clone()).collect();
+            let fault = PlanFault::UnknownAttribute { name: name.clone(), known };
+            return Err(PlanError::new(Setting::Attributes, fault));
+        }
+    }
+    let attributes = (0..all.attributes.len()).map(|i| each.iter().any(|w| w.attributes[i])).collect();
+    Ok(Wants { attributes, other_names: &[], moments: each.iter().any(|w| w.moments) })
+}
+
+/// Refuses plans and targets that cannot be used, before anything is read.
+pub(crate) fn check(plan: &Plan, targets: &[Target]) -> Result<(), ConvertError> {
+    plan.check()?;
+    if targets.is_empty() {
+        return Err(PlanError::new(Setting::Outputs, PlanFault::Missing).into());
+    }
+    for (i, target) in targets.iter().enumerate() {
+        if targets[..i].iter().any(|other| other.kind() == target.kind()) {
+            return Err(PlanError::new(Setting::Outputs, PlanFault::Twice(target.kind())).into());
+        }
+        target.output().check(plan)?;
+    }
+    Ok(())
+}

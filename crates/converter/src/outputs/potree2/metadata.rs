@@ -1,0 +1,92 @@
+//! The metadata of an octree, and its part of the report.
+
+use std::collections::HashSet;
+
+use pointmill_format::potree2::{AttributeStats, Encoding as StoredEncoding, HierarchyBytes, Metadata};
+use pointmill_format::{Aabb, Attribute, AttributeType, Lattice};
+use serde_json::Map;
+
+use super::settings::{Encoding, HIERARCHY_STEP, Potree2Settings};
+use crate::cloud::{Cloud, JobPoint, Ledger};
+use crate::octree::{Octree, SPACING_BITS};
+use crate::outputs::attributes::Choice;
+use crate::outputs::origin::own_key;
+use crate::report::TreeReport;
+
+/// The metadata of the dataset.
+pub(super) fn metadata(
+    cloud: &Cloud<'_>,
+    settings: &Potree2Settings,
+    choice: &Choice,
+    ledger: &Ledger,
+    hierarchy: &HierarchyBytes,
+) -> Metadata {
+    let Cloud { stats, facts, frame, .. } = cloud;
+    let (cube, side) = (&frame.cube, frame.cube.side);
+    let offset = cube.offset(&cloud.lattice.lattice);
+    let lattice = Lattice { scale: cloud.lattice.lattice.scale, offset };
+    let stored = |q: JobPoint| std::array::from_fn(|a| q[a] - cube.min[a]);
+    let mut position = AttributeStats {
+        attribute: Attribute::new("position", AttributeType::Int32, 3),
+        min: lattice.world(stored(stats.bounds.min)).to_vec(),
+        max: lattice.world(stored(stats.bounds.max)).to_vec(),
+        histogram: None,
+    };
+    position.attribute.description = String::new();
+    let mut attributes = vec![position];
+    attributes.extend(choice.kept.iter().map(|&i| {
+        let attribute = cloud.schema().attributes[i].clone();
+        let range = &facts.ranges[i];
+        // A range must be there and finite; a column of NaN has none.
+        let finite = |v: &[f64]| v.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect::<Vec<_>>();
+        let histogram = (attribute.name == "classification" && attribute.ty == AttributeType::UInt8).then(|| {
+            let mut left = stats.classes.clone();
+            left.iter_mut().zip(&ledger.classes_dropped).for_each(|(all, dropped)| *all -= dropped);
+            left
+        });
+        AttributeStats { attribute, min: finite(&range.min), max: finite(&range.max), histogram }
+    }));
+    let mut own = own_key(cloud, &choice.dropped);
+    own.insert("sampling".into(), settings.sampling.name().into());
+    own.insert("leafCapacity".into(), settings.leaf_capacity.into());
+    Metadata {
+        name: cloud.plan.cloud_name(),
+        description: String::new(),
+        points: ledger.points(),
+        projection: facts.crs.projection.clone(),
+        first_chunk_size: hierarchy.first_chunk_size,
+        step_size: HIERARCHY_STEP,
+        depth: hierarchy.depth,
+        lattice,
+        spacing: side / f64::from(1 << SPACING_BITS),
+        cube: Aabb { min: offset, max: offset.map(|v| v + side) },
+        encoding: match settings.encoding {
+            Encoding::Default => StoredEncoding::Default,
+            Encoding::Brotli { .. } => StoredEncoding::Brotli,
+        },
+        attributes,
+        extra: Map::from_iter([("pointmill".to_owned(), own.into())]),
+    }
+}
+
+pub(super) fn tree_report(tree: &Octree) -> TreeReport {
+    let nodes = &tree.nodes;
+    let depth = nodes.iter().map(|n| usize::from(n.key.level)).max().unwrap_or(0);
+    let mut report = TreeReport {
+        nodes: nodes.len() as u64,
+        depth: depth as u32,
+        points_per_level: vec![0; depth + 1],
+        nodes_per_level: vec![0; depth + 1],
+        overfull_leaves: tree.overfull_leaves,
+        largest_leaf: 0,
+    };
+    let parents: HashSet<_> = nodes.iter().filter_map(|n| n.key.parent()).collect();
+    for n in nodes {
+        report.points_per_level[usize::from(n.key.level)] += u64::from(n.points);
+        report.nodes_per_level[usize::from(n.key.level)] += 1;
+        if !parents.contains(&n.key) {
+            report.largest_leaf = report.largest_leaf.max(u64::from(n.points));
+        }
+    }
+    report
+}

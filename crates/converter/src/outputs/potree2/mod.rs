@@ -1,0 +1,143 @@
+//! The Potree 2.0 octree: payloads behind one another in `octree.bin`, and the two files around them.
+
+mod layout;
+mod metadata;
+mod payload;
+mod settings;
+
+use pointmill_format::DatasetKind;
+use pointmill_format::potree2::{NodeEntry, encode_hierarchy};
+use serde_json::{Map, Value};
+
+pub(crate) use layout::OutputLayout;
+pub(crate) use payload::PayloadEncoder;
+pub use settings::{Encoding, Potree2Settings};
+
+use self::settings::HIERARCHY_STEP;
+use super::attributes::choose;
+use super::output::{DiskSize, Output, Target, Wants};
+use super::staging::StagedDataset;
+use crate::cloud::Cloud;
+use crate::error::{ConvertError, Unsupported};
+use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
+use crate::plan::{Plan, PlanError, PlanFault, Setting};
+use crate::report::OutputReport;
+use crate::runtime::{DiskFile, Runtime};
+use crate::sources::{POSITION_BYTES, Schema};
+
+/// Elements of an attribute that readers of the format accept.
+const MAX_ELEMENTS: usize = 16;
+
+/// Bytes of a hierarchy record.
+const NODE_BYTES: u64 = 22;
+
+impl From<Potree2Settings> for Target {
+    fn from(settings: Potree2Settings) -> Self {
+        Self::new(settings)
+    }
+}
+
+impl Output for Potree2Settings {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Potree2
+    }
+
+    fn check(&self, _: &Plan) -> Result<(), ConvertError> {
+        let refuse = |setting, fault| Err(PlanError::new(setting, fault).into());
+        if self.leaf_capacity == 0 {
+            return refuse(Setting::LeafCapacity, PlanFault::Zero);
+        }
+        match self.encoding {
+            Encoding::Brotli { quality } if quality > 11 => {
+                refuse(Setting::BrotliQuality, PlanFault::NotOneOf("0 to 11"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn wants(&self, plan: &Plan, all: &Schema) -> Wants {
+        Wants::chosen(plan, all, true)
+    }
+
+    fn least_points(&self) -> u64 {
+        u64::from(self.leaf_capacity)
+    }
+
+    fn disk_size(&self, _: &Plan, _: &Schema, kept: u64) -> DiskSize {
+        let nodes = 3000 / u64::from(self.leaf_capacity).max(1) + 1;
+        DiskSize { per_point: POSITION_BYTES as u64 + kept, per_1000_points: nodes * NODE_BYTES }
+    }
+
+    fn describe_settings(&self, settings: &mut Map<String, Value>) {
+        settings.insert("sampling".into(), self.sampling.name().into());
+        if let Sampling::Random { seed } = self.sampling {
+            settings.insert("seed".into(), seed.into());
+        }
+        let encoding = match self.encoding {
+            Encoding::Default => "default",
+            Encoding::Brotli { quality } => {
+                settings.insert("brotli-quality".into(), quality.into());
+                "brotli"
+            }
+        };
+        settings.insert("encoding".into(), encoding.into());
+        settings.insert("leaf-capacity".into(), self.leaf_capacity.into());
+    }
+
+    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let schema = cloud.schema();
+        let choice = choose(&cloud.plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges);
+        if let Some(wide) = choice.kept.iter().map(|&i| &schema.attributes[i]).find(|a| a.elements > MAX_ELEMENTS) {
+            let (kind, name, elements) = (self.kind(), wide.name.clone(), wide.elements);
+            return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());
+        }
+        let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
+        let payloads = Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding };
+        let settings = OctreeSettings { sampling: self.sampling, leaf_capacity: self.leaf_capacity };
+        let tree = octree::build(cloud, rt, settings, &payloads)?;
+        payloads.file.sync("syncing the payloads")?;
+
+        let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
+        let hierarchy = encode_hierarchy(&mut nodes, HIERARCHY_STEP);
+        let metadata = metadata::metadata(cloud, self, &choice, &tree.ledger, &hierarchy);
+        to.write("hierarchy.bin", &hierarchy.bytes)?;
+        let json = metadata.to_json();
+        to.write("metadata.json", json.as_bytes())?;
+        Ok(OutputReport {
+            points: tree.ledger.points(),
+            duplicates_dropped: tree.ledger.duplicates_dropped(),
+            attributes: cloud.names(choice.kept.iter().copied()),
+            attributes_dropped: choice.dropped,
+            bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
+            checksum: tree.ledger.unaltered().to_string(),
+            tree: metadata::tree_report(&tree),
+            ..OutputReport::default()
+        })
+    }
+}
+
+fn entry(node: &FinishedNode) -> NodeEntry {
+    let FinishedNode { key, points, byte_offset, byte_size } = *node;
+    NodeEntry { key, points, byte_offset, byte_size }
+}
+
+/// `octree.bin` while it is written.
+struct Payloads {
+    file: DiskFile,
+    layout: OutputLayout,
+    encoding: Encoding,
+}
+
+impl NodeSink for Payloads {
+    type Encoder = PayloadEncoder;
+
+    fn encoder(&self) -> PayloadEncoder {
+        PayloadEncoder::new(self.layout.clone(), self.encoding)
+    }
+
+    fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
+        self.file.write_at(bytes, offset, "writing node payloads")?;
+        self.file.start_write_back(offset, bytes.len());
+        Ok(())
+    }
+}

@@ -1,0 +1,120 @@
+//! Requests that cannot be carried out as given, as data.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use pointmill_format::DatasetKind;
+
+/// A setting of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Setting {
+    /// The scans to read.
+    Inputs,
+    /// The datasets to make.
+    Outputs,
+    /// Maximum points of an octree leaf.
+    LeafCapacity,
+    /// Quality of Brotli compression.
+    BrotliQuality,
+    /// Maximum points of a leaf of a binary tree.
+    Capacity,
+    /// Side of the cells of the coarsest level of detail.
+    LodCell,
+    /// Bits of a coordinate in batches.
+    Planes,
+    /// Coordinate step.
+    Scale,
+    /// Box of the points to keep.
+    Bounds,
+    /// Folder of temporary files.
+    TempDir,
+    /// Attributes to keep.
+    Attributes,
+    /// Coordinate reference system.
+    Crs,
+}
+
+impl Setting {
+    /// The name in words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Inputs => "inputs",
+            Self::Outputs => "outputs",
+            Self::LeafCapacity => "leaf capacity",
+            Self::BrotliQuality => "Brotli quality",
+            Self::Capacity => "capacity",
+            Self::LodCell => "cell of the coarsest level of detail",
+            Self::Planes => "planes",
+            Self::Scale => "scale",
+            Self::Bounds => "bounds",
+            Self::TempDir => "folder of temporary files",
+            Self::Attributes => "attributes",
+            Self::Crs => "coordinate reference system",
+        }
+    }
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A setting, and what is wrong with its value.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{setting}: {fault}")]
+#[non_exhaustive]
+pub struct PlanError {
+    /// Which setting.
+    pub setting: Setting,
+    /// What is wrong with it.
+    pub fault: PlanFault,
+}
+
+impl PlanError {
+    pub(crate) fn new(setting: Setting, fault: PlanFault) -> Self {
+        Self { setting, fault }
+    }
+}
+
+/// What is wrong with the value of a setting.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanFault {
+    /// Nothing was named.
+    #[error("name at least one")]
+    Missing,
+    /// A format is named more than once.
+    #[error("{0} is named twice")]
+    Twice(DatasetKind),
+    /// A count of 0.
+    #[error("must be at least 1")]
+    Zero,
+    /// A length that is not positive and finite.
+    #[error("must be a number above 0")]
+    NotPositive,
+    /// A value that is none of the choices.
+    #[error("must be {0}")]
+    NotOneOf(&'static str),
+    /// A box without content.
+    #[error("the minimum is above the maximum")]
+    EmptyBox,
+    /// A path that is not a folder.
+    #[error("{} is not a folder", .0.display())]
+    NotAFolder(PathBuf),
+    /// An attribute that no input has.
+    #[error("no input has \"{name}\"; the inputs have: {}", known.join(", "))]
+    UnknownAttribute {
+        /// The name that was asked for.
+        name: String,
+        /// The names that the inputs have.
+        known: Vec<String>,
+    },
+    /// Text that is not a coordinate reference system.
+    #[error("\"{0}\" is not EPSG:n, a +proj=… definition or WKT")]
+    NotACrs(String),
+    /// A cell that the format of batches cannot have with this cloud.
+    #[error("{0}")]
+    Cell(String),
+}

@@ -1,0 +1,186 @@
+//! What was asked for: every setting resolved, nothing left to guess.
+
+mod error;
+
+use std::path::PathBuf;
+
+use pointmill_format::{Aabb, OpenOptions};
+
+pub use error::{PlanError, PlanFault, Setting};
+
+/// What every output shares: inputs, filter, lattice, policies, resources. [`Plan::new`] gives the defaults of the
+/// command line. The datasets to make are [`crate::Target`]s beside it.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Scans to read, files only (folders and globs are already expanded), any order.
+    pub inputs: Vec<PathBuf>,
+    /// What text and E57 files do not say of themselves.
+    pub open: OpenOptions,
+    /// The folder to make.
+    pub output: PathBuf,
+    /// Name of the cloud in the metadata.
+    pub name: String,
+    /// Which attributes go in.
+    pub attributes: AttributeChoice,
+    /// Coordinate step.
+    pub scale: ScaleChoice,
+    /// Ceiling for the resident set of the whole process, bytes.
+    pub memory_bytes: u64,
+    /// Worker threads, ≥ 1.
+    pub threads: usize,
+    /// Maximum points of a unit of work; `None`: what the memory allows. Changes nothing in the output.
+    pub task_points: Option<u64>,
+    /// Where temporary files go; `None`: beside the output.
+    pub temp_dir: Option<PathBuf>,
+    /// Which points go in.
+    pub filter: Filter,
+    /// Points whose position and attributes all repeat.
+    pub duplicates: Duplicates,
+    /// Points without a valid position.
+    pub invalid: OnFault,
+    /// Inputs (or parts of inputs) that cannot be decoded.
+    pub unreadable: OnFault,
+    /// Meaning of 16-bit colour fields.
+    pub rgb_depth: RgbDepth,
+    /// Overrides the coordinate reference system of the inputs: a proj4 string, `EPSG:n` or WKT.
+    pub crs: Option<String>,
+    /// Replace an existing output.
+    pub overwrite: bool,
+}
+
+/// Which attributes go in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum AttributeChoice {
+    /// What the format is made for: all for an octree, the class for a binary tree, the colour for batches.
+    Usual,
+    /// All that any input has.
+    All,
+    /// All but those that have one value everywhere; the report names what is left out.
+    Scene,
+    /// These, in this order; `position` is implied.
+    List(Vec<String>),
+}
+
+/// Coordinate step of the output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ScaleChoice {
+    /// The sources' own.
+    Auto,
+    /// This step on all axes, world units, > 0.
+    Fixed(f64),
+}
+
+/// Which points go in.
+#[derive(Debug, Clone, Default)]
+pub struct Filter {
+    /// Keep what lies inside or on the border, world coordinates.
+    pub bounds: Option<Aabb>,
+    /// Keep these classes; `None`: all.
+    pub classes: Option<Vec<u8>>,
+    /// Keep points whose index in their file is a multiple of this; 0 and 1: all.
+    pub every: u64,
+}
+
+/// What to do with points whose position and attributes all repeat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Duplicates {
+    /// Keep all.
+    Keep,
+    /// Keep one.
+    Drop,
+}
+
+impl Duplicates {
+    /// The word in reports and datasets.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Keep => "keep",
+            Self::Drop => "drop",
+        }
+    }
+}
+
+/// What to do when something is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnFault {
+    /// Skip it and count it in the report.
+    Skip,
+    /// End the run.
+    Fail,
+}
+
+/// Meaning of 16-bit colour fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RgbDepth {
+    /// Eight bits for a file whose values all are at most 255, else sixteen; found by reading every point.
+    Auto,
+    /// Values are 0–255; they are stored times 257.
+    Eight,
+    /// Values are 0–65535; they are stored as they are.
+    Sixteen,
+}
+
+impl RgbDepth {
+    /// The word in reports and datasets.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Eight => "8",
+            Self::Sixteen => "16",
+        }
+    }
+}
+
+impl Plan {
+    /// The defaults of the command line.
+    pub fn new(inputs: Vec<PathBuf>, output: PathBuf) -> Self {
+        Self {
+            inputs,
+            open: OpenOptions::default(),
+            output,
+            name: String::new(),
+            attributes: AttributeChoice::Usual,
+            scale: ScaleChoice::Auto,
+            memory_bytes: crate::memory::default_ceiling_bytes(),
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            task_points: None,
+            temp_dir: None,
+            filter: Filter::default(),
+            duplicates: Duplicates::Keep,
+            invalid: OnFault::Skip,
+            unreadable: OnFault::Fail,
+            rgb_depth: RgbDepth::Auto,
+            crs: None,
+            overwrite: false,
+        }
+    }
+}
+
+impl Plan {
+    /// Refuses settings that cannot be used.
+    pub(crate) fn check(&self) -> Result<(), PlanError> {
+        let refuse = |setting, fault| Err(PlanError::new(setting, fault));
+        if self.inputs.is_empty() {
+            return refuse(Setting::Inputs, PlanFault::Missing);
+        }
+        if matches!(self.scale, ScaleChoice::Fixed(s) if !(s.is_finite() && s > 0.0)) {
+            return refuse(Setting::Scale, PlanFault::NotPositive);
+        }
+        if self.filter.bounds.is_some_and(|b| b.is_empty()) {
+            return refuse(Setting::Bounds, PlanFault::EmptyBox);
+        }
+        match &self.temp_dir {
+            Some(dir) if !dir.is_dir() => refuse(Setting::TempDir, PlanFault::NotAFolder(dir.clone())),
+            _ => Ok(()),
+        }
+    }
+
+    /// The name of the cloud: as given, else that of the output.
+    pub(crate) fn cloud_name(&self) -> String {
+        if !self.name.is_empty() {
+            return self.name.clone();
+        }
+        let stem = self.output.file_name().map(|n| n.to_string_lossy().into_owned());
+        stem.filter(|s| !s.is_empty()).unwrap_or_else(|| "cloud".into())
+    }
+}

@@ -1,0 +1,141 @@
+//! Puts the account of a run together.
+
+use pointmill_format::{Aabb, DatasetKind};
+use serde_json::{Map, Value, json};
+
+use super::types::{CoordinateChange, GridReport, InputReport, OutputReport, PhaseReport, PointsReport, Report};
+use crate::cloud::{Cloud, Cube, JobLattice};
+use crate::error::ConvertError;
+use crate::memory;
+use crate::plan::{AttributeChoice, Filter, Plan};
+use crate::runtime::{Phase, PhaseTime};
+use crate::sources::{Sources, resolve_scan};
+
+/// What a run has to show for itself, beside the cloud.
+pub(crate) struct Account {
+    pub(crate) settings: Map<String, Value>,
+    pub(crate) outputs: Vec<OutputReport>,
+    pub(crate) phases: Vec<PhaseTime>,
+    /// Wall seconds in all.
+    pub(crate) seconds: f64,
+}
+
+/// The account of a run.
+///
+/// # Errors
+/// Points that do not add up.
+pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
+    let stats = &cloud.stats;
+    let count = stats.points.max(1) as f64;
+    let Account { settings, outputs, phases, seconds } = account;
+    let of_outputs = outputs.iter().flat_map(|o| &o.warnings);
+    Ok(Report {
+        version: env!("CARGO_PKG_VERSION").into(),
+        options: settings,
+        inputs: input_reports(cloud.sources, Some(cloud)),
+        grid: grid_report(&cloud.lattice, cloud.is_lossless, &cloud.frame.cube),
+        points: points_report(cloud, &outputs)?,
+        coordinate_change: CoordinateChange {
+            max: stats.change.max,
+            rms: stats.change.sum_of_squares.map(|s| (s / count).sqrt()),
+        },
+        checksum_in: stats.checksum.to_string(),
+        temp_bytes: cloud.store.spilled_bytes(),
+        output_bytes: outputs.iter().map(|o| o.bytes).sum(),
+        warnings: cloud.warnings.iter().chain(of_outputs).cloned().collect(),
+        outputs,
+        phases: phases.iter().map(|p| phase_report(p, cloud.points())).collect(),
+        seconds,
+        peak_memory_bytes: memory::peak_resident_bytes(),
+    })
+}
+
+/// Counts, and the proof that they add up.
+fn points_report(cloud: &Cloud<'_>, outputs: &[OutputReport]) -> Result<PointsReport, ConvertError> {
+    let stats = &cloud.stats;
+    let points = PointsReport {
+        read: stats.sources.iter().map(|s| s.read).sum(),
+        kept: stats.points,
+        outside_bounds: stats.outside_bounds,
+        other_class: stats.other_class,
+        thinned: stats.thinned,
+        invalid: stats.invalid,
+        unreadable: stats.unreadable.saturating_add(cloud.sources.points_missing),
+    };
+    let filtered = points.outside_bounds + points.other_class + points.thinned + points.invalid;
+    let is_whole = |o: &OutputReport| o.points + o.duplicates_dropped == points.kept;
+    if points.read == points.kept + filtered && outputs.iter().all(is_whole) {
+        return Ok(points);
+    }
+    Err(ConvertError::Internal(format!("the points do not add up: {points:?}")))
+}
+
+fn phase_report(time: &PhaseTime, points: u64) -> PhaseReport {
+    let points = if matches!(time.phase, Phase::Read | Phase::Build) { points } else { 0 };
+    let points_per_second = if time.seconds > 0.0 { points as f64 / time.seconds } else { 0.0 };
+    PhaseReport { name: time.phase.name().into(), seconds: time.seconds, points, points_per_second }
+}
+
+/// The inputs as the headers (and, once they were read, the points) describe them.
+pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec<InputReport> {
+    let flat = |b: Aabb| [b.min[0], b.min[1], b.min[2], b.max[0], b.max[1], b.max[2]];
+    let report = |(i, source): (usize, &crate::sources::Source)| {
+        let info = source.scan.info();
+        let seen = cloud.map(|c| &c.stats.sources[i]);
+        let coloured = cloud.filter(|c| c.intake.sources[i].has(c.schema().rgb()));
+        InputReport {
+            path: info.path.clone(),
+            format: info.format.clone(),
+            points_declared: info.points_declared,
+            points_read: seen.map_or(0, |s| s.read),
+            bounds_declared: info.bounds_declared.map(flat),
+            bounds_measured: seen.map(|s| s.bounds).filter(|b| !b.is_empty()).map(flat),
+            crs: resolve_scan(&info.crs).label,
+            rgb_depth: coloured.map(|c| if c.facts.widen_rgb[i].is_some() { 8 } else { 16 }),
+        }
+    };
+    sources.all.iter().enumerate().map(report).collect()
+}
+
+/// The lattice and the root cube.
+pub(crate) fn grid_report(lattice: &JobLattice, is_lossless: bool, cube: &Cube) -> GridReport {
+    let mut why = lattice.reason.to_string();
+    if !is_lossless {
+        why.push_str("; coordinates that are not on it are rounded");
+    }
+    let offset = cube.offset(&lattice.lattice);
+    GridReport { scale: lattice.lattice.scale, offset, cube_side: cube.side, why }
+}
+
+/// What shaped the datasets, as the report has it: what all outputs share. Each output adds its own settings.
+pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value> {
+    let mut settings = filter_settings(&plan.filter);
+    settings.insert("to".into(), kinds.iter().map(|k| k.name()).collect::<Vec<_>>().into());
+    let attributes = match &plan.attributes {
+        AttributeChoice::Usual => json!("usual"),
+        AttributeChoice::All => json!("all"),
+        AttributeChoice::Scene => json!("scene"),
+        AttributeChoice::List(names) => json!(names),
+    };
+    settings.insert("attributes".into(), attributes);
+    settings.insert("memory".into(), plan.memory_bytes.into());
+    settings.insert("threads".into(), plan.threads.into());
+    settings.insert("duplicates".into(), plan.duplicates.name().into());
+    settings.insert("rgb-depth".into(), plan.rgb_depth.name().into());
+    settings
+}
+
+/// The filter, as reports and datasets have it; nothing if it keeps everything.
+pub(crate) fn filter_settings(filter: &Filter) -> Map<String, Value> {
+    let mut settings = Map::new();
+    if let Some(b) = &filter.bounds {
+        settings.insert("bounds".into(), json!([b.min[0], b.min[1], b.min[2], b.max[0], b.max[1], b.max[2]]));
+    }
+    if let Some(classes) = &filter.classes {
+        settings.insert("classes".into(), json!(classes));
+    }
+    if filter.every > 1 {
+        settings.insert("every".into(), filter.every.into());
+    }
+    settings
+}

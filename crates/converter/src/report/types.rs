@@ -1,0 +1,270 @@
+//! The account of a run as data. Serialises to the JSON of `report.json`.
+
+use std::path::{Path, PathBuf};
+
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+use serde_json::{Map, Value};
+
+use crate::warning::Warning;
+
+/// What a run did.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct Report {
+    /// Version of pointmill.
+    pub version: String,
+    /// The settings that shaped the output.
+    pub options: Map<String, Value>,
+    /// One entry per input, in order of path.
+    pub inputs: Vec<InputReport>,
+    /// The lattice of the output.
+    pub grid: GridReport,
+    /// Every point accounted for.
+    pub points: PointsReport,
+    /// Largest and RMS change of a coordinate, per axis, world units.
+    pub coordinate_change: CoordinateChange,
+    /// One entry per dataset written, in the order requested.
+    pub outputs: Vec<OutputReport>,
+    /// Order-independent checksum of the points that passed the filter; that of every output equals it, or the run fails.
+    pub checksum_in: String,
+    /// Wall seconds and rates by phase.
+    pub phases: Vec<PhaseReport>,
+    /// Wall seconds in all.
+    pub seconds: f64,
+    /// Highest resident set of the process, bytes.
+    pub peak_memory_bytes: Option<u64>,
+    /// Bytes written to temporary files.
+    pub temp_bytes: u64,
+    /// Bytes of the datasets.
+    pub output_bytes: u64,
+    /// What the user should know, an object with `kind` and `text` each.
+    pub warnings: Vec<Warning>,
+}
+
+/// One dataset.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct OutputReport {
+    /// `potree2`, `bintree`, `batches`.
+    pub format: String,
+    /// Folder below the output; empty if there is one dataset.
+    pub folder: String,
+    /// Points in it; with `duplicates_dropped` the points that passed the filter.
+    pub points: u64,
+    /// Points that were dropped because all of their values repeat.
+    pub duplicates_dropped: u64,
+    /// Attributes that were kept.
+    pub attributes: Vec<String>,
+    /// Attributes that were left out, and why.
+    pub attributes_dropped: Vec<DroppedAttribute>,
+    /// Bytes of its files.
+    pub bytes: u64,
+    /// Wall seconds from the gathered points to the synced files.
+    pub seconds: f64,
+    /// Order-independent checksum of the points written; equals `checksum_in` of the report.
+    pub checksum: String,
+    /// Nodes of a tree.
+    pub tree: TreeReport,
+    /// What is particular to the format.
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    pub details: Map<String, Value>,
+    /// What the user should know of it; listed among the warnings of the report.
+    #[serde(skip)]
+    pub warnings: Vec<Warning>,
+}
+
+/// One input.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct InputReport {
+    /// The file; serialised as text, with U+FFFD for what is no Unicode in its name.
+    #[serde(serialize_with = "lossy")]
+    pub path: PathBuf,
+    /// Its kind, for people.
+    pub format: String,
+    /// Claimed by the header.
+    pub points_declared: u64,
+    /// Decoded.
+    pub points_read: u64,
+    /// Claimed by the header: min x y z, max x y z.
+    pub bounds_declared: Option<[f64; 6]>,
+    /// Of the points decoded, before any filter.
+    pub bounds_measured: Option<[f64; 6]>,
+    /// As found, shortened for people ("EPSG:2994", "WKT: NAD83 / …") or empty.
+    pub crs: String,
+    /// 8 or 16 where the file has colour.
+    pub rgb_depth: Option<u8>,
+}
+
+/// File names need not be Unicode, JSON must be.
+fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
+}
+
+/// The lattice and the cube.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct GridReport {
+    /// Coordinate step per axis.
+    pub scale: [f64; 3],
+    /// World coordinate of integer 0.
+    pub offset: [f64; 3],
+    /// Side of the root cube, world units.
+    pub cube_side: f64,
+    /// Why this lattice.
+    pub why: String,
+}
+
+/// Every point accounted for: `read = kept + outside_bounds + other_class + thinned + invalid`, and for every output
+/// `kept = points + duplicates_dropped`. All are counted, none is a difference; the run fails where a sum is wrong.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct PointsReport {
+    /// Decoded from the inputs.
+    pub read: u64,
+    /// Passed the filter.
+    pub kept: u64,
+    /// Outside the bounds.
+    pub outside_bounds: u64,
+    /// Of other classes than those to keep.
+    pub other_class: u64,
+    /// Removed by thinning.
+    pub thinned: u64,
+    /// Without a valid position.
+    pub invalid: u64,
+    /// Declared, but in parts of inputs that could not be decoded.
+    pub unreadable: u64,
+}
+
+/// Coordinate change by moving to the output lattice.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct CoordinateChange {
+    /// Largest, world units.
+    pub max: [f64; 3],
+    /// Root of the mean square, world units.
+    pub rms: [f64; 3],
+}
+
+/// An attribute that is not in the dataset. Serialises to its name, why as text, and the constant if there is one.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct DroppedAttribute {
+    /// Its name.
+    pub name: String,
+    /// Why.
+    pub why: DropReason,
+}
+
+/// Why an attribute is not in a dataset.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum DropReason {
+    /// All points agree on these values, one per element.
+    Constant(Vec<f64>),
+    /// The plan lists the attributes to keep, and this is none of them.
+    NotRequested,
+    /// The format does not store it unless it is requested.
+    NotUsual,
+    /// Batches show it as grey of 8 bits.
+    ShownAsGrey,
+}
+
+impl DropReason {
+    /// What all points agree on, by element, if that is why.
+    pub fn constant(&self) -> Option<&[f64]> {
+        match self {
+            Self::Constant(values) => Some(values),
+            _ => None,
+        }
+    }
+}
+
+impl std::fmt::Display for DropReason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Constant(values) => {
+                let texts: Vec<String> = values.iter().map(f64::to_string).collect();
+                write!(f, "constant {}", texts.join(" "))
+            }
+            Self::NotRequested => f.write_str("not requested"),
+            Self::NotUsual => f.write_str("not part of the usual record"),
+            Self::ShownAsGrey => f.write_str("shown as grey of 8 bits"),
+        }
+    }
+}
+
+impl Serialize for DroppedAttribute {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let constant = self.why.constant();
+        let mut object = serializer.serialize_struct("DroppedAttribute", 2 + usize::from(constant.is_some()))?;
+        object.serialize_field("name", &self.name)?;
+        object.serialize_field("why", &self.why.to_string())?;
+        match constant {
+            Some(values) => object.serialize_field("constant", values)?,
+            None => object.skip_field("constant")?,
+        }
+        object.end()
+    }
+}
+
+/// The tree.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct TreeReport {
+    /// Nodes in all.
+    pub nodes: u64,
+    /// Deepest level, root = 0.
+    pub depth: u32,
+    /// Points by level.
+    pub points_per_level: Vec<u64>,
+    /// Nodes by level.
+    pub nodes_per_level: Vec<u64>,
+    /// Points of the fullest leaf.
+    pub largest_leaf: u64,
+    /// Leaves above the capacity, because their points share one position.
+    pub overfull_leaves: u64,
+}
+
+/// One phase.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct PhaseReport {
+    /// `probe`, `read`, `build`, `finish`.
+    pub name: String,
+    /// Wall seconds.
+    pub seconds: f64,
+    /// Points handled.
+    pub points: u64,
+    /// Points per wall second.
+    pub points_per_second: f64,
+}
+
+/// What a run would do, from the headers alone.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct Estimate {
+    /// Input files.
+    pub inputs: Vec<InputReport>,
+    /// Points declared in all.
+    pub points: u64,
+    /// min x y z, max x y z as declared.
+    pub bounds: Option<[f64; 6]>,
+    /// Coordinate reference system, as it would stand in `projection`, or what was found.
+    pub crs: String,
+    /// The lattice.
+    pub grid: GridReport,
+    /// Attributes of the output.
+    pub attributes: Vec<String>,
+    /// Bytes per point of the output (before compression).
+    pub bytes_per_point: u64,
+    /// Estimated highest resident set, bytes.
+    pub memory_bytes: u64,
+    /// Estimated temporary bytes; 0 if all fits in memory.
+    pub temp_bytes: u64,
+    /// Estimated bytes of the dataset (an upper bound under BROTLI).
+    pub output_bytes: u64,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+}

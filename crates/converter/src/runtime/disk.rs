@@ -1,0 +1,184 @@
+//! Files of a run: every write, sync and rename passes through here, so that a test can make any of them fail.
+
+use std::fmt::Debug;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use pointmill_format::bytes;
+
+use super::os_hints;
+use crate::error::ConvertError;
+
+/// Something that is about to be done to the disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DiskOperation {
+    /// Make a file or a folder.
+    Create,
+    /// Write bytes into a file, or cut it.
+    Write,
+    /// Wait until a file or a folder is safe.
+    Sync,
+    /// Give a file or a folder another name.
+    Rename,
+}
+
+/// The disk that a run writes to. [`SystemDisk`] permits everything; a test's disk fails when it likes.
+pub trait Disk: Debug + Send + Sync {
+    /// Called before each operation, from any thread; an error takes the place of the operation.
+    ///
+    /// # Errors
+    /// What the operation fails with.
+    fn permit(&self, operation: DiskOperation) -> io::Result<()>;
+}
+
+/// The file system as it is.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SystemDisk;
+
+impl Disk for SystemDisk {
+    fn permit(&self, _: DiskOperation) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A file that is open for writing and reading at positions, from any thread; errors name it.
+#[derive(Debug)]
+pub(crate) struct DiskFile {
+    file: File,
+    path: PathBuf,
+    disk: Arc<dyn Disk>,
+}
+
+impl DiskFile {
+    /// Makes the file `path`.
+    pub(crate) fn create(path: &Path, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+        let create = || {
+            disk.permit(DiskOperation::Create)?;
+            File::options().read(true).write(true).create(true).truncate(true).open(path)
+        };
+        let file = create().map_err(|e| ConvertError::io(path, "making the file", e))?;
+        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk) })
+    }
+
+    /// Writes all of `bytes` at `offset`; `doing` is for the error ("writing a leaf").
+    pub(crate) fn write_at(&self, bytes: &[u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
+        self.try_write_at(bytes, offset).map_err(|e| ConvertError::io(&self.path, doing, e))
+    }
+
+    fn try_write_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
+        self.disk.permit(DiskOperation::Write)?;
+        bytes::write_all_at(&self.file, bytes, offset)
+    }
+
+    /// Fills `buf` from `offset`.
+    pub(crate) fn read_at(&self, buf: &mut [u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
+        bytes::read_exact_at(&self.file, buf, offset).map_err(|e| ConvertError::io(&self.path, doing, e))
+    }
+
+    /// Cuts or extends the file.
+    pub(crate) fn set_len(&self, bytes: u64, doing: &'static str) -> Result<(), ConvertError> {
+        let cut = || {
+            self.disk.permit(DiskOperation::Write)?;
+            self.file.set_len(bytes)
+        };
+        cut().map_err(|e| ConvertError::io(&self.path, doing, e))
+    }
+
+    /// Waits until the file is safe.
+    pub(crate) fn sync(&self, doing: &'static str) -> Result<(), ConvertError> {
+        let sync = || {
+            self.disk.permit(DiskOperation::Sync)?;
+            self.file.sync_all()
+        };
+        sync().map_err(|e| ConvertError::io(&self.path, doing, e))
+    }
+
+    /// The error of a writer on top of this file.
+    pub(crate) fn failed(&self, doing: &'static str, error: io::Error) -> ConvertError {
+        ConvertError::io(&self.path, doing, error)
+    }
+
+    /// Asks the system to begin writing a range to the disk, without waiting.
+    pub(crate) fn start_write_back(&self, offset: u64, len: usize) {
+        os_hints::start_write_back(&self.file, offset, len);
+    }
+}
+
+/// Where temporary files are made.
+#[derive(Debug, Clone)]
+pub(crate) struct TempFiles {
+    folder: PathBuf,
+    disk: Arc<dyn Disk>,
+}
+
+impl TempFiles {
+    pub(crate) fn new(folder: PathBuf, disk: Arc<dyn Disk>) -> Self {
+        Self { folder, disk }
+    }
+
+    /// A new file without a name: nothing is left behind however the run ends. Errors name the folder.
+    pub(crate) fn make(&self) -> Result<DiskFile, ConvertError> {
+        let make = || {
+            self.disk.permit(DiskOperation::Create)?;
+            tempfile::tempfile_in(&self.folder)
+        };
+        let file = make().map_err(|e| ConvertError::io(&self.folder, "making a temporary file", e))?;
+        Ok(DiskFile { file, path: self.folder.clone(), disk: Arc::clone(&self.disk) })
+    }
+}
+
+/// A [`DiskFile`] written from front to back.
+pub(crate) struct Sequential<'a> {
+    file: &'a DiskFile,
+    at: u64,
+}
+
+impl<'a> Sequential<'a> {
+    pub(crate) fn new(file: &'a DiskFile) -> Self {
+        Self { file, at: 0 }
+    }
+
+    /// Bytes written so far.
+    pub(crate) fn len(&self) -> u64 {
+        self.at
+    }
+}
+
+impl io::Write for Sequential<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.try_write_at(bytes, self.at)?;
+        self.at += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Waits until the names in a folder are safe.
+pub(crate) fn sync_folder(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
+    disk.permit(DiskOperation::Sync)?;
+    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+/// Waits until a file that is closed is safe.
+pub(crate) fn sync_path(disk: &dyn Disk, path: &Path) -> io::Result<()> {
+    disk.permit(DiskOperation::Sync)?;
+    File::open(path)?.sync_all()
+}
+
+/// Makes a folder in one that exists.
+pub(crate) fn create_folder(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
+    disk.permit(DiskOperation::Create)?;
+    fs::create_dir(folder)
+}
+
+/// Gives a folder another name.
+pub(crate) fn rename(disk: &dyn Disk, from: &Path, to: &Path) -> io::Result<()> {
+    disk.permit(DiskOperation::Rename)?;
+    fs::rename(from, to)
+}

@@ -1,0 +1,48 @@
+//! How a run tells what it is doing, and how it is told to stop.
+
+use crate::warning::Warning;
+
+/// The phases of a run, in order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Headers of all inputs.
+    Probe,
+    /// Decoding every point once; the unit is points.
+    Read,
+    /// Building and writing nodes; the unit is points.
+    Build,
+    /// Hierarchy, metadata, syncing and renaming; no unit.
+    Finish,
+}
+
+impl Phase {
+    /// The word shown to people and written to reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Probe => "probe",
+            Self::Read => "read",
+            Self::Build => "build",
+            Self::Finish => "finish",
+        }
+    }
+}
+
+/// Receives what happens; called from worker threads, so implementations are quick and thread-safe.
+pub trait Events: Sync {
+    /// A phase begins; `total` is its size in points (0: unknown).
+    fn phase(&self, _phase: Phase, _total: u64) {}
+    /// `points` more are done in the current phase.
+    fn advance(&self, _points: u64) {}
+    /// Something the user should know.
+    fn warning(&self, _warning: &Warning) {}
+    /// True if the run must end; asked often.
+    fn stop_requested(&self) -> bool {
+        false
+    }
+}
+
+/// Says nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Events for Silent {}

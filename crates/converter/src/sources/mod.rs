@@ -1,0 +1,106 @@
+//! What the headers say, put together: open scans and the union of their attributes. Nothing changes it later.
+
+mod crs;
+mod extent;
+mod schema;
+
+use pointmill_format::{Aabb, ErrorKind, ReadError, Scan};
+
+pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
+pub(crate) use extent::{Extent, far_out, intersection};
+pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
+
+use crate::error::{ConvertError, InputFault};
+use crate::plan::{OnFault, Plan};
+use crate::runtime::Events;
+use crate::warning::Warning;
+
+/// A scan, and where its columns are among all attributes.
+pub(crate) struct Source {
+    pub(crate) scan: Box<dyn Scan>,
+    /// Where each of its columns is in [`Sources::attributes`].
+    pub(crate) columns: Vec<usize>,
+    /// Where its points are, as far as is known before they are read.
+    pub(crate) extent: Option<Extent>,
+}
+
+/// Everything known before the first point is decoded.
+pub(crate) struct Sources {
+    /// In order of path.
+    pub(crate) all: Vec<Source>,
+    /// The union of the attributes of all scans.
+    pub(crate) attributes: Schema,
+    /// Points in the pieces of all scans.
+    pub(crate) points_declared: u64,
+    /// Points declared by headers but not there.
+    pub(crate) points_missing: u64,
+    pub(crate) warnings: Vec<Warning>,
+}
+
+impl Sources {
+    /// Opens all inputs of the plan, in order of path.
+    pub(crate) fn open(plan: &Plan, events: &dyn Events) -> Result<Self, ConvertError> {
+        let mut paths = plan.inputs.clone();
+        paths.sort();
+        paths.dedup();
+        let mut warnings = Vec::new();
+        let mut scans: Vec<Box<dyn Scan>> = Vec::new();
+        let mut points_missing = 0u64;
+        for path in &paths {
+            let opened = pointmill_format::open_scan(path, &plan.open);
+            match opened.and_then(|scan| Ok((missing_points(&*scan, plan.unreadable)?, scan))) {
+                Ok((missing, scan)) => {
+                    let noticed = scan.info().warnings.iter();
+                    warnings.extend(noticed.map(|w| Warning::Scan { path: path.clone(), what: w.to_string() }));
+                    points_missing = points_missing.saturating_add(missing);
+                    scans.push(scan);
+                }
+                Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind(), ErrorKind::Unsupported) => {
+                    warnings.push(Warning::InputSkipped { error: error.to_string() });
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        if scans.is_empty() {
+            return Err(InputFault::NoneReadable.into());
+        }
+        warnings.iter().for_each(|w| events.warning(w));
+        Ok(Self::combine(scans, points_missing, warnings))
+    }
+
+    fn combine(scans: Vec<Box<dyn Scan>>, points_missing: u64, warnings: Vec<Warning>) -> Self {
+        let infos: Vec<_> = scans.iter().map(|s| s.info()).collect();
+        let (attributes, columns) = Schema::union(&infos);
+        let points_declared = scans.iter().flat_map(|s| s.pieces()).map(|p| p.points).sum();
+        let sources = scans.into_iter().zip(columns).map(|(scan, columns)| {
+            let extent = Extent::of(&*scan);
+            Source { scan, columns, extent }
+        });
+        Self { all: sources.collect(), attributes, points_declared, points_missing, warnings }
+    }
+
+    /// What the headers claim (or a sample shows) of where the points are, cut by the filter; a hint.
+    pub(crate) fn bounds_hint(&self, cut: Option<&Aabb>) -> Option<Aabb> {
+        let extents = self.all.iter().filter_map(|s| s.extent.as_ref());
+        let all = extents.fold(Aabb::EMPTY, |all, e| all.union(&e.bounds));
+        let hint = match cut {
+            Some(cut) if !all.is_empty() => intersection(&all, cut),
+            _ => all,
+        };
+        (!hint.is_empty()).then_some(hint)
+    }
+}
+
+/// Points that the header declares and the file does not hold; an error if the policy says so.
+fn missing_points(scan: &dyn Scan, policy: OnFault) -> Result<u64, ReadError> {
+    let info = scan.info();
+    let found: u64 = scan.pieces().iter().map(|p| p.points).sum();
+    let missing = info.points_declared.saturating_sub(found);
+    if missing > 0 && policy == OnFault::Fail {
+        let fault = pointmill_format::Fault::PointsMissing { declared: info.points_declared, found };
+        return Err(
+            ReadError::broken(&info.path, info.file_bytes, fault).advise(pointmill_format::Advice::SkipUnreadable)
+        );
+    }
+    Ok(missing)
+}

@@ -1,0 +1,294 @@
+//! What the user should know of a run that goes on, as data.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use pointmill_format::Aabb;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+
+use crate::advice::Advice;
+
+/// What the user should know of a run that goes on.
+///
+/// `Display` gives one line with [`Self::advice`] in words. Serialises to an object with `kind` and `text`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A reader noticed something odd in a scan that did not stop it.
+    Scan {
+        /// The scan.
+        path: PathBuf,
+        /// What was odd.
+        what: String,
+    },
+    /// An input that cannot be read was skipped.
+    InputSkipped {
+        /// Why, with path and byte.
+        error: String,
+    },
+    /// Points that cannot be decoded were skipped.
+    PointsSkipped {
+        /// How many, by the declared counts.
+        points: u64,
+        /// Why, with path and byte.
+        error: String,
+    },
+    /// The declared bounds, or the coordinate step chosen from them, do not fit the points: they are read again.
+    ReadAgain,
+    /// The declared bounds made the coordinate step too coarse: the points are read again.
+    StepTooCoarse {
+        /// How many times too coarse.
+        factor: f64,
+    },
+    /// The extent asks for a coarser coordinate step.
+    CoarserStep {
+        /// The step per axis, world units.
+        scale: [f64; 3],
+        /// Why.
+        reason: String,
+    },
+    /// A few points are far from all others.
+    Outliers {
+        /// How many.
+        points: u64,
+        /// The box of all others, whole world units.
+        others: Aabb,
+        /// Longest side of the cloud over that of `others`.
+        factor: f64,
+        /// The coordinate step would be finer without them.
+        holds_back_step: bool,
+    },
+    /// 64-bit integers were rounded to doubles.
+    IntegersRounded {
+        /// Number of values.
+        values: u64,
+    },
+    /// Inputs with 8-bit colour are mixed with inputs with 16-bit colour.
+    MixedRgbDepth {
+        /// Inputs taken as 8 bits deep.
+        eight_bit: usize,
+        /// Inputs with colour.
+        coloured: usize,
+        /// The first of the former.
+        first: PathBuf,
+    },
+    /// The coordinate reference system could not be resolved in full.
+    Crs(CrsNote),
+    /// The inputs have different coordinate reference systems.
+    DifferentCrs {
+        /// What each of them says.
+        labels: Vec<String>,
+    },
+    /// A binary tree with one file per leaf has very many files.
+    ManyFiles {
+        /// Number of leaves.
+        leaves: usize,
+    },
+    /// Batches: 16-bit colours are stored in 8 bits.
+    ColoursNarrowed,
+    /// Batches: some inputs have no colour and are black.
+    InputsWithoutColour {
+        /// How many.
+        without: usize,
+        /// Of how many inputs.
+        inputs: usize,
+    },
+    /// Batches: no input has colour; grey shows the intensity.
+    GreyIntensity {
+        /// The intensity shown as black.
+        least: f64,
+        /// The intensity shown as white.
+        greatest: f64,
+    },
+    /// Batches: no input has colour or intensity.
+    NoColour,
+}
+
+/// What is odd about a coordinate reference system.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CrsNote {
+    /// The WKT describes no horizontal system.
+    NoSystem,
+    /// The WKT carries no EPSG code.
+    NoCode {
+        /// Name of the system.
+        name: String,
+    },
+    /// The table of proj4 definitions lacks the code.
+    NotInTable {
+        /// EPSG code.
+        code: u32,
+    },
+    /// Viewers cannot use the proj4 definition.
+    NotForViewers {
+        /// EPSG code, where the definition comes from the table.
+        code: Option<u32>,
+        /// Why.
+        why: Proj4Fault,
+    },
+    /// WKT and GeoTIFF keys of one file disagree; the WKT was taken.
+    Disagree {
+        /// EPSG code of the WKT.
+        wkt: u32,
+        /// EPSG code of the GeoTIFF keys.
+        geotiff: u32,
+    },
+}
+
+/// Why viewers cannot use a proj4 definition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Proj4Fault {
+    /// There is none.
+    Missing,
+    /// The text is not one.
+    Malformed(String),
+    /// Viewers do not know the projection.
+    UnknownProjection(String),
+}
+
+impl Warning {
+    /// A short name for programs, such as `outliers`.
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Scan { .. } => "scan",
+            Self::InputSkipped { .. } => "input_skipped",
+            Self::PointsSkipped { .. } => "points_skipped",
+            Self::ReadAgain => "read_again",
+            Self::StepTooCoarse { .. } => "step_too_coarse",
+            Self::CoarserStep { .. } => "coarser_step",
+            Self::Outliers { .. } => "outliers",
+            Self::IntegersRounded { .. } => "integers_rounded",
+            Self::MixedRgbDepth { .. } => "mixed_rgb_depth",
+            Self::Crs(_) => "crs",
+            Self::DifferentCrs { .. } => "different_crs",
+            Self::ManyFiles { .. } => "many_files",
+            Self::ColoursNarrowed => "colours_narrowed",
+            Self::InputsWithoutColour { .. } => "inputs_without_colour",
+            Self::GreyIntensity { .. } => "grey_intensity",
+            Self::NoColour => "no_colour",
+        }
+    }
+
+    /// What the user can do, where there is something.
+    pub fn advice(&self) -> Option<Advice> {
+        match self {
+            Self::Outliers { others, .. } => Some(Advice::CutBounds { bounds: Some(*others) }),
+            Self::MixedRgbDepth { .. } => Some(Advice::SetRgbDepth),
+            Self::Crs(CrsNote::NoCode { .. }) => Some(Advice::NameEpsg),
+            Self::Crs(CrsNote::NotInTable { .. }) => Some(Advice::GiveProj4),
+            Self::DifferentCrs { .. } => Some(Advice::Reproject),
+            Self::ManyFiles { .. } => Some(Advice::PackLeaves),
+            _ => None,
+        }
+    }
+
+    /// The line without the advice.
+    pub fn what(&self) -> String {
+        match self {
+            Self::Scan { path, what } => format!("{}: {what}", path.display()),
+            Self::InputSkipped { error } => format!("input skipped: {error}"),
+            Self::PointsSkipped { points, error } => format!("{points} points skipped: {error}"),
+            Self::ReadAgain => "the points lie outside the declared bounds, or their extent does not fit the chosen \
+                                step; reading again with the measured bounds"
+                .to_owned(),
+            Self::StepTooCoarse { factor } => format!(
+                "the declared bounds made the coordinate step {factor} times too coarse; reading again with the \
+                 measured bounds"
+            ),
+            Self::CoarserStep { scale, reason } => format!("coordinate step {scale:?}: {reason}"),
+            Self::Outliers { points, factor, holds_back_step, .. } => outliers(*points, *factor, *holds_back_step),
+            Self::IntegersRounded { values } => format!(
+                "{values} values of 64-bit integers are beyond 2^53 and were rounded: they are stored as doubles, \
+                 because Potree viewers fail on 64-bit integers"
+            ),
+            Self::MixedRgbDepth { eight_bit, coloured, first } => format!(
+                "{eight_bit} of {coloured} inputs with colour have no value above 255 and are taken as 8 bits deep, \
+                 the others as 16 (the first is {})",
+                first.display()
+            ),
+            Self::Crs(note) => note.to_string(),
+            Self::DifferentCrs { labels } => format!(
+                "the inputs have different coordinate reference systems ({}); coordinates are taken as they are and \
+                 the projection stays empty",
+                labels.join("; ")
+            ),
+            Self::ManyFiles { leaves } => format!("{leaves} files, one per leaf"),
+            Self::ColoursNarrowed => "batches: colours of 16 bits are stored in 8".to_owned(),
+            Self::InputsWithoutColour { without, inputs } => {
+                format!("batches: {without} of {inputs} inputs have no colour and are black")
+            }
+            Self::GreyIntensity { least, greatest } => {
+                format!("batches: no input has colour; grey shows the intensity, {least} to {greatest}")
+            }
+            Self::NoColour => "batches: no input has colour or intensity; all points are white".to_owned(),
+        }
+    }
+}
+
+fn outliers(points: u64, factor: f64, holds_back_step: bool) -> String {
+    let (lie, make, them) = if points == 1 { ("point is", "makes", "it") } else { ("points are", "make", "them") };
+    let gain = if holds_back_step { "the coordinate step could be finer and " } else { "" };
+    format!(
+        "{points} {lie} far from all others and {make} the extent at least {} times larger; without {them} {gain}the \
+         tree would have fewer levels",
+        factor.floor()
+    )
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what())?;
+        match self.advice() {
+            Some(advice) => write!(f, "; {advice}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Serialize for Warning {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Warning", 2)?;
+        object.serialize_field("kind", self.kind())?;
+        object.serialize_field("text", &self.to_string())?;
+        object.end()
+    }
+}
+
+impl fmt::Display for CrsNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoSystem => f.write_str("the WKT describes no projected or geographic coordinate system"),
+            Self::NoCode { name } => write!(f, "the WKT \"{name}\" carries no EPSG code"),
+            Self::NotInTable { code } => write!(f, "EPSG:{code} is not in the table of proj4 definitions"),
+            Self::NotForViewers { code: Some(code), why } => write!(f, "EPSG:{code}: {why}"),
+            Self::NotForViewers { code: None, why } => why.fmt(f),
+            Self::Disagree { wkt, geotiff } => {
+                write!(f, "the WKT says EPSG:{wkt} but the GeoTIFF keys say EPSG:{geotiff}; the WKT was taken")
+            }
+        }
+    }
+}
+
+impl fmt::Display for Proj4Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing => f.write_str("there is no proj4 definition for it"),
+            Self::Malformed(text) => write!(f, "\"{text}\" is not a proj4 definition"),
+            Self::UnknownProjection(name) => write!(f, "viewers do not know +proj={name}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_is_an_object_with_kind_and_text() {
+        let json = serde_json::to_value(Warning::ManyFiles { leaves: 7 }).unwrap();
+        assert_eq!(json["kind"], "many_files");
+        assert_eq!(json["text"], "7 files, one per leaf; the packed layout puts all leaves into one file");
+    }
+}

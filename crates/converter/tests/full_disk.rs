@@ -1,0 +1,131 @@
+//! A disk that fails after N operations, for every N: whatever was being made, the run ends with an error of the disk,
+//! the old output is as it was (or the new one is complete), and nothing is left beside it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use pointmill_converter::{
+    AttributeChoice, BatchesSettings, BintreeSettings, ConvertError, Disk, DiskOperation, Encoding, Plan,
+    Potree2Settings, Silent, Target, convert_on,
+};
+use pointmill_format::bintree::Layout;
+
+/// Permits a number of operations, then reports a full disk.
+#[derive(Debug)]
+struct FailingDisk {
+    permitted: u64,
+    asked: AtomicU64,
+}
+
+impl FailingDisk {
+    fn after(permitted: u64) -> Arc<Self> {
+        Arc::new(Self { permitted, asked: AtomicU64::new(0) })
+    }
+}
+
+impl Disk for FailingDisk {
+    fn permit(&self, _: DiskOperation) -> io::Result<()> {
+        if self.asked.fetch_add(1, Ordering::Relaxed) < self.permitted {
+            Ok(())
+        } else {
+            Err(io::ErrorKind::StorageFull.into())
+        }
+    }
+}
+
+/// All files of a folder but the report, whose times differ from run to run.
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut open = vec![folder.to_path_buf()];
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()) {
+            if entry.is_dir() {
+                open.push(entry);
+            } else if entry.file_name().unwrap() != "report.json" {
+                files.insert(entry.clone(), fs::read(&entry).unwrap());
+            }
+        }
+    }
+    files
+}
+
+fn points(count: u32) -> String {
+    (0..count).map(|i| format!("{} {} {} {}\n", i * 7919 % 10_007, i * 104_729 % 9_973, i % 7, i % 256)).collect()
+}
+
+/// At most this many failures are tried for one kind of run, spread evenly; the last are all tried.
+const TRIES: u64 = 40;
+
+fn check(what: &str, targets: &[Target], change: impl Fn(&mut Plan)) {
+    let dir = tempfile::tempdir().unwrap();
+    let (scan, out) = (dir.path().join("scan.xyz"), dir.path().join("out"));
+    fs::write(&scan, points(20_000)).unwrap();
+    let mut plan = Plan::new(vec![scan.clone()], out.clone());
+    (plan.threads, plan.overwrite, plan.name) = (2, true, "cloud".into());
+    plan.attributes = AttributeChoice::All;
+    change(&mut plan);
+    let run = |disk: Arc<FailingDisk>| convert_on(disk, &plan, targets, &Silent);
+
+    let counting = FailingDisk::after(u64::MAX);
+    run(Arc::clone(&counting)).unwrap();
+    let (operations, new) = (counting.asked.load(Ordering::Relaxed), contents(&out));
+    let step = (operations / TRIES).max(1);
+    for permitted in (0..operations).step_by(step as usize).chain(operations.saturating_sub(8)..operations) {
+        fs::remove_dir_all(&out).unwrap();
+        fs::create_dir(&out).unwrap();
+        // an old dataset, and one that the new one differs from
+        fs::write(out.join("metadata.json"), format!("{{\"hierarchy\": {permitted}}}")).unwrap();
+        let old = contents(&out);
+        let disk = FailingDisk::after(permitted);
+        match run(Arc::clone(&disk)) {
+            Err(ConvertError::Io { error, .. }) => assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{what}"),
+            Err(other) => panic!("{what}, after {permitted} of {operations}: {other}"),
+            // threads may need a few operations more or less
+            Ok(_) => assert!(disk.asked.load(Ordering::Relaxed) <= permitted, "{what}: an error was overlooked"),
+        }
+        let found = contents(&out);
+        assert!(found == old || found == new, "{what}, after {permitted} of {operations}: {:?}", found.keys());
+        let mut beside: Vec<_> = fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        beside.sort();
+        assert_eq!(beside, ["out", "scan.xyz"], "{what}, after {permitted} of {operations}");
+    }
+}
+
+fn potree2() -> Target {
+    Potree2Settings { leaf_capacity: 500, ..Potree2Settings::default() }.into()
+}
+
+fn bintree(layout: Layout) -> Target {
+    BintreeSettings { capacity: 1000, layout, ..BintreeSettings::default() }.into()
+}
+
+#[test]
+fn an_octree_in_memory_and_spilled() {
+    check("octree", &[potree2()], |_| ());
+    let brotli = Potree2Settings { encoding: Encoding::Brotli { quality: 1 }, ..Potree2Settings::default() };
+    check("octree, Brotli", &[brotli.into()], |_| ());
+    check("octree, spilled", &[potree2()], |plan| (plan.threads, plan.memory_bytes) = (1, 92 << 20));
+}
+
+#[test]
+fn a_binary_tree_as_files_and_packed() {
+    check("leaves in files", &[bintree(Layout::Files)], |_| ());
+    check("leaves packed", &[bintree(Layout::Packed)], |plan| plan.task_points = Some(3000));
+}
+
+#[test]
+fn batches_raw_and_compressed() {
+    check("batches", &[BatchesSettings::default().into()], |plan| plan.task_points = Some(3000));
+    let zstd = BatchesSettings { zstd_level: Some(1), ..BatchesSettings::default() };
+    check("batches, zstd", &[zstd.into()], |_| ());
+}
+
+#[test]
+fn three_outputs_of_one_read() {
+    let all = [potree2(), bintree(Layout::Packed), BatchesSettings::default().into()];
+    check("three outputs", &all, |_| ());
+}

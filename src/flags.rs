@@ -1,0 +1,107 @@
+//! Where settings and advice of the libraries get the names of options: nothing below `src/` knows any.
+
+use pointmill_converter::{Advice, ConvertError, DropReason, PlanError, PlanFault, Setting, Warning};
+use pointmill_format::Aabb;
+
+/// The option that a setting comes from.
+fn option(setting: Setting) -> &'static str {
+    match setting {
+        Setting::Outputs => "--to",
+        Setting::LeafCapacity => "--leaf-capacity",
+        Setting::BrotliQuality => "--brotli-quality",
+        Setting::Capacity => "--capacity",
+        Setting::LodCell => "--lod-cell",
+        Setting::Planes => "--planes",
+        Setting::Scale => "--scale",
+        Setting::Bounds => "--bounds",
+        Setting::TempDir => "--temp-dir",
+        Setting::Attributes => "--attributes",
+        Setting::Crs => "--crs",
+        _ => "INPUT",
+    }
+}
+
+/// What the user can do, in options.
+fn advice(advice: &Advice) -> String {
+    match advice {
+        Advice::ReplaceOutput => "choose another output, or pass --overwrite".to_owned(),
+        Advice::RaiseMemory { mib } => format!("pass --memory {mib}MiB or more"),
+        Advice::FreeDisk => "free some space, or put temporary files elsewhere with --temp-dir".to_owned(),
+        Advice::DropDuplicates => "pass --duplicates drop".to_owned(),
+        Advice::KeepDuplicates => "leave out --duplicates drop, or convert to potree2".to_owned(),
+        Advice::CutBounds { bounds: Some(b) } => format!("--bounds {} leaves them out", bounds_value(b)),
+        Advice::CutBounds { bounds: None } => "leave them out with --bounds, or correct the input".to_owned(),
+        Advice::SkipInvalid => "pass --invalid skip to leave such points out".to_owned(),
+        Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
+        Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
+        Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
+        Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),
+        Advice::Reproject => "reproject the inputs, or name the system with --crs".to_owned(),
+        Advice::NameAttributes => "name the attributes to keep with --attributes".to_owned(),
+        Advice::PackLeaves => "--layout packed puts them into one".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+/// A box as `--bounds` takes it.
+fn bounds_value(b: &Aabb) -> String {
+    let corner = |c: [f64; 3]| c.map(|v| v.to_string()).join(",");
+    format!("{}..{}", corner(b.min), corner(b.max))
+}
+
+fn with_advice(what: String, advised: Option<&Advice>) -> String {
+    match advised {
+        Some(advised) => format!("{what}; {}", advice(advised)),
+        None => what,
+    }
+}
+
+/// An error of a conversion, one line.
+pub(crate) fn error_line(error: &ConvertError) -> String {
+    match error {
+        ConvertError::Plan(error) => plan_line(error),
+        other => with_advice(other.what(), other.advice().as_ref()),
+    }
+}
+
+fn plan_line(error: &PlanError) -> String {
+    let option = option(error.setting);
+    match &error.fault {
+        PlanFault::Cell(what) if error.setting == Setting::LodCell => format!("{option}: {what}, or auto"),
+        PlanFault::Missing => format!("{option}: name at least one"),
+        fault => format!("{option}: {fault}"),
+    }
+}
+
+/// A warning of a conversion, one line.
+pub(crate) fn warning_line(warning: &Warning) -> String {
+    with_advice(warning.what(), warning.advice().as_ref())
+}
+
+/// Why an attribute is not in a dataset.
+pub(crate) fn drop_reason(why: &DropReason) -> String {
+    match why {
+        DropReason::NotUsual => format!("{why}; --attributes adds it"),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_names_an_option_and_nothing_is_said_twice() {
+        let others = Aabb { min: [0.0, -1.0, 2.5], max: [10.0, 20.0, 30.0] };
+        let outliers = Warning::Outliers { points: 2, others, factor: 11.0, holds_back_step: false };
+        let line = warning_line(&outliers);
+        assert!(line.ends_with("--bounds 0,-1,2.5..10,20,30 leaves them out"), "{line}");
+        assert_eq!(line.matches("leave").count(), 1);
+        let memory = ConvertError::Memory {
+            ceiling: 1 << 20,
+            needed: 90 << 20,
+            why: pointmill_converter::MemoryNeed::OnePlace { points: 7 },
+        };
+        assert!(error_line(&memory).ends_with("; pass --memory 91MiB or more"), "{}", error_line(&memory));
+    }
+}
