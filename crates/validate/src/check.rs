@@ -1,11 +1,11 @@
-//! The promises that formats make.
+//! The requirements of the formats.
 
 use pointmill_format::DatasetKind;
 use serde::{Serialize, Serializer};
 
-/// A promise of a format. Each check stands for one; [`Check::of`] has those of a format in the order of reports.
+/// A requirement of a format. [`Check::of`] has those of a format in the order of reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[allow(missing_docs)] // `promise` says it
+#[allow(missing_docs)] // see `promise`
 pub enum Check {
     Metadata,
     Hierarchy,
@@ -100,7 +100,7 @@ impl Check {
         Self::Errors,
     ];
 
-    /// What datasets of that kind promise, in the order of reports.
+    /// The checks of datasets of that kind, in the order of reports.
     pub const fn of(kind: DatasetKind) -> &'static [Self] {
         match kind {
             DatasetKind::Potree2 => Self::POTREE2,
@@ -223,7 +223,7 @@ impl Check {
         }
     }
 
-    /// What the dataset promises, in one line.
+    /// The requirement, in one line.
     pub const fn promise(self) -> &'static str {
         match self {
             Self::Metadata => "metadata.json is complete, in range and consistent",
@@ -242,7 +242,7 @@ impl Check {
             Self::TightBox => "min and max of position are the tight box of the points",
             Self::AttributeRanges => "min and max of every attribute bound its values and are attained",
             Self::Histogram => "histograms count the values that are there",
-            Self::Spacing => "inner nodes are sampled as promised: no pair closer than the spacing of the level",
+            Self::Spacing => "inner nodes are sampled as stated: no pair closer than the spacing of the level",
             Self::Coverage => "no hole: every point is within two spacings of a point drawn at each level above it",
             Self::Index => "index.json is complete, in range and consistent",
             Self::LeafFiles => "leaves have the right size, do not overlap, and no file or byte belongs to none",

@@ -16,16 +16,16 @@ use crate::place::Place;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// A promise is broken; the dataset is not ok.
+    /// A requirement is not met; the dataset is not ok.
     Error,
     /// Unusual or troublesome for some clients, but allowed.
     Warning,
 }
 
-/// One broken promise.
+/// One requirement that is not met.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// Which promise.
+    /// Which requirement.
     pub check: Check,
     /// How bad.
     pub severity: Severity,
@@ -66,7 +66,7 @@ impl Finding {
         self
     }
 
-    /// Says how many points are concerned.
+    /// Sets how many points are affected.
     pub(crate) fn points(mut self, points: u64) -> Self {
         self.points = Some(points);
         self
@@ -119,11 +119,11 @@ fn plain(value: &Value) -> Cow<'_, str> {
 pub struct CheckResult {
     /// Which.
     pub name: Check,
-    /// What the dataset promises, in one line.
+    /// The requirement, in one line.
     pub promise: &'static str,
     /// No error; true also of a check that was skipped.
     pub ok: bool,
-    /// How many things were looked at; the unit is that of the promise (points, nodes, keys).
+    /// How many things were checked; the unit is that of the requirement (points, nodes, keys).
     pub checked: u64,
     /// Errors found, listed or not.
     pub found: u64,
@@ -217,13 +217,13 @@ impl Findings {
         self.checked[check.index()].fetch_add(n, Ordering::Relaxed);
     }
 
-    /// Says that a check was not done, and forgets what it may have found.
+    /// Records that a check was not done, and discards its findings.
     pub(crate) fn skip(&self, check: Check, why: impl Into<String>) {
         *self.slot(check) = Slot { skipped: Some(why.into()), ..Slot::default() };
         self.checked[check.index()].store(0, Ordering::Relaxed);
     }
 
-    /// Says that a check was not fully done, and keeps what it found.
+    /// Records that a check was done in part, and keeps its findings.
     pub(crate) fn note(&self, check: Check, why: impl Into<String>) {
         self.slot(check).skipped = Some(why.into());
     }

@@ -1,4 +1,4 @@
-//! Does a dataset keep the promises of its format, and does it hold every point of its sources?
+//! Checks that a dataset conforms to its format, and that it holds every point of its sources exactly once.
 //!
 //! ```no_run
 //! use pointmill_validate::{Options, validate};
@@ -14,7 +14,7 @@
 //! # }
 //! ```
 //!
-//! The crate believes nobody. It shares the readers of `pointmill-format` and works out every expectation itself, from
+//! The crate shares the readers of `pointmill-format` and computes every expected value itself, from
 //! the page of the format in `docs/formats`: boxes, spacing, order, checksums. That repetition is deliberate. It never
 //! sees the converter.
 #![forbid(unsafe_code)]
@@ -40,7 +40,7 @@ pub use outcome::{AgainstSummary, LeafQuality, LevelQuality, Outcome};
 pub use place::{BinaryNode, Place};
 pub use pointmill_format::{DatasetKind, Located, locate};
 
-/// Checks the dataset at `dataset`, whose format [`locate`] finds. Broken promises are findings, not errors.
+/// Checks the dataset at `dataset`, whose format [`locate`] finds. What does not conform is a finding, not an error.
 ///
 /// `progress` is called from worker threads, often.
 ///

@@ -9,15 +9,15 @@ use pointmill_format::OpenOptions;
 pub struct Options {
     /// The scans that the dataset was made from, files only; empty: no comparison.
     pub against: Vec<PathBuf>,
-    /// What text and E57 files do not say of themselves; as they were opened for the conversion.
+    /// Facts that text and E57 files do not state; as given to the conversion.
     pub open: OpenOptions,
-    /// Worker threads; 0: one for each core.
+    /// Worker threads; 0: one per core.
     pub threads: usize,
-    /// What caches and the search for differing records may use, bytes. A guide, not a ceiling for the process.
+    /// Memory for caches and for the search for differing records, bytes. A guide, not a limit of the process.
     pub memory_bytes: u64,
-    /// Problems listed for each check; all are counted.
+    /// Maximum problems listed per check; all are counted.
     pub max_problems: usize,
-    /// Check spacing and coverage and measure quality: the dearest part of a validation.
+    /// Check spacing and coverage and measure quality: the slowest part of a validation.
     pub neighbourhoods: bool,
 }
 

@@ -24,7 +24,7 @@ pub struct Outcome {
     /// Findings, by check, at most [`crate::Options::max_problems`] each; errors before warnings, coarse or early places
     /// before others.
     pub problems: Vec<Finding>,
-    /// One entry a level of an octree; empty for other formats.
+    /// One entry per level of an octree; empty for other formats.
     pub quality: Vec<LevelQuality>,
     /// Of a binary tree whose index could be read.
     pub leaves: Option<LeafQuality>,
@@ -56,7 +56,7 @@ pub struct AgainstSummary {
     pub attributes_not_in_dataset: Vec<String>,
 }
 
-/// Quality of one level of the octree. Distances are told over the spacing of the level.
+/// Quality of one level of the octree. Distances are relative to the spacing of the level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LevelQuality {
     /// 0 for the root.
@@ -72,7 +72,7 @@ pub struct LevelQuality {
     /// Smallest distance from a point of an inner node to another point of that node, over the spacing.
     pub nearest_min: Option<f64>,
     /// Mean of the distance from each point of an inner node to the nearest other point of that node, over the
-    /// spacing; points without one within 8 spacings are left out (`isolated`).
+    /// spacing; points without one within 8 spacings are not counted (`isolated`).
     pub nearest_mean: Option<f64>,
     /// Points of inner nodes that have no other point of their node within 8 spacings.
     pub isolated: u64,

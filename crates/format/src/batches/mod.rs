@@ -36,6 +36,8 @@ mod blocks;
 mod check;
 mod clod;
 mod colour;
+#[cfg(feature = "zstd")]
+mod compress;
 mod describe;
 mod encode;
 mod error;
@@ -56,9 +58,11 @@ pub use crate::geometry::morton::{morton21, morton32};
 pub use aligned::AlignedBytes;
 pub use blocks::BlockScratch;
 #[cfg(feature = "zstd")]
-pub use blocks::{DEFAULT_BATCHES_PER_BLOCK, compress};
+pub use blocks::DEFAULT_BATCHES_PER_BLOCK;
 pub use clod::{keeps, target_spacing, weight};
 pub use colour::{ColourSum, colour_word, eight_bit, grey, lod_of, rgb_of};
+#[cfg(feature = "zstd")]
+pub use compress::compress;
 pub use describe::{AttributeEntry, ColourSource, Description, ErrorFigures, LatticeEntry, PlaneErrors};
 pub use encode::{EncodedBatch, ErrorSums, encode_batch, le_bytes};
 pub use error::WriteError;

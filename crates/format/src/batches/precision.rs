@@ -1,7 +1,5 @@
 //! How many of the 30 bits: in a file, and in a picture (`docs/formats/batches.md`, §7 and §9).
 
-use super::BatchRecord;
-
 /// Bits of a position on each axis: how many planes there are, or are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Precision {
@@ -35,19 +33,6 @@ impl Precision {
             30 => Some(Self::Thirty),
             _ => None,
         }
-    }
-
-    /// The least precision whose cells are smaller than `step` (world units, per axis) in every batch, so that
-    /// rounding to the lattice gives every integer back: what `--planes auto` writes.
-    pub fn for_steps<'a>(records: impl IntoIterator<Item = &'a BatchRecord>, step: [f64; 3]) -> Self {
-        let enough = |record: &BatchRecord, precision: Self| {
-            let cells = f64::from(1u32 << precision.bits());
-            record.sides().iter().zip(&step).all(|(s, step)| *s < cells * step)
-        };
-        records.into_iter().fold(Self::Ten, |least, record| {
-            let needed = Self::ALL.into_iter().find(|p| enough(record, *p)).unwrap_or(Self::Thirty);
-            least.max(needed)
-        })
     }
 
     /// The published choice, from the projected diagonal of a batch's box ([`projected_diagonal`]), in pixels.
@@ -92,6 +77,7 @@ pub fn distance_to_box(point: [f64; 3], min: [f64; 3], max: [f64; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::BatchRecord;
     use super::*;
 
     #[test]

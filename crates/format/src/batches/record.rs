@@ -18,6 +18,21 @@ pub struct BatchRecord {
     pub points: u32,
 }
 
+impl Precision {
+    /// The least precision whose cells are smaller than `step` (world units, per axis) in every batch, so that
+    /// rounding to the lattice gives every integer back: what `--planes auto` writes.
+    pub fn for_steps<'a>(records: impl IntoIterator<Item = &'a BatchRecord>, step: [f64; 3]) -> Self {
+        let enough = |record: &BatchRecord, precision: Self| {
+            let cells = f64::from(1u32 << precision.bits());
+            record.sides().iter().zip(&step).all(|(s, step)| *s < cells * step)
+        };
+        records.into_iter().fold(Self::Ten, |least, record| {
+            let needed = Self::ALL.into_iter().find(|p| enough(record, *p)).unwrap_or(Self::Thirty);
+            least.max(needed)
+        })
+    }
+}
+
 impl BatchRecord {
     /// m: the lower corner in double precision.
     pub fn corner(&self) -> [f64; 3] {

@@ -1,11 +1,7 @@
 //! What `metadata.json` says.
 
-use std::path::Path;
-
 use crate::names::named;
-use crate::{Aabb, Attribute, Lattice, NodeKey, ReadError};
-
-use super::{metadata_json, metadata_parse};
+use crate::{Aabb, Attribute, Lattice, NodeKey};
 
 /// How the payloads in `octree.bin` are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,22 +89,6 @@ pub struct Metadata {
 }
 
 impl Metadata {
-    /// Parses `metadata.json`; `path` is for messages.
-    ///
-    /// # Errors
-    /// What is missing, of the wrong type or out of range, and where; [`crate::ErrorKind::Unsupported`] for a version,
-    /// an encoding or an attribute type that is not of Potree 2.0.
-    pub fn from_json(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, ReadError> {
-        metadata_parse::parse(bytes, path.as_ref())
-    }
-
-    /// The text of `metadata.json`, with all keys that PotreeConverter 2.1 writes and then [`Self::extra`].
-    ///
-    /// Doubles come back bit for bit. JSON has neither NaN nor infinities: they become 0 and ±[`f64::MAX`].
-    pub fn to_json(&self) -> String {
-        metadata_json::to_json(self)
-    }
-
     /// Bytes a point in DEFAULT encoding.
     pub fn record_len(&self) -> usize {
         self.attributes.iter().map(|a| a.attribute.size()).sum()

@@ -6,7 +6,16 @@ use serde_json::Value;
 
 use super::{AttributeStats, Metadata};
 
-pub(super) fn to_json(metadata: &Metadata) -> String {
+impl Metadata {
+    /// The text of `metadata.json`, with all keys that PotreeConverter 2.1 writes and then [`Self::extra`].
+    ///
+    /// Doubles come back bit for bit. JSON has neither NaN nor infinities: they become 0 and ±[`f64::MAX`].
+    pub fn to_json(&self) -> String {
+        to_json(self)
+    }
+}
+
+fn to_json(metadata: &Metadata) -> String {
     let m = metadata;
     let mut json = String::from("{\n\t\"version\": \"2.0\"");
     let mut field = |name: &str, value: &dyn std::fmt::Display| write_field(&mut json, "\t", name, value);

@@ -11,7 +11,18 @@ use super::{AttributeStats, Encoding, Metadata};
 /// More elements a point than any attribute has; keeps a bad count from asking for memory.
 const MAX_ELEMENTS: u64 = 256;
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Metadata, ReadError> {
+impl Metadata {
+    /// Parses `metadata.json`; `path` is for messages.
+    ///
+    /// # Errors
+    /// What is missing, of the wrong type or out of range, and where; [`crate::ErrorKind::Unsupported`] for a version,
+    /// an encoding or an attribute type that is not of Potree 2.0.
+    pub fn from_json(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        parse(bytes, path.as_ref())
+    }
+}
+
+fn parse(bytes: &[u8], path: &Path) -> Result<Metadata, ReadError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let value = serde_json::from_slice(bytes).map_err(|e| syntax_error(bytes, path, &e))?;
     from_value(value).map_err(|fault| match fault {

@@ -262,7 +262,7 @@ fn a_mapped_file_is_the_file_that_was_read() {
     let (mapped, read) = (Batches::map(&path).unwrap(), Batches::open(&path).unwrap());
     assert_eq!((mapped.hi10(), mapped.colour(), mapped.records()), (read.hi10(), read.colour(), read.records()));
     assert_eq!(mapped.read_everything().unwrap(), 12_345);
-    assert!(Batches::map(&folder.path().join("none")).unwrap_err().to_string().contains("none: opening"));
+    assert!(Batches::map(folder.path().join("none")).unwrap_err().to_string().contains("none: opening"));
     std::fs::write(&path, b"").unwrap();
     assert!(Batches::map(&path).unwrap_err().to_string().contains("QBATCHES"), "an empty file maps to nothing");
 }

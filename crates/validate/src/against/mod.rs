@@ -77,7 +77,7 @@ impl Against {
             _ => narrow::narrow(self, &colours, context)?,
         }
         for (name, count) in self.sources.deviating() {
-            let expected = "one value throughout, as attributesDropped says";
+            let expected = "one value throughout, as stated in attributesDropped";
             let finding = Finding::new(Check::Against, format!("dropped attribute {name}"), expected, "other values");
             context.findings.push(finding.points(count));
         }

@@ -50,7 +50,7 @@ pub(crate) struct Rules {
     pub(crate) rgb: Option<usize>,
     /// The dataset has 8 bits a channel: each 16-bit value v of the rules below becomes (v · 255 + 32767) / 65535.
     pub(crate) rgb_as_bytes: bool,
-    /// False where a dataset does not tell its integers: every position counts as 0 then.
+    /// False if the integers of a dataset are not known: every position then counts as 0.
     pub(crate) compare_positions: bool,
     /// The dataset's lattice.
     pub(crate) lattice: Lattice,
@@ -70,7 +70,7 @@ pub(crate) struct Rules {
     pub(crate) drop_duplicates: bool,
     /// Not written by pointmill: known deviations of other converters are tried too.
     pub(crate) foreign: bool,
-    /// Attributes that were left out because they have one value throughout: name and that value.
+    /// Attributes that were not written because they have one value throughout: name and that value.
     pub(crate) constants: Vec<(String, Vec<f64>)>,
 }
 

@@ -1,4 +1,4 @@
-//! One batch: its bytes, and what they say of each point. Batches are handled in parallel.
+//! One batch: its bytes, and the points decoded from them. Batches are handled in parallel.
 
 use pointmill_format::ReadError;
 
@@ -18,7 +18,7 @@ pub(crate) struct Raw {
     pub(crate) number: u64,
     pub(crate) slot: u64,
     pub(crate) bounds: Box32,
-    /// For each plane, one word a point.
+    /// For each plane, one word per point.
     pub(crate) planes: Vec<Vec<u32>>,
     pub(crate) colours: Vec<u32>,
     /// For each extra attribute, its bytes.

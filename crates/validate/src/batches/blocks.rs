@@ -1,4 +1,4 @@
-//! Columns of one entry a point, raw or as zstd blocks of whole batches (§8).
+//! Columns of one entry per point, raw or as zstd blocks of whole batches (§8).
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,15 +14,15 @@ use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
 /// Decompressed blocks of all sections larger than this together are refused: it would be a hostile file, or one of
-/// kilobytes a point.
+/// kilobytes per point.
 const MAX_BLOCK_BYTES: u64 = 1 << 30;
 
-/// A section of one entry a point.
+/// A section of one entry per point.
 #[derive(Debug)]
 pub(crate) struct Column {
     pub(crate) name: String,
     offset: u64,
-    /// Bytes a point.
+    /// Bytes per point.
     pub(crate) stride: u64,
     /// Bytes of the section in the file.
     pub(crate) bytes: u64,
@@ -38,7 +38,7 @@ struct Table {
     begins: Vec<u64>,
 }
 
-/// Finds a section that begins at `offset`; `None` if it is not wholly inside the file or its table makes no sense.
+/// Finds a section that begins at `offset`; `None` if it is not wholly inside the file or its table is invalid.
 pub(crate) fn open(
     bytes: &Bytes,
     header: &Header,
@@ -70,7 +70,7 @@ pub(crate) fn open(
         Ok(None)
     };
     if !(1..=256).contains(&k) {
-        return fault("batches a block", "1 to 256".into(), k.to_string());
+        return fault("batches per block", "1 to 256".into(), k.to_string());
     }
     if count != header.batches.div_ceil(k) {
         return fault("block count", header.batches.div_ceil(k).to_string(), count.to_string());
@@ -110,7 +110,7 @@ pub(crate) fn require_memory(bytes: &Bytes, header: &Header, columns: &[&Column]
         return Ok(());
     }
     let what = format!("the blocks of one place in all sections hold {needed} bytes, of {MAX_BLOCK_BYTES} allowed");
-    Err(ReadError::unsupported(&bytes.path, what).advise("write the file with fewer batches a block"))
+    Err(ReadError::unsupported(&bytes.path, what).advise("write the file with fewer batches per block"))
 }
 
 /// Decompressed blocks by column and number; `None`: the block is broken.
@@ -220,16 +220,16 @@ impl Column {
         let expected = points * self.stride;
         let mut frame = Vec::new();
         bytes.read(self.offset + begin, end - begin, &mut frame)?;
-        let said = zstd::zstd_safe::get_frame_content_size(&frame);
+        let stated = zstd::zstd_safe::get_frame_content_size(&frame);
         let fault = |found: String| {
             reported.once(&self.name, block, format!("a zstd frame of {expected} bytes"), found);
             Ok(None)
         };
-        match said {
-            Ok(Some(said)) if said == expected => {}
-            Ok(Some(said)) => return fault(format!("{said} bytes, by its header")),
-            Ok(None) => return fault("a frame that does not tell its size".into()),
-            Err(_) => return fault("no zstd frame".into()),
+        match stated {
+            Ok(Some(stated)) if stated == expected => {}
+            Ok(Some(stated)) => return fault(format!("{stated} bytes, by its header")),
+            Ok(None) => return fault("a frame that does not state its size".into()),
+            Err(_) => return fault("not a zstd frame".into()),
         }
         match zstd::zstd_safe::find_frame_compressed_size(&frame) {
             Ok(len) if len == frame.len() => {}

@@ -12,7 +12,7 @@ use crate::place::Place;
 pub(crate) fn check(raw: &Raw, points: &Points, bits: u32, findings: &Findings) {
     findings.checked(Check::BatchBoxes, raw.len() as u64);
     for axis in 0..3 {
-        let told = (raw.bounds.min[axis], raw.bounds.max[axis]);
+        let stated = (raw.bounds.min[axis], raw.bounds.max[axis]);
         let name = ["x", "y", "z"][axis];
         let fault = |face: &str, expected: String, found: f32| {
             let subject = format!("{face} {name} of slot {}", raw.slot);
@@ -23,11 +23,11 @@ pub(crate) fn check(raw: &Raw, points: &Points, bits: u32, findings: &Findings) 
             let r = &points.r[axis];
             let (low, high) = r.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(*r), h.max(*r)));
             let (min, max) = (f32_below(low), f32_above(high));
-            if told.0 != min {
-                fault("min", format!("{min}"), told.0);
+            if stated.0 != min {
+                fault("min", format!("{min}"), stated.0);
             }
-            if told.1 != max {
-                fault("max", format!("{max}"), told.1);
+            if stated.1 != max {
+                fault("max", format!("{max}"), stated.1);
             }
             continue;
         }
@@ -35,11 +35,11 @@ pub(crate) fn check(raw: &Raw, points: &Points, bits: u32, findings: &Findings) 
         let (low, high) = cells.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [from, to]| {
             (low.min(from[axis]), high.max(to[axis]))
         });
-        if low >= f64::from(told.0.next_up()) {
-            fault("min", format!("a point below {low}"), told.0);
+        if low >= f64::from(stated.0.next_up()) {
+            fault("min", format!("a point below {low}"), stated.0);
         }
-        if high <= f64::from(told.1.next_down()) {
-            fault("max", format!("a point above {high}"), told.1);
+        if high <= f64::from(stated.1.next_down()) {
+            fault("max", format!("a point above {high}"), stated.1);
         }
     }
 }

@@ -21,7 +21,7 @@ pub(crate) struct Description {
     pub(crate) colour: Colour,
     /// lo, hi of §6.2.
     pub(crate) intensity_range: Option<[u64; 2]>,
-    /// For 10, 20, 30 bits: max and rms; for the planes that are told of.
+    /// For 10, 20, 30 bits: max and rms; for the planes that are stated.
     pub(crate) errors: [Option<Figures>; 3],
     /// All of it.
     pub(crate) json: Value,
@@ -48,7 +48,7 @@ pub(crate) struct Extra {
     pub(crate) attribute: Attribute,
     pub(crate) offset: u64,
     pub(crate) bytes: u64,
-    /// Least and greatest raw value of each element, where they are told.
+    /// Least and greatest raw value of each element, where they are stated.
     pub(crate) min: Option<Vec<f64>>,
     pub(crate) max: Option<Vec<f64>>,
 }

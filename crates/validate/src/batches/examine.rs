@@ -1,4 +1,4 @@
-//! Everything that can be said of a batch without its neighbours.
+//! All checks of a batch that need no other batch.
 
 use super::batch::{Grid, Points, Raw};
 use super::boxes;
@@ -42,7 +42,7 @@ pub(crate) struct Seen {
     pub(crate) world: [[f64; 2]; 3],
     /// Points that are no lattice points.
     pub(crate) foreign: u64,
-    /// Points whose lattice integers the planes do not tell.
+    /// Points whose lattice integers the planes do not determine.
     pub(crate) uncertain: u64,
 }
 
@@ -153,7 +153,7 @@ fn originals(task: &Task<'_>, raw: &Raw, flags: &mut [u8]) -> Vec<u32> {
     if !task.header.averaged() {
         return colours;
     }
-    // a level above 3 is a fault of its own; it was not averaged
+    // a level above 3 is a separate error; it was not averaged
     let mut missing: Vec<bool> = (0..raw.len()).map(|i| raw.level(i) < 3).collect();
     let Some(entries) = &raw.originals else {
         flags.iter_mut().zip(missing).for_each(|(f, missing)| *f |= u8::from(missing) * COLOUR_UNKNOWN);

@@ -44,8 +44,8 @@ const RMS_TOLERANCE: f64 = 1e-9;
 
 /// Compares the description's figures with those of all points: the largest exactly, the rms to 10⁻⁹.
 pub(crate) fn check(header: &Header, description: &Description, errors: &Errors, findings: &Findings) {
-    for (plane, told) in description.errors.iter().enumerate().take(header.planes()) {
-        let Some(Figures { max, rms }) = told else { continue }; // the description's fault, told there
+    for (plane, stated) in description.errors.iter().enumerate().take(header.planes()) {
+        let Some(Figures { max, rms }) = stated else { continue }; // an error of the description, reported there
         findings.checked(Check::Errors, 6);
         let bits = 10 * (plane + 1);
         if *max != errors.max[plane] {

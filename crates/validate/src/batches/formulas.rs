@@ -1,4 +1,4 @@
-//! The arithmetic of `docs/formats/batches.md`, worked out again: the format crate has its own, on purpose.
+//! The arithmetic of `docs/formats/batches.md`, written again, independent of the format crate.
 //!
 //! IEEE doubles in the order in which the page writes the formulas; nothing is fused.
 

@@ -16,7 +16,7 @@ pub(crate) const HEADER_BYTES: u64 = 256;
 pub(crate) struct Header {
     /// N.
     pub(crate) points: u64,
-    /// B, as N makes it; what the file says is compared with it.
+    /// B, from N; the value in the file is compared with it.
     pub(crate) batches: u64,
     pub(crate) origin: [f64; 3],
     pub(crate) min: [f64; 3],
@@ -63,7 +63,7 @@ impl Header {
     pub(crate) fn bits(&self) -> u32 {
         10 * self.planes() as u32
     }
-    /// e: as the file says, or as the extent makes it where the file's is impossible; at most 30.
+    /// e: from the file, or from the extent if that of the file is impossible; at most 30.
     pub(crate) fn exponent(&self) -> i32 {
         self.exponent as i32
     }

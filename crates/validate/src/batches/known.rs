@@ -1,7 +1,7 @@
-//! Lattice integers from the sources, for files whose planes do not tell them.
+//! Lattice integers from the sources, for files whose planes do not determine them.
 //!
 //! Points of one place are interchangeable as far as positions go, so the sources' positions in the order of §3.1 are
-//! those of the file point by point. Then q must be their code, and everything is checked as if the planes told them.
+//! those of the file point by point. Then q must be their code, and everything is checked as if the planes determined them.
 
 use pointmill_format::{Lattice, ReadError};
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ type Row = (u128, [i64; 3]);
 pub(crate) enum Unknown {
     /// The sources have another number of points than the file.
     Count,
-    /// Equal records were dropped, and which ones only whole records tell.
+    /// Equal records were dropped, and only whole records show which.
     Duplicates,
     /// Sorting takes more memory than is allowed.
     Memory,
@@ -28,9 +28,9 @@ impl Unknown {
     /// For reports.
     pub(crate) fn why(&self) -> &'static str {
         match self {
-            Self::Count => "which the planes do not tell, and the sources have another number of points",
-            Self::Duplicates => "which the planes do not tell, and duplicates were dropped",
-            Self::Memory => "which the planes do not tell, and the sources do not fit into memory to be sorted",
+            Self::Count => "which the planes do not determine, and the sources have another number of points",
+            Self::Duplicates => "which the planes do not determine, and duplicates were dropped",
+            Self::Memory => "which the planes do not determine, and the sources do not fit into memory to be sorted",
         }
     }
 }

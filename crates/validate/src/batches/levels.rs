@@ -120,7 +120,7 @@ impl Levels {
     }
 
     /// A cell is complete. Points of its level must be its candidate, and the candidate's level must not be finer:
-    /// for all cells together this says that every point has exactly its level.
+    /// for all cells together this means that every point has exactly its level.
     fn close(&mut self, level: usize, findings: &Findings) {
         let Some(cell) = self.open[level].take() else { return };
         if cell.uncertain {

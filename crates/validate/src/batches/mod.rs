@@ -1,17 +1,17 @@
 //! Quantised batches. `docs/formats/batches.md` is the only source of what is expected.
 //!
 //! # How positions are known
-//! A file holds cells, not points. Where the planes tell the lattice integers X apart (a cell is finer than a step, or
+//! A file holds cells, not points. Where the planes determine the lattice integers X (a cell is finer than a step, or
 //! holds one lattice point alone), everything of the page is recomputed from X and compared exactly: q, boxes, order,
-//! candidates, error figures. Where they do not, because planes were left out or the step is very fine, X comes from the
+//! candidates, error figures. Where they do not, because planes were omitted or the step is very fine, X comes from the
 //! sources, if they are given and fit into memory ([`known`]). Else what is certain is checked all the same (boxes and
-//! order to within a cell), and the report says what was not.
+//! order to within a cell), and the report states what was not.
 //!
 //! # Tolerances
 //! * rms of errors: 10⁻⁹, relative. Everything else about known positions: none.
 //!
 //! # Memory
-//! Batches are streamed in windows, twice a quarter of [`Options::memory_bytes`] at most; beside them 24 bytes a batch
+//! Batches are streamed in windows, twice a quarter of [`Options::memory_bytes`] at most; beside them 24 bytes per batch
 //! for boxes and 8 for originals, and of compressed sections the blocks of a window.
 
 mod batch;
@@ -79,14 +79,14 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         true => originals::read(&bytes, &header, sections.originals, &findings)?,
         false => None,
     };
-    let told = lattice_is_told(&header, &description, &boxes, &findings);
+    let determined = lattice_is_determined(&header, &description, &boxes, &findings);
     let mut against = match options.against.as_slice() {
         [] => None,
         paths => Some(Against::open(paths, &options.open, records::rules(&header, &description))?),
     };
     let mut known = None;
     let mut unknown = None;
-    if let (false, Some(against)) = (told, &mut against) {
+    if let (false, Some(against)) = (determined, &mut against) {
         match known::positions(&header, &description.lattice, against, options.memory_bytes, progress)? {
             Ok(positions) => known = Some(positions),
             Err(why) => {
@@ -124,24 +124,29 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
     Ok(outcome)
 }
 
-/// True if the planes tell every point's lattice integers, by the boxes. Planes that are absent though they would have
-/// told them are worth a word: a writer that was not asked to leave them out should not have.
-fn lattice_is_told(header: &Header, description: &Description, boxes: &[Option<Box32>], findings: &Findings) -> bool {
+/// True if the planes determine every point's lattice integers, by the boxes. Planes that are absent although they would
+/// have determined them are reported: a writer should omit them only when asked to.
+fn lattice_is_determined(
+    header: &Header,
+    description: &Description,
+    boxes: &[Option<Box32>],
+    findings: &Findings,
+) -> bool {
     let fine = |bounds: &Box32, bits: u32| {
         (0..3).all(|a| Axis::new(&description.lattice, header.origin, bounds, a, bits).is_fine())
     };
-    let told = |bits: u32| boxes.iter().flatten().all(|bounds| fine(bounds, bits));
-    let told_now = told(header.bits());
-    if !told_now && header.bits() < 30 && told(30) {
+    let determines = |bits: u32| boxes.iter().flatten().all(|bounds| fine(bounds, bits));
+    let now = determines(header.bits());
+    if !now && header.bits() < 30 && determines(30) {
         let coarse = boxes.iter().flatten().filter(|bounds| !fine(bounds, header.bits())).count();
         let found = format!("{} planes; cells of {coarse} batches are coarser than the source's step", header.planes());
         let expected = "planes that give every X back, unless fewer were asked for";
         findings.push(Finding::new(Check::Quantisation, "planes", expected, found).warning());
     }
-    told_now
+    now
 }
 
-/// What only all batches together can say, and what could not be said.
+/// Checks that need all batches together, and what was not checked.
 fn conclude(task: &Task<'_>, walked: &Walked) {
     let Task { header, description, findings, .. } = task;
     let blind = (walked.unreadable > 0).then(|| format!("{} batches could not be read", walked.unreadable));
@@ -157,11 +162,11 @@ fn conclude(task: &Task<'_>, walked: &Walked) {
         Some(why) => findings.note(Check::Errors, why.clone()),
         None => figures::check(header, description, &walked.errors, findings),
     }
-    let told = description.attributes.iter().any(|a| a.min.is_some() || a.max.is_some());
+    let stated = description.attributes.iter().any(|a| a.min.is_some() || a.max.is_some());
     match &blind {
         Some(why) => findings.skip(Check::AttributeRanges, why.clone()),
-        None if !told && description.intensity_column().is_none() => {
-            findings.skip(Check::AttributeRanges, "none are told");
+        None if !stated && description.intensity_column().is_none() => {
+            findings.skip(Check::AttributeRanges, "none are stated");
         }
         None => walked.ranges.check(description, findings),
     }
@@ -199,10 +204,10 @@ fn levels_skipped(task: &Task<'_>, walked: &Walked, why: Option<String>) {
 fn tight_box(header: &Header, walked: &Walked, findings: &Findings) {
     findings.checked(Check::TightBox, header.points);
     let Some(world) = walked.world else { return };
-    for (subject, told, side) in [("min", header.min, 0), ("max", header.max, 1)] {
+    for (subject, stated, side) in [("min", header.min, 0), ("max", header.max, 1)] {
         let found = world.map(|range| range[side]);
-        if told != found {
-            findings.push(Finding::new(Check::TightBox, subject, json!(found), json!(told)));
+        if stated != found {
+            findings.push(Finding::new(Check::TightBox, subject, json!(found), json!(stated)));
         }
     }
 }
@@ -231,7 +236,7 @@ fn compare(
         parts.push("colours, whose originals are absent".to_owned());
     }
     if task.description.colour == Colour::Intensity && task.description.intensity_range.is_none() {
-        parts.push("greys, whose range is not told".to_owned());
+        parts.push("greys, whose range is not stated".to_owned());
     }
     if !parts.is_empty() {
         findings.note(Check::Against, format!("counts and attributes, without {}", parts.join(" and ")));

@@ -8,7 +8,7 @@ use pointmill_format::Lattice;
 use super::batch_records::Box32;
 use super::formulas::{decode, encode, ulp};
 
-/// What q says about X of an axis.
+/// The integers X of an axis that q allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Recovered {
     /// It can be nothing else.
@@ -33,7 +33,7 @@ pub(crate) struct Axis {
     fine: bool,
 }
 
-/// Integers above are not told apart by doubles.
+/// Doubles do not distinguish integers above.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
 impl Axis {

@@ -1,4 +1,4 @@
-//! Least and greatest raw values that the description tells of attributes.
+//! Least and greatest raw values of attributes in the description.
 
 use pointmill_format::AttributeType;
 use serde_json::json;
@@ -11,7 +11,7 @@ use crate::finding::{Finding, Findings};
 /// Least and greatest value of each element of each attribute; NaN and infinities are neither.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ranges {
-    /// Empty for attributes that nothing is told of.
+    /// Empty for attributes without stated values.
     values: Vec<Vec<[f64; 2]>>,
 }
 
@@ -56,22 +56,22 @@ impl Ranges {
                 continue; // nothing but NaN
             }
             let name = &extra.attribute.name;
-            for (word, told, side) in [("min", &extra.min, 0), ("max", &extra.max, 1)] {
-                let Some(told) = told else { continue };
+            for (word, stated, side) in [("min", &extra.min, 0), ("max", &extra.max, 1)] {
+                let Some(stated) = stated else { continue };
                 let seen: Vec<f64> = seen.iter().map(|range| range[side]).collect();
                 findings.checked(Check::AttributeRanges, seen.len() as u64);
-                if *told != seen {
+                if *stated != seen {
                     let subject = format!("{word} of {name}");
-                    findings.push(Finding::new(Check::AttributeRanges, subject, json!(seen), json!(told)));
+                    findings.push(Finding::new(Check::AttributeRanges, subject, json!(seen), json!(stated)));
                 }
             }
             if description.colour == Colour::Intensity
                 && description.intensity_column() == Some(i)
-                && let (Some(told), [seen]) = (description.intensity_range, seen.as_slice())
+                && let (Some(stated), [seen]) = (description.intensity_range, seen.as_slice())
             {
                 findings.checked(Check::AttributeRanges, 2);
-                if told.map(|v| v as f64) != *seen {
-                    findings.push(Finding::new(Check::AttributeRanges, "intensityRange", json!(seen), json!(told)));
+                if stated.map(|v| v as f64) != *seen {
+                    findings.push(Finding::new(Check::AttributeRanges, "intensityRange", json!(seen), json!(stated)));
                 }
             }
         }

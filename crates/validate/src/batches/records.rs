@@ -47,7 +47,7 @@ impl against::Records for Records<'_> {
     fn each_block(&self, rules: &Rules, work: &(dyn Fn(&mut Block, Place) + Sync)) -> Result<(), ReadError> {
         let task = self.task;
         let (batches, window) = (task.header.batches, window_batches(task));
-        let silent = Findings::new(task.findings.format(), 0); // the walk has told of broken blocks
+        let silent = Findings::new(task.findings.format(), 0); // the walk has reported broken blocks
         let reported = Reported::new(&silent);
         let mut cache = Cache::default();
         for first in (0..batches).step_by(window as usize) {
@@ -106,7 +106,7 @@ pub(crate) fn fill(raw: &Raw, points: &Points, colours: &[u32], rules: &Rules, b
     }
 }
 
-/// The grey of a colour; a colour that is none is told apart from every grey.
+/// The grey of a colour; a colour that is not grey differs from every grey.
 fn grey_of(word: u32) -> u64 {
     let grey = word & 255;
     if word & 0xff_ffff == grey * 0x01_0101 { u64::from(grey) } else { u64::from(word & 0xff_ffff) + 256 }

@@ -12,7 +12,7 @@ use super::header::{HEADER_BYTES, Header};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
-/// Columns of one entry a point, in file order.
+/// Columns of one entry per point, in file order.
 #[derive(Debug)]
 pub(crate) struct Sections {
     /// hi10, and mid10, lo10 if they are there.

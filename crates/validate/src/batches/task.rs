@@ -22,7 +22,7 @@ pub(crate) struct Task<'a> {
     pub(crate) columns: &'a [&'a Column],
     /// If they can be used.
     pub(crate) originals: Option<&'a Originals>,
-    /// Lattice integers of all points in Morton order, from the sources, where the planes do not tell them.
+    /// Lattice integers of all points in Morton order, from the sources, where the planes do not determine them.
     pub(crate) known: Option<&'a [[i64; 3]]>,
     pub(crate) findings: &'a Findings,
     pub(crate) sums: Option<&'a Sums>,

@@ -19,14 +19,14 @@ use crate::finding::Finding;
 use crate::options::Progress;
 use crate::place::Place;
 
-/// What all batches together say.
+/// Results of all batches together.
 #[derive(Debug, Default)]
 pub(crate) struct Walked {
     /// Batches that could not be read.
     pub(crate) unreadable: u64,
     /// Points that are no lattice points.
     pub(crate) foreign: u64,
-    /// Points whose lattice integers the planes do not tell.
+    /// Points whose lattice integers the planes do not determine.
     pub(crate) uncertain: u64,
     /// Cells of all levels that were not judged.
     pub(crate) uncertain_cells: u64,

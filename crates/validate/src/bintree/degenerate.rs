@@ -34,7 +34,7 @@ impl Runs {
     }
 }
 
-/// Nodes are degenerate exactly if they have to be, and cut as the page says. `summaries`: of all nodes whose points are
+/// Nodes are degenerate exactly if they have to be, and cut as the page requires. `summaries`: of all nodes whose points are
 /// known.
 pub(super) fn check(tree: &Tree<'_>, summaries: &[Option<Summary>], ends: &HashMap<u32, Ends>, findings: &Findings) {
     let mut runs: HashMap<u32, Runs> = HashMap::new();
@@ -70,9 +70,9 @@ pub(super) fn check(tree: &Tree<'_>, summaries: &[Option<Summary>], ends: &HashM
         };
         let as_cut = is_degenerate == (own.count > 1) && (is_degenerate || node.is_leaf());
         if !as_cut {
-            let told = if is_degenerate { "a node that is cut further" } else { "a leaf" };
-            let told = if as_cut || is_degenerate || node.is_leaf() { told } else { "a node that is split" };
-            report("cut by number", format!("{} leaves", own.count), told.into());
+            let found = if is_degenerate { "a node that is cut further" } else { "a leaf" };
+            let found = if as_cut || is_degenerate || node.is_leaf() { found } else { "a node that is split" };
+            report("cut by number", format!("{} leaves", own.count), found.into());
         } else if is_degenerate {
             for (child, runs_of_child) in tree.dataset.children(index).into_iter().flatten().zip(own.split()) {
                 runs.insert(child, runs_of_child);

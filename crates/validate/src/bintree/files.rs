@@ -14,7 +14,7 @@ use crate::finding::{Finding, Findings};
 /// Which nodes are leaves that can be read.
 ///
 /// # Errors
-/// The operating system does not tell; a file that is not there is a finding.
+/// The operating system cannot report it; a missing file is a finding.
 pub(super) fn check(folder: &Path, tree: &Tree<'_>, findings: &Findings) -> Result<Vec<bool>, ReadError> {
     let readable = match tree.header().layout {
         Layout::Files => files(folder, tree, findings)?,

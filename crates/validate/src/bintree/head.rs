@@ -1,4 +1,4 @@
-//! What `index.json` says beside the shape of the tree. The reader tolerates more than the page promises.
+//! Everything in `index.json` but the shape of the tree. The reader tolerates more than the page allows.
 
 use std::fmt;
 use std::fs::File;
@@ -34,7 +34,7 @@ const KEYS: [&str; 15] = [
     "nodes",
 ];
 
-/// Checks the index that `tree` was read from. False if it does not say what the lattice is.
+/// Checks the index that `tree` was read from. False if it does not state the lattice.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -171,7 +171,7 @@ struct NodeKeys {
 }
 
 impl NodeKeys {
-    /// What the page says of a node of this kind, unless it holds.
+    /// What the page requires of a node of this kind, unless it is met.
     fn fault(&self) -> Option<&'static str> {
         let is_split = self.axis.is_some() || self.split.is_some() || self.degenerate.is_some();
         match (&self.children, self.degenerate) {

@@ -1,4 +1,4 @@
-//! The points of one leaf against what the page promises of it.
+//! Checks the points of one leaf against the page.
 
 use std::ops::Range;
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use pointmill_format::bintree::PACKED_FILE;
 use pointmill_format::bytes::{ByteSource, Folder};
 
-/// The reader opens no tree with a range that leaves `leaves.bin`. Here it is told that there is no end, so that a file
+/// The reader opens no tree with a range that leaves `leaves.bin`. Here it is given no end, so that a file
 /// that was cut short is a finding about the leaves that lie behind the cut, and the others are looked at.
 #[derive(Debug)]
 pub(super) struct Lenient(Folder);

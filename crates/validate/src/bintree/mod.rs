@@ -1,14 +1,14 @@
 //! Mean-split binary trees. `docs/formats/bintree.md` is the only source of what is expected.
 //!
-//! The reader of the format crate refuses an index that makes no tree; what it says is a finding then, and nothing else
-//! can be looked at. Everything about leaves and splits is worked out here, from the bytes of the leaves.
+//! The reader of the format crate refuses an index that is not a tree; its error is then the only finding. Everything
+//! about leaves and splits is computed here, from the bytes of the leaves.
 //!
 //! # Tolerances
 //! None but for the distance of a decoded position from its lattice point: the bound of §5 of the page and two ulps of
 //! the coordinate. Splits, boxes, centers and offsets are compared exactly.
 //!
 //! # Memory
-//! About 300 bytes a node. Leaves are read in parallel, one a thread, each as a whole; what a split needs of the points
+//! About 300 bytes per node. Leaves are read in parallel, one per thread, each as a whole; what a split needs of the points
 //! below it (exact sums, extremes, how many lie at the greatest coordinate) goes up the tree, so every point is read
 //! once.
 
@@ -93,7 +93,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
 
 /// Why some things cannot be known.
 struct Unknown {
-    /// The index does not say what the lattice is.
+    /// The index does not state the lattice.
     lattice: bool,
     /// Leaves that are too long for their integers to be certain.
     uncertain: u64,
@@ -105,7 +105,7 @@ impl Unknown {
     /// Why integers are not certain, if they are not.
     fn integers(&self) -> Option<String> {
         match self.uncertain {
-            _ if self.lattice => Some("the index does not say what the lattice is".into()),
+            _ if self.lattice => Some("the index does not state the lattice".into()),
             0 => None,
             1 => Some("in 1 leaf single precision is too coarse for the lattice".into()),
             n => Some(format!("in {n} leaves single precision is too coarse for the lattice")),
@@ -142,7 +142,7 @@ fn compare(
     let rules = against.sums.rules();
     let why_not = match rules.stored {
         _ if unknown.lattice => unknown.integers(),
-        // no box told that these leaves are too long, or offsets are no numbers
+        // no box showed that these leaves are too long, or offsets are not numbers
         None => unknown.integers(),
         Some(_) if rules.drop_duplicates => unknown.integers(),
         Some(_) if !Routes::are_certain(tree) => Some("the lattice is too fine for doubles".into()),
@@ -155,7 +155,7 @@ fn compare(
     against.compare(context).map(Some)
 }
 
-/// All that can be said of a dataset whose index makes no tree.
+/// The outcome for a dataset whose index is not a tree.
 fn unreadable_index(findings: Findings, error: ReadError) -> Outcome {
     let is_leaves = error.path().file_name().is_some_and(|name| name == PACKED_FILE);
     let (check, subject) = if is_leaves { (Check::LeafFiles, PACKED_FILE) } else { (Check::Index, "index.json") };

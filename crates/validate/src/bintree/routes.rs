@@ -1,5 +1,5 @@
 //! Where single precision is too coarse for the lattice, integers do not come back from the leaves. But planes and centers
-//! tell which leaf a source's point belongs to, and which offsets have to be stored for it: these are compared then.
+//! show which leaf a source's point belongs to, and which offsets have to be stored for it: these are compared then.
 
 use pointmill_format::Lattice;
 use pointmill_format::bintree::NodeKind;
@@ -20,7 +20,7 @@ enum Route {
     Center([f64; 3]),
 }
 
-/// The planes and centers of a tree, about 40 bytes a node.
+/// The planes and centers of a tree, about 40 bytes per node.
 #[derive(Debug)]
 pub(super) struct Routes {
     lattice: Lattice,
@@ -40,7 +40,7 @@ impl Routes {
         Self { lattice: tree.header().lattice, routes }
     }
 
-    /// True if neighbours on the lattice have different world coordinates, so that planes tell them apart.
+    /// True if neighbours on the lattice have different world coordinates, so that planes separate them.
     pub(super) fn are_certain(tree: &Tree<'_>) -> bool {
         let lattice = tree.header().lattice;
         let Some(root) = tree.nodes().first() else { return true };

@@ -23,7 +23,7 @@ pub(super) struct Scan<'a> {
     pub(super) tree: &'a Tree<'a>,
     /// By node: a leaf whose bytes are there.
     pub(super) readable: &'a [bool],
-    /// The index says what the lattice is.
+    /// The index states the lattice.
     pub(super) lattice_known: bool,
     /// Where records are summed for the comparison with the sources.
     pub(super) sums: Option<&'a Sums>,

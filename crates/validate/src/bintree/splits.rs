@@ -1,4 +1,4 @@
-//! Axis and plane of every inner node, worked out anew from the exact sums of the points below.
+//! Axis and plane of every inner node, recomputed from the exact sums of the points below.
 
 use pointmill_format::bintree::{Node, NodeKind, SplitRule};
 
@@ -46,8 +46,8 @@ impl Split<'_> {
         findings.checked(Check::SplitAxis, 1);
         let (longest, extents) = all.longest_axis(self.tree.header().lattice.scale);
         if longest != self.axis {
-            let told = |axis: usize| format!("{} ({})", AXES[axis], extents[axis]);
-            let finding = Finding::new(Check::SplitAxis, "axis", told(longest), told(self.axis));
+            let extent_of = |axis: usize| format!("{} ({})", AXES[axis], extents[axis]);
+            let finding = Finding::new(Check::SplitAxis, "axis", extent_of(longest), extent_of(self.axis));
             findings.push(finding.at(self.tree.place(self.index)).points(all.count));
         }
     }
@@ -88,7 +88,7 @@ impl Split<'_> {
         }
     }
 
-    /// The sides tell whether the plane is the median: the largest value of the low side has to be the one at the
+    /// The sides decide whether the plane is the median: the largest value of the low side has to be the one at the
     /// median's rank, or the largest below a maximum at that rank. Points on the wrong side, which have their finding,
     /// make this unanswerable.
     fn check_median(&self, all: &Summary, findings: &Findings) {

@@ -8,7 +8,7 @@ pub(super) struct Summary {
     pub(super) max: [i64; 3],
     /// 2⁶⁴ points of 63 bits would fit.
     pub(super) sum: [i128; 3],
-    /// Points whose coordinate is `max`: what a median that falls on the largest value is told by.
+    /// Points whose coordinate is `max`: they identify a median that falls on the largest value.
     pub(super) at_max: [u64; 3],
 }
 

@@ -1,4 +1,4 @@
-//! Boxes, spacing and order as the format defines them (`docs/formats/potree2.md`), worked out here.
+//! Boxes, spacing and order as the format defines them (`docs/formats/potree2.md`), computed here.
 //!
 //! The format crate knows how to do some of this too. It is repeated on purpose: a validator that borrows the
 //! arithmetic of the program it checks agrees with its mistakes.
@@ -10,7 +10,7 @@ use pointmill_format::{Aabb, Lattice, NodeKey};
 /// Cells a side of an inner node, at most one point each under grid and random sampling.
 pub(crate) const CELLS: f64 = 128.0;
 
-/// What the metadata says about space.
+/// The geometry in the metadata.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Geometry {
     pub(crate) lattice: Lattice,
@@ -43,7 +43,7 @@ impl Geometry {
 
     /// Rounding allowed when world coordinates are compared: 4 ulps of the cube's largest coordinate on that axis.
     ///
-    /// A dequantised coordinate carries two roundings (product, sum), a box bound one a level in the worst case, of
+    /// A dequantised coordinate carries two roundings (product, sum), a box bound one per level in the worst case, of
     /// which only those of the last, smallest, halvings can fall below one ulp of the corner.
     pub(crate) fn tolerance(&self, axis: usize) -> f64 {
         let largest = self.cube.min[axis].abs().max(self.cube.max[axis].abs());

@@ -118,7 +118,7 @@ fn read_json(folder: &Path) -> Result<Option<Value>, ReadError> {
     Ok(serde_json::from_slice(&bytes).ok())
 }
 
-/// All that can be said of a dataset whose metadata makes no sense.
+/// The outcome for a dataset whose metadata is invalid.
 fn unreadable_metadata(folder: &Path, findings: Findings, error: ReadError) -> Result<Outcome, ReadError> {
     for check in Check::POTREE2.iter().copied().filter(|c| *c != Check::Metadata) {
         findings.skip(check, "metadata.json cannot be used");
@@ -153,7 +153,7 @@ fn say_what_was_skipped(
 ) {
     let metadata = dataset.metadata();
     if metadata.encoding == Encoding::Default {
-        findings.skip(Check::Order, "only BROTLI promises an order");
+        findings.skip(Check::Order, "only BROTLI requires an order");
     }
     if metadata.attributes.iter().all(|a| a.histogram.is_none()) {
         findings.skip(Check::Histogram, "there are none");

@@ -1,4 +1,4 @@
-//! Figures per level that tell how good a sampling looks, comparable between programs.
+//! Figures per level about the quality of the sampling, comparable between programs.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 

@@ -1,4 +1,4 @@
-//! The octree as `hierarchy.bin` tells it, walked chunk by chunk without trust.
+//! The octree in `hierarchy.bin`, walked chunk by chunk; nothing in it is trusted.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
@@ -37,7 +37,7 @@ impl Tree {
         (0..8).filter(|c| mask >> c & 1 == 1).filter_map(|c| self.find(node.key.child(c)?)).collect()
     }
 
-    /// The node's neighbours of its own level, sharing a face, an edge or a corner; at most 26.
+    /// The node's neighbours of the same level, sharing a face, an edge or a corner; at most 26.
     pub(crate) fn neighbours(&self, key: NodeKey) -> impl Iterator<Item = usize> + '_ {
         let around = |cell: u32| [cell.checked_sub(1), Some(cell), cell.checked_add(1)].into_iter().flatten();
         around(key.x)
@@ -52,7 +52,7 @@ struct Pending {
     root: NodeKey,
     offset: u64,
     size: u64,
-    /// What the proxy that led here says; `None` for the root chunk.
+    /// The record of the proxy that led here; `None` for the root chunk.
     points: Option<u32>,
 }
 
@@ -104,7 +104,7 @@ fn admit(chunk: &Pending, file_size: u64, chunks: &BTreeMap<u64, u64>, findings:
     }
     let before = chunks.range(..chunk.offset + whole).next_back();
     if let Some((&start, &other_end)) = before.filter(|(_, e)| **e > chunk.offset) {
-        let expected = format!("bytes of its own from {}", chunk.offset);
+        let expected = format!("bytes of no other chunk, from {}", chunk.offset);
         blame("range of a chunk", expected, format!("bytes {start} to {other_end} belong to another chunk"));
         return None;
     }

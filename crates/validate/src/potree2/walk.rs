@@ -79,7 +79,7 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
     let kept = match task.sampling {
         Sampling::Poisson => walk.pairs,
         Sampling::Cells => walk.cells,
-        // the promise that is broken less is the one that was meant
+        // the rule that is broken less is the one that was meant
         Sampling::Unknown if walk.cells.found(Check::Spacing) == 0 => walk.cells,
         Sampling::Unknown => walk.pairs,
     };
@@ -98,7 +98,7 @@ struct Walk<'a> {
     scratch: Mutex<Vec<NodePoints>>,
     seen: Mutex<ranges::Seen>,
     tallies: Vec<Tally>,
-    /// Findings of the two sampling promises, until it is known which one counts.
+    /// Findings for both sampling rules, until it is known which one applies.
     pairs: Findings,
     cells: Findings,
     unreadable: AtomicU64,

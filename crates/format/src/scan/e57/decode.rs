@@ -1,11 +1,11 @@
 //! A piece to a batch.
 
 use super::fields::Field;
+use super::file::{E57Scan, ScanPlan};
 use super::pose::{Pose, spherical_to_cartesian};
 use super::schema::{Fill, PositionFields, Roles, Triple};
 use super::streams::Streams;
 use super::unpack::{each, each_integer, fill};
-use super::{E57Scan, ScanPlan};
 use crate::scan::decode::fitting_batch;
 use crate::{Column, Fault, Positions, ReadError, Scratch, Sink, Wanted, with_column};
 

@@ -39,9 +39,11 @@
 mod cuts;
 mod decode;
 mod fields;
+mod file;
 mod header;
 mod notes;
 mod open;
+mod options;
 mod packets;
 mod pages;
 mod pose;
@@ -55,28 +57,10 @@ use std::path::Path;
 
 #[cfg(doc)]
 use crate::Attribute;
-use crate::scan::source::Source;
 use crate::{Piece, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
-use cuts::Cut;
-use fields::Field;
-use pose::Pose;
-use schema::{Fill, PositionFields};
+use file::E57Scan;
 
-/// What to make of an E57 file.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct E57Options {
-    /// Keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as columns.
-    pub keep_row_column: bool,
-}
-
-impl E57Options {
-    /// Sets [`Self::keep_row_column`].
-    #[must_use]
-    pub fn keep_row_column(self, keep_row_column: bool) -> Self {
-        Self { keep_row_column }
-    }
-}
+pub use options::E57Options;
 
 /// True if the first bytes of a file say that it is E57.
 pub fn is_e57(first_bytes: &[u8]) -> bool {
@@ -98,28 +82,6 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
 /// Those of [`open`].
 pub fn open_with(path: impl AsRef<Path>, options: E57Options) -> Result<Box<dyn Scan>, ReadError> {
     Ok(Box::new(open::open(path.as_ref(), options)?))
-}
-
-/// An open file.
-struct E57Scan {
-    source: Source,
-    info: ScanInfo,
-    /// Scans with points.
-    scans: Vec<ScanPlan>,
-    pieces: Vec<Piece>,
-    /// What each piece is made of; [`Cut::scan`] is an index into `scans`.
-    cuts: Vec<Cut>,
-}
-
-/// All that decoding needs of a scan.
-struct ScanPlan {
-    /// Number in the file.
-    index: usize,
-    fields: Vec<Field>,
-    positions: PositionFields,
-    pose: Pose,
-    /// By attribute.
-    fills: Vec<Fill>,
 }
 
 impl Scan for E57Scan {

@@ -8,14 +8,16 @@ use ::e57::PointCloud;
 use super::cuts::{self, Cut};
 use super::decode::Values;
 use super::fields::Field;
+use super::file::{E57Scan, ScanPlan};
 use super::notes::Notes;
+use super::options::E57Options;
 use super::packets::Section;
 use super::pages::{Pages, logical, logical_len, physical};
 use super::pose::Pose;
 use super::scaling::{self, Scaling};
 use super::schema::{Roles, ScanFields, Schema, fields};
 use super::streams::Streams;
-use super::{E57Options, E57Scan, ScanPlan, header, xml};
+use super::{header, xml};
 use crate::scan::source::Source;
 use crate::{Aabb, Advice, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning};
 

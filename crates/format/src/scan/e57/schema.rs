@@ -2,9 +2,9 @@
 
 use ::e57::{PointCloud, Record, RecordName};
 
-use super::E57Options;
 use super::fields::{Encoding, Field};
 use super::notes::Notes;
+use super::options::E57Options;
 use super::scaling::Scaling;
 use crate::{Attribute, AttributeType, ScanWarning};
 

@@ -3,8 +3,8 @@
 use std::io::Read;
 use std::ops::ControlFlow;
 
-use super::LasScan;
 use super::decompress::{self, Decompressor, Stop};
+use super::file::LasScan;
 use super::kernels;
 use super::laszip::LaszipRecord;
 use super::pieces::Storage;

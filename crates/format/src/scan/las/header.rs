@@ -35,6 +35,11 @@ pub(super) struct Header {
     pub(super) evlr_count: u32,
 }
 
+/// True if the first bytes of a file say that it is LAS or LAZ.
+pub fn is_las(first_bytes: &[u8]) -> bool {
+    first_bytes.starts_with(b"LASF")
+}
+
 impl Header {
     /// Bytes of a record that the point format accounts for; what follows are extra bytes.
     pub(super) fn format_len(&self) -> usize {
@@ -45,7 +50,7 @@ impl Header {
     pub(super) fn read(source: &Source, warnings: &mut Vec<ScanWarning>) -> Result<Self, ReadError> {
         let path = source.path();
         let bytes = source.vec_at(0, HEADER_1_4)?;
-        if !super::is_las(&bytes) {
+        if !is_las(&bytes) {
             let not_las = || Fault::Header("not a LAS or LAZ file (no LASF signature)".to_owned());
             let fault = if bytes.is_empty() { Fault::Empty } else { not_las() };
             return Err(ReadError::broken(path, 0, fault).advise(Advice::WrongFile));

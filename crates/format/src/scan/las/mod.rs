@@ -35,6 +35,7 @@ mod crs;
 mod decode;
 mod decompress;
 mod extra_bytes;
+mod file;
 mod header;
 mod kernels;
 mod laszip;
@@ -47,16 +48,14 @@ use std::path::Path;
 use crate::scan::source::Source;
 use crate::{Advice, Fault, Piece, ReadError, Scan, ScanInfo, ScanWarning, Scratch, Sink, Wanted};
 use chunk_table::Layout;
+use file::LasScan;
 use header::Header;
 use laszip::{Arrangement, LaszipRecord};
-use pieces::{Plan, Planner};
+use pieces::Planner;
 use records::Records;
 use schema::Schema;
 
-/// True if the first bytes of a file say that it is LAS or LAZ.
-pub fn is_las(first_bytes: &[u8]) -> bool {
-    first_bytes.starts_with(b"LASF")
-}
+pub use header::is_las;
 
 /// Opens a LAS or LAZ file: reads its header, records and (LAZ) chunk table, decodes no point.
 ///
@@ -65,16 +64,6 @@ pub fn is_las(first_bytes: &[u8]) -> bool {
 /// their point format, or a scale that cannot place a point.
 pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     Ok(Box::new(LasScan::open(path.as_ref())?))
-}
-
-/// An open file.
-struct LasScan {
-    source: Source,
-    info: ScanInfo,
-    schema: Schema,
-    record_len: usize,
-    laszip: Option<LaszipRecord>,
-    plan: Plan,
 }
 
 impl LasScan {

@@ -1,6 +1,5 @@
 //! The header: lines of a word and its values, up to DATA.
 
-use super::field_type;
 use crate::scan::source::Source;
 use crate::scan::tabular::lines;
 use crate::{Advice, AttributeType, Fault, ReadError, ScanWarning};
@@ -54,10 +53,20 @@ struct Lines {
     warnings: Vec<ScanWarning>,
 }
 
+/// True if the first bytes of a file say that it is PCD: a line of its header, behind comments.
+pub fn is_pcd(first_bytes: &[u8]) -> bool {
+    if first_bytes.starts_with(b"# .PCD") {
+        return true;
+    }
+    let mut lines = lines::lines(first_bytes).map(|(_, line)| line);
+    let first = lines.find(|l| lines::is_filled(l) && !l.starts_with(b"#")).unwrap_or_default();
+    [b"VERSION ".as_slice(), b"FIELDS ", b"COLUMNS "].iter().any(|word| first.starts_with(word))
+}
+
 impl Header {
     pub(super) fn read(source: &Source) -> Result<Self, ReadError> {
         let bytes = source.vec_at(0, MAX_HEADER)?;
-        if !super::is_pcd(&bytes) {
+        if !is_pcd(&bytes) {
             let what =
                 if bytes.is_empty() { "the file is empty" } else { "not a PCD file (no VERSION or FIELDS line)" };
             return Err(ReadError::broken(source.path(), 0, Fault::Header(what.to_owned()))
@@ -159,4 +168,21 @@ impl Lines {
 
 fn shown(word: &str) -> String {
     word.chars().take(40).collect()
+}
+
+/// A field's type from its SIZE and TYPE.
+fn field_type(size: &str, ty: &str) -> Option<AttributeType> {
+    Some(match (ty, size) {
+        ("I", "1") => AttributeType::Int8,
+        ("I", "2") => AttributeType::Int16,
+        ("I", "4") => AttributeType::Int32,
+        ("I", "8") => AttributeType::Int64,
+        ("U", "1") => AttributeType::UInt8,
+        ("U", "2") => AttributeType::UInt16,
+        ("U", "4") => AttributeType::UInt32,
+        ("U", "8") => AttributeType::UInt64,
+        ("F", "4") => AttributeType::Float32,
+        ("F", "8") => AttributeType::Float64,
+        _ => return None,
+    })
 }

@@ -23,15 +23,7 @@ use crate::scan::tabular::{
 use crate::{Advice, AttributeType, Fault, Piece, ReadError, Scan, ScanWarning};
 use header::{Encoding, Header};
 
-/// True if the first bytes of a file say that it is PCD: a line of its header, behind comments.
-pub fn is_pcd(first_bytes: &[u8]) -> bool {
-    if first_bytes.starts_with(b"# .PCD") {
-        return true;
-    }
-    let mut lines = lines::lines(first_bytes).map(|(_, line)| line);
-    let first = lines.find(|l| lines::is_filled(l) && !l.starts_with(b"#")).unwrap_or_default();
-    [b"VERSION ".as_slice(), b"FIELDS ", b"COLUMNS "].iter().any(|word| first.starts_with(word))
-}
+pub use header::is_pcd;
 
 /// Opens a PCD file: reads its header; ascii lines are counted, no point is decoded but a sample of those whose
 /// colours are floats.
@@ -154,21 +146,4 @@ impl Encoding {
             Self::Compressed => "binary compressed",
         }
     }
-}
-
-/// A field's type from its SIZE and TYPE.
-fn field_type(size: &str, ty: &str) -> Option<AttributeType> {
-    Some(match (ty, size) {
-        ("I", "1") => AttributeType::Int8,
-        ("I", "2") => AttributeType::Int16,
-        ("I", "4") => AttributeType::Int32,
-        ("I", "8") => AttributeType::Int64,
-        ("U", "1") => AttributeType::UInt8,
-        ("U", "2") => AttributeType::UInt16,
-        ("U", "4") => AttributeType::UInt32,
-        ("U", "8") => AttributeType::UInt64,
-        ("F", "4") => AttributeType::Float32,
-        ("F", "8") => AttributeType::Float64,
-        _ => return None,
-    })
 }

@@ -49,10 +49,15 @@ pub(super) struct Header {
     pub(super) warnings: Vec<ScanWarning>,
 }
 
+/// True if the first bytes of a file say that it is PLY.
+pub fn is_ply(first_bytes: &[u8]) -> bool {
+    first_bytes.strip_prefix(b"ply").is_some_and(|rest| rest.first().is_none_or(|b| *b <= b' '))
+}
+
 impl Header {
     pub(super) fn read(source: &Source) -> Result<Self, ReadError> {
         let bytes = source.vec_at(0, MAX_HEADER)?;
-        if !super::is_ply(&bytes) {
+        if !is_ply(&bytes) {
             let what =
                 if bytes.is_empty() { "the file is empty" } else { "not a PLY file (it does not start with ply)" };
             return Err(ReadError::broken(source.path(), 0, Fault::Header(what.to_owned())).advise(Advice::WrongFile));

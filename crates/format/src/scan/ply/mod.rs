@@ -38,10 +38,7 @@ use crate::scan::tabular::{Property, RowScan, Schema, precision, resolution, set
 use crate::{Advice, AttributeType, Fault, ReadError, Scan};
 use header::{Encoding, Header, Kind};
 
-/// True if the first bytes of a file say that it is PLY.
-pub fn is_ply(first_bytes: &[u8]) -> bool {
-    first_bytes.strip_prefix(b"ply").is_some_and(|rest| rest.first().is_none_or(|b| *b <= b' '))
-}
+pub use header::is_ply;
 
 /// Opens a PLY file: reads its header, and finds the vertices; ascii lines are counted, no point is decoded but a
 /// sample of those whose colours are floats.

@@ -30,44 +30,19 @@
 
 mod columns;
 mod off;
+mod options;
 mod pts;
 mod ptx;
+mod rows;
 mod xyz;
 
 use std::path::Path;
 
 use crate::scan::source::Source;
-use crate::scan::tabular::ascii::{Tokens, parse};
-use crate::scan::tabular::lines;
 use crate::{Advice, Fault, ReadError, Scan};
+use rows::{filled, is_comment, is_count, number_count};
 
-/// What the file does not say of itself.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct TextOptions {
-    /// Names of all columns in file order: `x`, `y`, `z`, `r`, `g`, `b`, `i` (intensity), `c` (classification), `nx`,
-    /// `ny`, `nz`; `-` is left out; any other becomes an attribute of that name. A type may follow a colon
-    /// (`quality:uint8`). `None`: found by the rules above. Ignored in PTX and OFF files.
-    pub columns: Option<Vec<String>>,
-    /// Between two fields; `None`: found. A blank means any blanks.
-    pub separator: Option<char>,
-}
-
-impl TextOptions {
-    /// Sets [`Self::columns`].
-    #[must_use]
-    pub fn columns<N: Into<String>>(mut self, names: impl IntoIterator<Item = N>) -> Self {
-        self.columns = Some(names.into_iter().map(Into::into).collect());
-        self
-    }
-
-    /// Sets [`Self::separator`].
-    #[must_use]
-    pub fn separator(mut self, separator: char) -> Self {
-        self.separator = Some(separator);
-        self
-    }
-}
+pub use options::TextOptions;
 
 /// The kinds of text that are told apart by content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -160,62 +135,6 @@ pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Sca
 /// What is wrong with them, for people: x or y is missing, a name stands twice, a type is not known.
 pub fn check_columns(names: &[String]) -> Result<(), String> {
     columns::check(names)
-}
-
-/// The filled lines of the first bytes, 64 at most; the last one may be cut and counts only if it is the only one.
-fn filled(first_bytes: &[u8]) -> Vec<&[u8]> {
-    let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);
-    let mut lines: Vec<_> = lines::lines(text).map(|(_, l)| l).filter(|l| lines::is_filled(l)).take(64).collect();
-    if lines.len() > 3 && lines.len() < 64 && !text.ends_with(b"\n") {
-        lines.pop();
-    }
-    lines
-}
-
-/// UTF-8 with a signature.
-const BOM: &[u8] = &[0xef, 0xbb, 0xbf];
-
-/// Line starts of comments.
-const COMMENTS: [&[u8]; 3] = [b"#", b"//", b"%"];
-
-fn is_comment(line: &[u8]) -> bool {
-    let line = line.trim_ascii_start();
-    COMMENTS.iter().any(|c| line.starts_with(c))
-}
-
-/// A line of numbers, if the file is what it should be.
-fn is_data(line: &[u8]) -> bool {
-    // a digit first is the usual row
-    if line.first().is_some_and(|b| b.is_ascii_digit() || *b == b'-') {
-        return true;
-    }
-    lines::is_filled(line) && !is_comment(line)
-}
-
-/// A line of one whole number without sign.
-fn is_count(line: &[u8]) -> bool {
-    let line = line.trim_ascii();
-    (1..=20).contains(&line.len()) && line.iter().all(u8::is_ascii_digit)
-}
-
-/// `;` before `,` before blanks: a decimal comma needs another separator.
-fn separator(line: &[u8]) -> Option<u8> {
-    [b';', b','].into_iter().find(|s| line.contains(s))
-}
-
-/// The fields of a line.
-fn fields(line: &[u8], separator: Option<u8>) -> Vec<&[u8]> {
-    let mut tokens = Tokens { line, at: 0, separator };
-    std::iter::from_fn(|| (!tokens.is_empty()).then(|| tokens.token())).collect()
-}
-
-fn is_number(field: &[u8]) -> bool {
-    parse(field).is_ok()
-}
-
-/// Fields up to the first that is no number.
-fn number_count(line: &[u8]) -> usize {
-    fields(line, separator(line)).iter().take_while(|f| !f.is_empty() && is_number(f)).count()
 }
 
 #[cfg(test)]

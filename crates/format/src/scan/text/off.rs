@@ -1,7 +1,7 @@
 //! OFF: a keyword, three counts, the vertices. Faces and edges are not read.
 
 use super::columns::{Column, Table};
-use super::{BOM, fields, is_data, is_number};
+use super::rows::{BOM, fields, is_data, is_number};
 use crate::scan::source::Source;
 use crate::scan::tabular::{LineRule, lines, reconcile};
 use crate::{Advice, ReadError, Scan};

@@ -3,8 +3,9 @@
 use std::cell::Cell;
 
 use super::columns::Table;
+use super::options::TextOptions;
+use super::rows::{BOM, fields, is_count, is_data, is_number, separator};
 use super::xyz::{named, wanted_separator};
-use super::{BOM, TextOptions, fields, is_count, is_data, is_number, separator};
 use crate::scan::source::Source;
 use crate::scan::tabular::{LineRule, lines, reconcile};
 use crate::{Advice, ReadError, Scan, ScanWarning};

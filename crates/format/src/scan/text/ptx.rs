@@ -4,7 +4,7 @@
 //! world coordinates. Cell by cell follow x, y, z, intensity and perhaps red, green, blue.
 
 use super::columns::{Column, Table};
-use super::{fields, is_number};
+use super::rows::{fields, is_number};
 use crate::scan::source::Source;
 use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::{LineRule, Pose, lines, reconcile};

@@ -1,7 +1,8 @@
 //! Lines of numbers without more order than that.
 
 use super::columns::{Column, Table};
-use super::{BOM, TextOptions, fields, is_comment, is_data, is_number, separator};
+use super::options::TextOptions;
+use super::rows::{BOM, fields, is_comment, is_data, is_number, separator};
 use crate::scan::source::Source;
 use crate::scan::tabular::{LineRule, Role, lines};
 use crate::{Advice, ReadError, Scan};
@@ -58,7 +59,7 @@ impl Head {
         if first.first().is_some_and(|f| !is_number(f)) {
             names = Some(header_names(row, separator));
             (at, row) = data.get(1).map(|(at, line)| (*at, line)).ok_or_else(none)?;
-            separator = wanted_separator(options).unwrap_or_else(|| super::separator(row));
+            separator = wanted_separator(options).unwrap_or_else(|| super::rows::separator(row));
         }
         let numeric: Vec<bool> = fields(row, separator).iter().map(|f| is_number(f)).collect();
         if numeric.iter().filter(|n| **n).count() < 2 {

@@ -134,7 +134,7 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
 struct Judge<'a>(&'a Findings);
 
 impl Judge<'_> {
-    /// One promise of the metadata: kept, or a finding.
+    /// One requirement of the metadata: met, or a finding.
     fn that(&self, kept: bool, subject: &str, expected: &str, found: &Value) {
         self.0.checked(Check::Metadata, 1);
         if !kept {

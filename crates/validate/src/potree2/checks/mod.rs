@@ -1,4 +1,4 @@
-//! One promise of the format per file. Each takes what it needs and pushes findings.
+//! One check per file. Each takes what it needs and pushes findings.
 
 pub(crate) mod coverage;
 pub(crate) mod metadata;

@@ -48,7 +48,7 @@ pub(crate) fn boxes(key: NodeKey, positions: [&[i32]; 3], geometry: &Geometry, f
     false
 }
 
-/// Ascending Morton codes, which BROTLI promises.
+/// Ascending Morton codes, which BROTLI requires.
 pub(crate) fn order(key: NodeKey, positions: [&[i32]; 3], findings: &Findings) {
     let [xs, ys, zs] = positions;
     findings.checked(Check::Order, xs.len() as u64);

@@ -6,7 +6,7 @@ use crate::potree2::tree::{Tree, TreeNode};
 
 /// Checks all ranges and marks the nodes whose payload may be read.
 ///
-/// `record_len`: bytes a point if payloads are interleaved records (DEFAULT), else `None`.
+/// `record_len`: bytes per point if payloads are interleaved records (DEFAULT), else `None`.
 pub(crate) fn check(tree: &mut Tree, file_size: u64, record_len: Option<u64>, findings: &Findings) {
     findings.checked(Check::PayloadRanges, tree.nodes.len() as u64);
     for node in &mut tree.nodes {

@@ -1,4 +1,4 @@
-//! What the metadata says about values: the tight box, min and max of every attribute, histograms.
+//! Values in the metadata: the tight box, min and max of every attribute, histograms.
 
 use pointmill_format::potree2::{AttributeStats, Metadata};
 use pointmill_format::{Column, NodePoints, with_column};
@@ -96,7 +96,7 @@ fn others(metadata: &Metadata) -> impl Iterator<Item = &AttributeStats> {
     metadata.attributes.iter().filter(|a| a.attribute.name != "position")
 }
 
-/// Compares what the metadata says with what was seen. If not every node could be read (`complete` is false), only
+/// Compares the metadata with the values found. If not every node could be read (`complete` is false), only
 /// values beyond the bounds are found, not bounds that nothing attains.
 pub(crate) fn check(metadata: &Metadata, geometry: &Geometry, seen: &Seen, complete: bool, findings: &Findings) {
     if seen.points == 0 {

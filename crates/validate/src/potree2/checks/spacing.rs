@@ -9,14 +9,14 @@ use crate::potree2::expect::Geometry;
 use crate::potree2::grid::{Grid, Origin, square};
 use crate::potree2::quality::Tally;
 
-/// What inner nodes promise.
+/// How inner nodes are sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sampling {
     /// No two points of a node closer than the spacing of its level, less one lattice step.
     Poisson,
     /// At most one point in each cell of the node's 128³ grid (grid and random sampling).
     Cells,
-    /// The dataset does not say: one of the two, throughout.
+    /// Not stated in the dataset: one of the two, throughout.
     Unknown,
 }
 

@@ -1,10 +1,10 @@
-//! What the records of the hierarchy promise beyond their bytes: types, counts, depth.
+//! Types, counts and depth in the records of the hierarchy.
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::potree2::tree::Tree;
 
-/// Types, empty nodes, depth and the sum of points. `points` and `depth` are what the metadata says.
+/// Types, empty nodes, depth and the sum of points. `points` and `depth` are from the metadata.
 pub(crate) fn check(tree: &Tree, points: u64, depth: u32, findings: &Findings) {
     let nodes = tree.nodes.len() as u64;
     findings.checked(Check::NodeTypes, nodes);
