@@ -52,6 +52,7 @@ mod error;
 mod geometry;
 mod names;
 mod points;
+mod write_error;
 
 pub mod batches;
 pub mod bintree;
@@ -68,6 +69,7 @@ pub use scan::{
     Batches, Counted, Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart,
     ScanWarning, Scratch, Sink, UnknownAttribute, Wanted, open_scan, supported_scans,
 };
+pub use write_error::WriteError;
 
 /// The JSON library whose types hold keys that a format leaves free ([`potree2::Metadata::extra`]).
 pub use serde_json;
@@ -92,7 +94,7 @@ const _: () = {
     shared::<Batches<'static>>();
     shared::<bytes::Folder>();
     shared::<ReadError>();
-    shared::<batches::WriteError>();
+    shared::<WriteError>();
 };
 
 /// The example in the README compiles, or the tests fail.
