@@ -10,6 +10,13 @@ check:
 test:
     cargo test --workspace
 
+# Each feature of the format crate by itself
+features:
+    for feature in `sed -n '/^\[features\]/,/^\[dep/s/^\([a-z0-9]*\) = .*/\1/p' crates/format/Cargo.toml`; do \
+        cargo clippy -q -p pointmill-format --all-targets --no-default-features --features $feature -- -D warnings && \
+        cargo test -q -p pointmill-format --lib --no-default-features --features $feature || exit 1; \
+    done
+
 # Converts the scan in fixtures/ and validates the dataset, as the README does
 demo:
     eval "$(sed -n '/^cargo run --release/p' README.md)"

@@ -203,9 +203,12 @@ fn kind_in_folder(path: &Path) -> io::Result<Kind> {
 }
 
 fn content(path: &Path) -> io::Result<Option<ScanKind>> {
-    ScanKind::of_file(path).map_err(|e| match e.kind {
-        ErrorKind::Io(error) => error,
-        _ => io::Error::other(e.to_string()),
+    ScanKind::of_file(path).map_err(|e| {
+        let line = e.to_string();
+        match e.into_kind() {
+            ErrorKind::Io(error) => error,
+            _ => io::Error::other(line),
+        }
     })
 }
 
@@ -318,7 +321,7 @@ mod tests {
     fn a_file_whose_columns_are_named_is_taken_for_text() {
         let dir = folder();
         fs::write(dir.path().join("flat.dat"), "1 2\n3 4\n").unwrap();
-        let named = OpenOptions { columns: Some(vec!["x".into(), "y".into()]), ..OpenOptions::default() };
+        let named = OpenOptions::default().columns(["x", "y"]);
         let code = |name: &str| expand(&[dir.path().join(name)], &named).map_err(|e| e.code());
         assert_eq!(names(&code("flat.dat").unwrap()), ["flat.dat"]);
         assert_eq!(code("notes.txt").unwrap_err(), 3);

@@ -20,6 +20,8 @@ fn open(
     columns: Option<&str>,
     separator: Option<char>,
 ) -> Result<Box<dyn pointmill_format::Scan>, pointmill_format::ReadError> {
-    let columns = columns.map(|list| list.split(',').map(str::to_owned).collect());
-    text::open(path, &TextOptions { columns, separator })
+    let mut options = TextOptions::default();
+    options.columns = columns.map(|list| list.split(',').map(str::to_owned).collect());
+    options.separator = separator;
+    text::open(path, &options)
 }

@@ -51,8 +51,9 @@ impl ReadingArgs {
             pointmill_format::scan::text::check_columns(columns)
                 .map_err(|e| Failure::Usage(format!("--columns: {e}")))?;
         }
-        let Self { columns, separator, row_column } = self;
-        Ok(OpenOptions { columns: columns.clone(), separator: *separator, keep_row_column: *row_column })
+        let mut options = OpenOptions::default().keep_row_column(self.row_column);
+        (options.columns, options.separator) = (self.columns.clone(), self.separator);
+        Ok(options)
     }
 }
 

@@ -86,7 +86,7 @@ fn require_dataset(dataset: &Path) -> Result<(), Failure> {
     if !dataset.exists() {
         return Err(Failure::Usage(format!("{path}: no such dataset")));
     }
-    let located = locate(dataset).map_err(|error| match error.kind {
+    let located = locate(dataset).map_err(|error| match error.kind() {
         ErrorKind::Io(_) => Failure::from(error),
         _ => Failure::Usage(error.to_string()),
     })?;
@@ -98,7 +98,7 @@ fn require_dataset(dataset: &Path) -> Result<(), Failure> {
 
 /// A broken dataset is a result of the validation, also when a reader reports it.
 fn failure(error: ReadError, dataset: &Path) -> Failure {
-    let in_dataset = error.path.starts_with(dataset);
+    let in_dataset = error.path().starts_with(dataset);
     match Failure::from(error) {
         Failure::Input(line) if in_dataset => Failure::Faults(line),
         other => other,

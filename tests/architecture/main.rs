@@ -39,7 +39,7 @@ const LAYERS: [(&str, Layers<'static>); 4] = [
     (
         "pointmill-format",
         &[
-            &["error", "bytes", "geometry", "names"],
+            &["error", "write_error", "bytes", "geometry", "names"],
             &["points"],
             &["scan"],
             &["potree2", "bintree", "batches"],

@@ -34,7 +34,7 @@ fn plan(inputs: Vec<PathBuf>, out: PathBuf) -> Plan {
     plan.scale = ScaleChoice::Fixed(0.01);
     plan.name = "cloud".into();
     let columns = ["x", "y", "z", "c"].map(str::to_owned).to_vec();
-    plan.open = OpenOptions { columns: Some(columns), ..OpenOptions::default() };
+    plan.open = OpenOptions::default().columns(columns);
     plan
 }
 

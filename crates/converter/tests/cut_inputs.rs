@@ -48,9 +48,9 @@ fn check(folder: &str) {
                 }
                 Err(ConvertError::Read(e)) => {
                     let line = e.to_string();
-                    assert!(matches!(e.kind, ErrorKind::Broken) && e.path == input, "{line}");
-                    assert!(e.offset.is_some_and(|at| at <= cut as u64), "cut to {cut}: {line}");
-                    assert!(!e.advice.is_empty() && !line.contains('\n'), "{line}");
+                    assert!(matches!(e.kind(), ErrorKind::Broken) && e.path() == input, "{line}");
+                    assert!(e.offset().is_some_and(|at| at <= cut as u64), "cut to {cut}: {line}");
+                    assert!(e.advice().is_some() && !line.contains('\n'), "{line}");
                 }
                 Err(e) => panic!("{name} cut to {cut}: {e}"),
             }

@@ -11,7 +11,7 @@ fn main() -> Result<(), ReadError> {
     let positions_only = std::env::args().any(|a| a == "--positions");
     for path in std::env::args().skip(1).filter(|a| !a.starts_with("--")) {
         let start = Instant::now();
-        let scan = e57::open(path.as_ref())?;
+        let scan = e57::open(&path)?;
         let opened = start.elapsed().as_secs_f64();
         scan.info().warnings.iter().for_each(|line| eprintln!("{path}: {line}"));
         let wanted = if positions_only { Wanted::positions(scan.info()) } else { Wanted::all(scan.info()) };

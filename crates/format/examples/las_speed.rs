@@ -10,7 +10,7 @@ use pointmill_format::{Positions, ReadError, Scratch, Wanted};
 fn main() -> Result<(), ReadError> {
     let positions_only = std::env::args().any(|a| a == "--positions");
     for path in std::env::args().skip(1).filter(|a| !a.starts_with("--")) {
-        let scan = las::open(path.as_ref())?;
+        let scan = las::open(&path)?;
         scan.info().warnings.iter().for_each(|line| eprintln!("{path}: {line}"));
         let wanted = if positions_only { Wanted::positions(scan.info()) } else { Wanted::all(scan.info()) };
         let (mut scratch, mut points, mut sum) = (Scratch::default(), 0, [0i64; 3]);

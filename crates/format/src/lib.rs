@@ -1,17 +1,50 @@
-//! Readers and writers of point-cloud formats, for renderers and for preprocessors.
+//! Point-cloud files, for renderers and for preprocessors: scans become columns, datasets become nodes, and back.
 //!
-//! * [`batches`]: quantised batches with levels of detail, mapped as they stand (cargo features `mmap`, `zstd`), and written.
+//! A scan (LAS, LAZ, E57, PLY, PCD, text) is a list of attributes and a run of points. [`open_scan`] detects the kind from
+//! the content and reads the header; batches of points follow, a typed column per attribute:
+//!
+//! ```
+//! # #[cfg(feature = "las")] {
+//! use pointmill_format::{OpenOptions, Positions, Wanted, open_scan};
+//!
+//! # let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/las/format7.laz");
+//! let scan = open_scan(file, &OpenOptions::default())?;
+//! let info = scan.info();
+//! println!("{}, {} points, EPSG {:?}", info.format, info.points_declared, info.crs.epsg);
+//! info.warnings.iter().for_each(|warning| println!("{warning}"));
+//!
+//! let (mut points, mut brightest) = (0, 0);
+//! for batch in scan.batches(Wanted::named(info, ["intensity"])?) {
+//!     let batch = batch?;
+//!     if let (Positions::Quantized([x, y, z]), Some(lattice)) = (&batch.positions, info.lattice) {
+//!         let first = lattice.world([x[0], y[0], z[0]].map(i64::from));
+//!         println!("{} points from {first:?} on", batch.len());
+//!     }
+//!     let intensity = batch.column::<u16>("intensity").ok_or("no intensity")?;
+//!     brightest = intensity.iter().copied().max().unwrap_or(0).max(brightest);
+//!     points += batch.len() as u64;
+//! }
+//! assert_eq!(points, info.points_declared);
+//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Programs that use all cores decode the pieces of a scan on their own threads ([`Scan::decode`]).
+//!
+//! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
+//!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF); `scans` is all of them.
+//! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written
 //!   (feature `rstar`: nearest points too).
-//! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
-//! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
-//!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF).
+//! * [`batches`]: quantised batches with levels of detail, mapped as they stand (features `mmap`, `zstd`), and written.
 //! * [`bytes`]: positioned reads and writes of files.
 //!
-//! [`open_scan`] opens a scan of any kind whose feature is on; the kind is detected from the content.
+//! The feature `serde` gives boxes, lattices and node keys their serialisation.
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
-//! found in a file are never trusted; an allocation is bounded by the size of the file that asks for it.
+//! found in a file are never trusted; an allocation is bounded by the size of the file that asks for it. A decompressor
+//! that panics on corrupt bytes is caught, and the panic is an error ([`Fault::Decode`]); the panic hook of the process
+//! is left alone, so the default one prints a line.
 #![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a module of its own
 
 mod dataset_kind;
@@ -19,6 +52,7 @@ mod error;
 mod geometry;
 mod names;
 mod points;
+mod write_error;
 
 pub mod batches;
 pub mod bintree;
@@ -27,14 +61,15 @@ pub mod potree2;
 pub mod scan;
 
 pub use dataset_kind::{DatasetKind, Located, locate};
-pub use error::{ErrorKind, ReadError};
+pub use error::{Advice, ErrorKind, Fault, ReadError};
 pub use geometry::{Aabb, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart, Scratch, Sink, Wanted,
-    open_scan, supported_scans,
+    Batches, Counted, Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart,
+    ScanWarning, Scratch, Sink, UnknownAttribute, Wanted, open_scan, supported_scans,
 };
+pub use write_error::WriteError;
 
 /// The JSON library whose types hold keys that a format leaves free ([`potree2::Metadata::extra`]).
 pub use serde_json;
@@ -52,9 +87,14 @@ const _: () = {
     shared::<bintree::Picker>();
     shared::<batches::Batches<batches::AlignedBytes>>();
     shared::<NodePoints>();
+    shared::<Box<dyn Scan>>();
+    shared::<ScanInfo>();
+    shared::<PointBatch>();
+    shared::<Scratch>();
+    shared::<Batches<'static>>();
     shared::<bytes::Folder>();
     shared::<ReadError>();
-    shared::<batches::WriteError>();
+    shared::<WriteError>();
 };
 
 /// The example in the README compiles, or the tests fail.

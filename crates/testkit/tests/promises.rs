@@ -1,11 +1,11 @@
 //! A scan in memory that breaks one promise at a time: each is noticed, and named.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::sync::Arc;
 
 use pointmill_format::{
-    Attribute, AttributeType, Column, Crs, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo,
-    Scratch, Sink, Wanted,
+    Attribute, AttributeType, Column, Piece, PointBatch, Positions, ReadError, Scan, ScanInfo, ScanWarning, Scratch,
+    Sink, Wanted,
 };
 use pointmill_testkit::reader::{columns_are_independent, keeps_promises, read};
 
@@ -17,7 +17,6 @@ enum Fault {
     EmptyPiece,
     PieceOutside,
     ManyWarnings,
-    WarningOfTwoLines,
     SkippedPoint,
     EmptyBatch,
     LargeBatch,
@@ -61,32 +60,21 @@ fn fake(fault: Fault) -> Fake {
     ];
     let piece = |i: u64| Piece { first_point: i * PIECE, points: PIECE, byte_offset: i * 1000, byte_len: 1000 };
     let mut pieces: Vec<Piece> = (0..3).map(piece).collect();
-    let mut warnings = vec!["the header is odd".to_owned()];
+    let mut warnings = vec![ScanWarning::Other("the header is odd".to_owned())];
     match fault {
         Fault::Gap => pieces[1].first_point += 1,
         Fault::EmptyPiece => pieces[2].points = 0,
         Fault::PieceOutside => pieces[2].byte_len = u64::MAX,
-        Fault::ManyWarnings => warnings = vec!["odd".to_owned(); 1000],
-        Fault::WarningOfTwoLines => warnings[0] += "\nand so on",
+        Fault::ManyWarnings => warnings = vec![ScanWarning::NoScans; 1000],
         Fault::LargeBatch => pieces[0].points = 100_000,
         _ => {}
     }
     if fault == Fault::LargeBatch {
         pieces.truncate(1);
     }
-    let info = ScanInfo {
-        path: PathBuf::from("fake"),
-        format: "fake".into(),
-        points_declared: 3 * PIECE,
-        bounds_declared: None,
-        lattice: None,
-        resolution: Resolution::Double,
-        parts: Vec::new(),
-        attributes,
-        crs: Crs::default(),
-        file_bytes: FILE_BYTES,
-        warnings,
-    };
+    let mut info = ScanInfo::new("fake", "fake", 3 * PIECE);
+    info.attributes = attributes.into();
+    (info.file_bytes, info.warnings) = (FILE_BYTES, warnings);
     Fake { info, pieces, fault, decodes: 0.into() }
 }
 
@@ -95,21 +83,21 @@ impl Fake {
     fn batch(&self, first_point: u64, len: u64, wanted: &Wanted, decode: usize) -> PointBatch {
         let fault = self.fault;
         let again = if fault == Fault::OtherValuesAgain && decode > 3 { 1.0 } else { 0.0 };
-        let alone = !wanted.0.contains(&true) && fault == Fault::OtherPositionsAlone;
+        let alone = !wanted.flags().contains(&true) && fault == Fault::OtherPositionsAlone;
         let value = |i: u64| (first_point + i) as f64 + if alone { 0.5 } else { 0.0 };
         let axis = |k: f64| (0..len).map(|i| if i == 7 { f64::NAN } else { k * value(i) }).collect::<Vec<f64>>();
         let mut xyz = [axis(1.0), axis(-1.0), axis(0.25)];
         if fault == Fault::UnequalAxes {
             xyz[1].pop();
         }
-        let filled = |i: usize| wanted.0[i] || fault == Fault::UnwantedColumn;
+        let filled = |i: usize| wanted.is_wanted(i) || fault == Fault::UnwantedColumn;
         let count = |i: usize, elements: u64| if filled(i) { (len * elements) as usize } else { 0 };
-        let only_one = wanted.0.iter().filter(|w| **w).count() == 1;
+        let only_one = wanted.flags().iter().filter(|w| **w).count() == 1;
         let shift = u16::from(fault == Fault::OtherColumnAlone && only_one);
         let times = (0..count(2, 1)).map(|i| value(i as u64) + again).collect();
         let mut columns = vec![
             Column::UInt16(vec![9 + shift; count(0, 3)]),
-            Column::UInt16(vec![7; count(1, 1) - usize::from(fault == Fault::ShortColumn && wanted.0[1])]),
+            Column::UInt16(vec![7; count(1, 1) - usize::from(fault == Fault::ShortColumn && wanted.is_wanted(1))]),
             Column::Float64(times),
         ];
         match fault {
@@ -121,16 +109,14 @@ impl Fake {
             Fault::NoLattice => Positions::Quantized([0, 1, 2].map(|_| vec![1; len as usize])),
             _ => Positions::World(xyz),
         };
-        PointBatch { first_point, positions, columns }
+        let mut batch = PointBatch::new(first_point, positions, Arc::clone(&self.info.attributes));
+        batch.columns = columns;
+        batch
     }
 
     fn error(&self) -> Option<ReadError> {
         match self.fault {
-            Fault::ErrorOfTwoLines => {
-                let mut error = ReadError::broken("fake", 7, "odd").advise("look at it");
-                error.what += "\nvery odd";
-                Some(error)
-            }
+            Fault::ErrorOfTwoLines => Some(ReadError::broken("fake", 7, "odd").advise("look at it\nvery closely")),
             Fault::ErrorWithoutByte => Some(ReadError::broken("fake", None, "odd").advise("look at it")),
             Fault::ErrorWithoutAdvice => Some(ReadError::broken("fake", 7, "odd")),
             _ => None,
@@ -216,7 +202,6 @@ fn each_broken_promise_is_noticed_and_named() {
         (Fault::EmptyPiece, "piece 2 is empty"),
         (Fault::PieceOutside, "piece 2 ends outside the file"),
         (Fault::ManyWarnings, "1000 warnings"),
-        (Fault::WarningOfTwoLines, "a warning is not one line"),
         (Fault::SkippedPoint, "batches are consecutive"),
         (Fault::EmptyBatch, "a batch of 0 points"),
         (Fault::LargeBatch, "a batch of 100000 points"),

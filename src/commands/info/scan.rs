@@ -58,7 +58,7 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
         let ranges = measured.map(|m| m.ranges[i].as_slice());
         t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, ranges));
     }
-    info.warnings.iter().for_each(|w| t.row("warning", w));
+    info.warnings.iter().for_each(|w| t.row("warning", w.to_string()));
     t.0
 }
 
@@ -145,7 +145,7 @@ fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
         "attributes": info.attributes.iter().map(attribute_json).collect::<Vec<_>>(),
         "pieces": scan.pieces().len(),
         "file_bytes": info.file_bytes,
-        "warnings": info.warnings,
+        "warnings": info.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
     });
     if let Some(measured) = measured {
         let names = info.attributes.iter().map(|a| a.name.clone());

@@ -41,7 +41,7 @@ impl Intake {
             let columns: Vec<Option<usize>> = source.columns.iter().map(|c| places[*c]).collect();
             let attributes = &source.scan.info().attributes;
             let is_filtered = |i: usize| plan.filter.classes.is_some() && attributes[i].name == "classification";
-            let wanted = Wanted(columns.iter().enumerate().map(|(i, c)| c.is_some() || is_filtered(i)).collect());
+            let wanted = columns.iter().enumerate().map(|(i, c)| c.is_some() || is_filtered(i)).collect::<Wanted>();
             SourceIntake { columns, wanted }
         };
         let of_sources = sources.all.iter().map(of_source).collect();

@@ -207,22 +207,11 @@ fn single_step(bounds: &Aabb) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pointmill_format::Crs;
 
     fn info(lattice: Option<Lattice>, resolution: Resolution) -> ScanInfo {
-        ScanInfo {
-            path: "x".into(),
-            format: String::new(),
-            points_declared: 0,
-            bounds_declared: None,
-            lattice,
-            resolution,
-            parts: vec![],
-            attributes: vec![],
-            crs: Crs::default(),
-            file_bytes: 0,
-            warnings: vec![],
-        }
+        let mut info = ScanInfo::new("x", "", 0);
+        (info.lattice, info.resolution) = (lattice, resolution);
+        info
     }
 
     fn with(lattices: &[Lattice], choice: ScaleChoice) -> Lattice {

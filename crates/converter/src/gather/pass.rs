@@ -151,8 +151,8 @@ impl<'a> Pass<'a> {
                 worker.stats.warnings.push(warning);
                 Ok(())
             }
-            Err(error) if error.advice.is_empty() => {
-                Err(error.advise("copy the file again, or pass --unreadable skip to convert the rest").into())
+            Err(error) if error.advice().is_none() => {
+                Err(error.advise(pointmill_format::Advice::SkipUnreadable).into())
             }
             Err(error) => Err(error.into()),
         }

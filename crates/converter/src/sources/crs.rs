@@ -214,11 +214,11 @@ mod tests {
     use super::*;
 
     fn geotiff(code: u32) -> ResolvedCrs {
-        resolve_scan(&Crs { epsg: Some(code), ..Crs::default() })
+        resolve_scan(&Crs::new(None, Some(code), None))
     }
 
     fn in_wkt(text: &str, epsg: Option<u32>) -> ResolvedCrs {
-        resolve_scan(&Crs { wkt: Some(text.into()), epsg, vertical_epsg: None })
+        resolve_scan(&Crs::new(Some(text.into()), epsg, None))
     }
 
     fn given(text: &str) -> Result<ResolvedCrs, PlanError> {
@@ -239,7 +239,7 @@ mod tests {
         assert_eq!(geotiff(25832).label, "EPSG:25832 ETRS89 / UTM zone 32N");
         assert!(geotiff(3857).projection.starts_with("+proj=merc +a=6378137 +b=6378137"));
         assert!(geotiff(3857).projection.contains("+nadgrids=@null"));
-        let crs = Crs { epsg: Some(2994), vertical_epsg: Some(5703), wkt: None };
+        let crs = Crs::new(None, Some(2994), Some(5703));
         assert!(resolve_scan(&crs).label.ends_with("(ft) + EPSG:5703"));
     }
 

@@ -55,7 +55,7 @@ impl Sources {
                     points_missing = points_missing.saturating_add(missing);
                     scans.push(scan);
                 }
-                Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind, ErrorKind::Unsupported) => {
+                Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind(), ErrorKind::Unsupported) => {
                     warnings.push(Warning::InputSkipped { error: error.to_string() });
                 }
                 Err(error) => return Err(error.into()),
@@ -97,9 +97,10 @@ fn missing_points(scan: &dyn Scan, policy: OnFault) -> Result<u64, ReadError> {
     let found: u64 = scan.pieces().iter().map(|p| p.points).sum();
     let missing = info.points_declared.saturating_sub(found);
     if missing > 0 && policy == OnFault::Fail {
-        let what = format!("the header declares {} points, the file holds {found}", info.points_declared);
-        return Err(ReadError::broken(&info.path, info.file_bytes, what)
-            .advise("copy the file again, or pass --unreadable skip to convert the points that are there"));
+        let fault = pointmill_format::Fault::PointsMissing { declared: info.points_declared, found };
+        return Err(
+            ReadError::broken(&info.path, info.file_bytes, fault).advise(pointmill_format::Advice::SkipUnreadable)
+        );
     }
     Ok(missing)
 }

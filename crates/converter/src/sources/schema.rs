@@ -149,22 +149,11 @@ fn place(all: &mut Vec<Attribute>, attribute: &Attribute) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pointmill_format::Crs;
 
     fn scan(attributes: Vec<Attribute>) -> ScanInfo {
-        ScanInfo {
-            path: "x".into(),
-            format: String::new(),
-            points_declared: 0,
-            bounds_declared: None,
-            lattice: None,
-            resolution: Default::default(),
-            parts: vec![],
-            attributes,
-            crs: Crs::default(),
-            file_bytes: 0,
-            warnings: vec![],
-        }
+        let mut info = ScanInfo::new("x", "", 0);
+        info.attributes = attributes.into();
+        info
     }
 
     #[test]

@@ -6,8 +6,8 @@ use std::path::Path;
 #[cfg(doc)]
 use super::DEFAULT_BATCHES_PER_BLOCK;
 use super::blocks::MAX_BATCHES_PER_BLOCK;
-use super::{BATCH_POINTS, Batches, Description, Flags, HEADER_BYTES, Header, Part, Section, WriteError, align};
-use crate::{Attribute, ReadError};
+use super::{BATCH_POINTS, Batches, Description, Flags, HEADER_BYTES, Header, Part, Section, align};
+use crate::{Attribute, ReadError, WriteError};
 
 /// Writes the cloud of `source` to `out` with compressed sections, from its position 0 on.
 ///

@@ -4,7 +4,8 @@ use std::borrow::Cow;
 
 use super::describe::{ErrorFigures, PlaneErrors};
 use super::record::quantize;
-use super::{BATCH_POINTS, BatchRecord, WriteError, f32_above, f32_below};
+use super::{BATCH_POINTS, BatchRecord, f32_above, f32_below};
+use crate::WriteError;
 
 /// A batch as it goes to the file. Reuse one: its vectors keep their memory.
 #[derive(Debug, Clone)]

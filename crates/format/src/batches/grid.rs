@@ -1,7 +1,7 @@
 //! From world coordinates to cells, Morton coordinates and float32 boxes (`docs/formats/batches.md`, §2 and §5).
 
-use super::WriteError;
 use crate::Aabb;
+use crate::WriteError;
 use crate::geometry::morton::{morton21, morton32};
 
 /// Levels of detail that have cells: 0, 1, 2. Points that are in none of them have level 3.

@@ -289,7 +289,7 @@ mod tests {
             let mut bytes = header().encode();
             bytes[at] = value;
             let error = Header::parse(&bytes, Path::new("a")).unwrap_err();
-            assert!(matches!(error.kind, crate::ErrorKind::Unsupported), "{error}");
+            assert!(matches!(error.kind(), crate::ErrorKind::Unsupported), "{error}");
         }
     }
 

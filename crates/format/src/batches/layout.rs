@@ -1,11 +1,11 @@
 //! Where everything of a file will lie, before anything is written (`docs/formats/batches.md`, §1.1).
 
-use crate::{Aabb, Attribute};
+use crate::{Aabb, Attribute, WriteError};
 
 use super::describe::{AttributeEntry, Description};
 use super::{
-    BATCH_POINTS, Flags, Grid, HEADER_BYTES, Header, MAX_POINTS, Part, Precision, Sections, WriteError, align,
-    batch_count, swap_slot,
+    BATCH_POINTS, Flags, Grid, HEADER_BYTES, Header, MAX_POINTS, Part, Precision, Sections, align, batch_count,
+    swap_slot,
 };
 
 /// A range of the file, in bytes.
@@ -144,7 +144,7 @@ impl Layout {
     /// use pointmill_format::batches::{Layout, Part, Precision};
     /// use pointmill_format::{Attribute, AttributeType};
     ///
-    /// # fn main() -> Result<(), pointmill_format::batches::WriteError> {
+    /// # fn main() -> Result<(), pointmill_format::WriteError> {
     /// let attributes = [Attribute::new("intensity", AttributeType::UInt16, 1)];
     /// let layout = Layout::new(1000, &attributes, Precision::Ten)?;
     /// let sections: Vec<_> = layout.sections().map(|s| (s.part, s.bytes_per_point, s.section.offset)).collect();
@@ -234,7 +234,7 @@ impl Layout {
         description.errors = description.errors.up_to(self.precision());
         let text = description.to_json();
         if let Err(e) = Description::from_json(text.as_bytes(), "description".as_ref(), 0) {
-            return Err(WriteError::input(format!("{}: not a number, infinite, or a scale that is not > 0", e.what)));
+            return Err(WriteError::input(format!("{}: not a number, infinite, or a scale that is not > 0", e.what())));
         }
         let description_offset = align(self.originals + Self::originals_bytes(originals));
         let header = Header {

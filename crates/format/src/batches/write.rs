@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 use std::io::{Seek, SeekFrom, Write};
 
-use crate::{Aabb, Attribute, Lattice};
+use crate::{Aabb, Attribute, Lattice, WriteError};
 
 use super::describe::{ColourSource, Description};
 use super::{
     BATCH_POINTS, ColourSum, EncodedBatch, ErrorSums, Grid, HEADER_BYTES, Header, LOD_LEVELS, Layout, Part,
-    PointSection, Precision, Section, WriteError, align, colour_word, encode_batch, le_bytes, lod_of, rgb_of,
+    PointSection, Precision, Section, align, colour_word, encode_batch, le_bytes, lod_of, rgb_of,
 };
 
 /// Points in memory, in any order.

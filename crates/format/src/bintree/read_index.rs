@@ -15,11 +15,7 @@ pub(super) fn read_index(source: &dyn ByteSource) -> Result<(Header, Vec<Node>),
         let advice = "convert the sources again, or copy the folder again if it was whole elsewhere";
         match fault {
             Fault::Broken(at, what) => ReadError::broken(path, at, what).advise(advice),
-            Fault::Unsupported(at, what) => {
-                let mut error = ReadError::unsupported(path, what);
-                error.offset = Some(at);
-                error
-            }
+            Fault::Unsupported(at, what) => ReadError::unsupported(path, what).at(at),
             Fault::Io(e) => ReadError::io(path, "reading", e)
                 .advise("a binary tree is a folder with index.json and leaves.bin or one file a leaf"),
         }

@@ -1,6 +1,6 @@
 //! Where the columns of a leaf record are.
 
-use crate::{Attribute, AttributeType};
+use crate::{Attribute, AttributeType, WriteError};
 
 /// Bytes of the columns that every dataset has: x, y, z and classification as floats.
 pub const CORE_BYTES: usize = 16;
@@ -35,21 +35,21 @@ impl RecordLayout {
     /// The core and then `extras` in that order, each aligned to its element size (section 4 of the format's page).
     ///
     /// # Errors
-    /// A name that is empty, taken twice or one of the core's; no elements, or more than 256. What is wrong is a
-    /// sentence.
-    pub fn new(extras: impl IntoIterator<Item = Attribute>) -> Result<Self, String> {
+    /// [`WriteError::Input`]: a name that is empty, taken twice or one of the core's; no elements, or more than 256.
+    pub fn new(extras: impl IntoIterator<Item = Attribute>) -> Result<Self, WriteError> {
         let (mut placed, mut end, mut widest) = (Vec::new(), CORE_BYTES, 4);
         for attribute in extras {
             // What is wrong with it is found below; the sum must not overflow before.
             if attribute.elements > MAX_ELEMENTS {
-                return Err(format!("the attribute \"{}\" has {} elements", attribute.name, attribute.elements));
+                let what = format!("the attribute \"{}\" has {} elements", attribute.name, attribute.elements);
+                return Err(WriteError::input(what));
             }
             let offset = end.next_multiple_of(attribute.ty.size());
             end = offset + attribute.size();
             widest = widest.max(attribute.ty.size());
             placed.push(PlacedAttribute { attribute, offset });
         }
-        Self::from_places(placed, end.next_multiple_of(widest))
+        Self::from_places(placed, end.next_multiple_of(widest)).map_err(WriteError::Input)
     }
 
     /// Columns behind the core at the places that an index tells.
@@ -106,7 +106,8 @@ mod tests {
     use AttributeType as T;
 
     fn placed(columns: &[(&str, T, usize)]) -> Result<(Vec<usize>, usize), String> {
-        let layout = RecordLayout::new(columns.iter().map(|(n, t, e)| Attribute::new(*n, *t, *e)))?;
+        let layout =
+            RecordLayout::new(columns.iter().map(|(n, t, e)| Attribute::new(*n, *t, *e))).map_err(|e| e.to_string())?;
         Ok((layout.extras().iter().map(|e| e.offset).collect(), layout.stride()))
     }
 

@@ -1,8 +1,10 @@
 //! Writes `index.json` node by node: no node is kept.
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use serde_json::Value;
+
+use crate::WriteError;
 
 use super::header::{FORMAT, VERSION};
 use super::preorder::Preorder;
@@ -12,7 +14,7 @@ use super::{Header, Layout, Node, NodeKind, PlacedAttribute};
 /// to the current node only. Give it a buffered writer.
 ///
 /// Nothing wrong is written: nodes that are not a tree in preorder, counts that do not add up and numbers that JSON does
-/// not know are errors of kind [`io::ErrorKind::InvalidInput`].
+/// not know are [`WriteError::Input`].
 ///
 /// ```
 /// use pointmill_format::bintree::{Bintree, IndexWriter};
@@ -43,7 +45,7 @@ impl<W: Write> IndexWriter<W> {
     ///
     /// # Errors
     /// What the writer says; a header with numbers that are not finite or scales that are not greater than 0.
-    pub fn new(mut out: W, header: &Header) -> io::Result<Self> {
+    pub fn new(mut out: W, header: &Header) -> Result<Self, WriteError> {
         if !header.lattice.is_valid() || header.origin.iter().any(|v| !v.is_finite()) || header.capacity == 0 {
             return invalid(format!(
                 "index.json cannot have the lattice {:?}, the origin {:?} or the capacity {}",
@@ -73,7 +75,7 @@ impl<W: Write> IndexWriter<W> {
     /// # Errors
     /// What the writer says; a node that is not the next of a tree in preorder, or has a `start` where the layout has
     /// none, or none where it has one.
-    pub fn node(&mut self, node: &Node) -> io::Result<()> {
+    pub fn node(&mut self, node: &Node) -> Result<(), WriteError> {
         let index = self.order.len();
         let file = if node.is_leaf() && self.layout == Layout::Files { self.order.file_name() } else { String::new() };
         self.order.push(node, Some(self.layout)).or_else(|fault| invalid(format!("node {index} {fault}")))?;
@@ -98,14 +100,14 @@ impl<W: Write> IndexWriter<W> {
                 write!(self.out, ",\"center\":{},\"file\":\"{file}\"", numbers(&center))
             }
         }?;
-        self.out.write_all(b"}")
+        Ok(self.out.write_all(b"}")?)
     }
 
     /// Writes the end and gives the writer back, flushed.
     ///
     /// # Errors
     /// What the writer says; nodes that are missing.
-    pub fn finish(mut self) -> io::Result<W> {
+    pub fn finish(mut self) -> Result<W, WriteError> {
         self.order.finish().or_else(invalid)?;
         if self.order.len() == 0 && self.points > 0 {
             return invalid(format!("there are no nodes, the header says {} points", self.points));
@@ -116,8 +118,8 @@ impl<W: Write> IndexWriter<W> {
     }
 }
 
-fn invalid<T>(what: impl Into<String>) -> io::Result<T> {
-    Err(io::Error::new(io::ErrorKind::InvalidInput, what.into()))
+fn invalid<T>(what: impl Into<String>) -> Result<T, WriteError> {
+    Err(WriteError::input(what))
 }
 
 /// The keys before `nodes` and their values as JSON, in order.

@@ -1,7 +1,17 @@
 //! Axis-aligned boxes in world coordinates.
 
 /// An axis-aligned box, world coordinates, closed: `min ≤ p ≤ max`.
+///
+/// ```
+/// use pointmill_format::Aabb;
+///
+/// let mut bounds = Aabb::EMPTY;
+/// bounds.grow([1.0, 2.0, 3.0]);
+/// bounds.grow([3.0, 2.0, 4.0]);
+/// assert_eq!((bounds.extent(), bounds.center()), ([2.0, 0.0, 1.0], [2.0, 2.0, 3.5]));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Aabb {
     /// Lower corner: x, y, z.
     pub min: [f64; 3],

@@ -1,7 +1,16 @@
 //! Integer coordinates and the world.
 
 /// A lattice of coordinates: `world = quantized · scale + offset`, per axis, evaluated in double precision.
+///
+/// ```
+/// use pointmill_format::Lattice;
+///
+/// let lattice = Lattice { scale: [0.5; 3], offset: [100.0, 0.0, 0.0] };
+/// assert_eq!(lattice.world([2, 3, -1]), [101.0, 1.5, -0.5]);
+/// assert_eq!(lattice.quantize(0, 101.0), 2);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Lattice {
     /// Step of one unit, world units, > 0 and finite.
     pub scale: [f64; 3],

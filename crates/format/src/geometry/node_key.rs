@@ -1,12 +1,25 @@
 //! The address of an octree node.
 
 use std::fmt;
+use std::str::FromStr;
+
+use crate::UnknownName;
 
 /// Address of an octree node: its level (root = 0) and its cell in the `2^level` grid of that level.
 ///
 /// Child index is `4·x + 2·y + z` of the lowest cell bits (x owns bit 2), as Potree spells it: `r042` is child 2 of
 /// child 4 of child 0 of the root. Levels reach 31, so that cells fit 31 bits.
+///
+/// ```
+/// use pointmill_format::NodeKey;
+///
+/// let key: NodeKey = "r042".parse()?;
+/// assert_eq!((key.level, key.x, key.y, key.z), (3, 2, 1, 0));
+/// assert_eq!(key.parent().map(|p| p.to_string()), Some("r04".to_owned()));
+/// # Ok::<(), pointmill_format::UnknownName>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NodeKey {
     /// 0 for the root.
     pub level: u8,
@@ -51,10 +64,20 @@ impl NodeKey {
         Some(Self { level, x: self.x >> up, y: self.y >> up, z: self.z >> up })
     }
 
-    /// Parses a Potree name: `r` and one digit 0–7 a level.
+    /// Parses a Potree name: `r` and one digit 0–7 per level.
     pub fn from_name(name: &str) -> Option<Self> {
         let digits = name.strip_prefix('r')?;
         digits.bytes().try_fold(Self::ROOT, |key, b| key.child(b.checked_sub(b'0').filter(|d| *d < 8)?))
+    }
+}
+
+impl FromStr for NodeKey {
+    type Err = UnknownName;
+
+    /// [`Self::from_name`].
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        Self::from_name(name)
+            .ok_or_else(|| UnknownName::new(name, "node", &["r, and r with a digit of 0 to 7 per level"]))
     }
 }
 
@@ -77,7 +100,7 @@ mod tests {
 
     #[test]
     fn names_round_trip_and_children_know_their_parent() {
-        let key = NodeKey::from_name("r0427").unwrap();
+        let key: NodeKey = "r0427".parse().unwrap();
         assert_eq!(key.to_string(), "r0427");
         assert_eq!(key.child_index(), 7);
         assert_eq!(key.parent().unwrap().to_string(), "r042");

@@ -1,5 +1,10 @@
 //! The columns of a cloud: names, types and meaning.
 
+use std::fmt;
+use std::str::FromStr;
+
+use crate::UnknownName;
+
 /// The type of one element of an attribute. All are stored little-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)] // the names say it
@@ -63,7 +68,31 @@ impl AttributeType {
     }
 }
 
+impl fmt::Display for AttributeType {
+    /// [`Self::potree_name`].
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.potree_name())
+    }
+}
+
+impl FromStr for AttributeType {
+    type Err = UnknownName;
+
+    /// [`Self::from_potree_name`].
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        let known = || Self::ALL.map(Self::potree_name);
+        Self::from_potree_name(name).ok_or_else(|| UnknownName::new(name, "attribute type", &known()))
+    }
+}
+
 /// One attribute of a cloud: what its column holds.
+///
+/// ```
+/// use pointmill_format::{Attribute, AttributeType};
+///
+/// let rgb = Attribute::new("rgb", AttributeType::UInt16, 3);
+/// assert_eq!((rgb.size(), rgb.ty.to_string()), (6, "uint16".to_owned()));
+/// ```
 ///
 /// Stored values are raw; the meant value of element `e` is `raw · scale[e] + offset[e]` (LAS extra bytes), 1 and 0
 /// for everything else.
@@ -75,7 +104,7 @@ pub struct Attribute {
     pub description: String,
     /// Type of one element.
     pub ty: AttributeType,
-    /// Elements a point, ≥ 1.
+    /// Elements per point, ≥ 1.
     pub elements: usize,
     /// Factor for each element, `elements` long.
     pub scale: Vec<f64>,
@@ -99,7 +128,7 @@ impl Attribute {
         }
     }
 
-    /// Bytes a point: elements × element size.
+    /// Bytes per point: elements × element size.
     pub fn size(&self) -> usize {
         self.elements * self.ty.size()
     }
@@ -112,8 +141,8 @@ mod tests {
     #[test]
     fn every_type_is_found_by_its_potree_name() {
         for t in AttributeType::ALL {
-            assert_eq!(AttributeType::from_potree_name(t.potree_name()), Some(t));
+            assert_eq!(t.to_string().parse(), Ok(t));
         }
-        assert_eq!(AttributeType::from_potree_name("undefined"), None);
+        assert!("undefined".parse::<AttributeType>().is_err());
     }
 }

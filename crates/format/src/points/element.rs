@@ -23,6 +23,9 @@ pub trait Element: sealed::Sealed + Copy + Default + PartialEq + PartialOrd + st
 
     #[doc(hidden)]
     fn values(column: &Column) -> Option<&[Self]>;
+
+    #[doc(hidden)]
+    fn values_mut(column: &mut Column) -> Option<&mut Vec<Self>>;
 }
 
 macro_rules! elements {
@@ -33,6 +36,13 @@ macro_rules! elements {
             const TYPE: AttributeType = AttributeType::$name;
 
             fn values(column: &Column) -> Option<&[Self]> {
+                match column {
+                    Column::$name(values) => Some(values),
+                    _ => None,
+                }
+            }
+
+            fn values_mut(column: &mut Column) -> Option<&mut Vec<Self>> {
                 match column {
                     Column::$name(values) => Some(values),
                     _ => None,
@@ -58,5 +68,10 @@ impl Column {
     /// The values, if they are of type `T`.
     pub fn values<T: Element>(&self) -> Option<&[T]> {
         T::values(self)
+    }
+
+    /// The values, if they are of type `T`, to be changed.
+    pub fn values_mut<T: Element>(&mut self) -> Option<&mut Vec<T>> {
+        T::values_mut(self)
     }
 }

@@ -1,21 +1,25 @@
 //! The only place that knows which Brotli library is in use (the C one, through `brotlic`).
 
-use std::io;
-
 use brotlic::{BrotliDecoder, CompressionMode, Quality, WindowSize, decode::DecoderInfo};
 
+use crate::WriteError;
+
 /// Compresses `input` into one stream (window 22, generic mode) and appends it to `out`.
-pub(super) fn compress(input: &[u8], quality: u8, out: &mut Vec<u8>) -> io::Result<()> {
-    let quality = Quality::new(quality).map_err(io::Error::other)?;
-    let window = WindowSize::new(22).map_err(io::Error::other)?;
+pub(super) fn compress(input: &[u8], quality: u8, out: &mut Vec<u8>) -> Result<(), WriteError> {
+    let quality = Quality::new(quality).map_err(refused)?;
+    let window = WindowSize::new(22).map_err(refused)?;
     // The bound holds for qualities from 2 up; below, the library stores what does not fit it uncompressed.
     let bound = brotlic::compress_bound(input.len(), Quality::best())
-        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "a payload too large for Brotli"))?;
+        .ok_or_else(|| WriteError::input("a payload too large for Brotli"))?;
     let start = out.len();
     out.resize(start + bound, 0);
     let result = brotlic::compress(input, &mut out[start..], quality, window, CompressionMode::Generic);
     out.truncate(start + *result.as_ref().unwrap_or(&0));
-    result.map(|_| ()).map_err(io::Error::other)
+    result.map(|_| ()).map_err(refused)
+}
+
+fn refused(error: impl std::fmt::Display) -> WriteError {
+    WriteError::Compress(error.to_string())
 }
 
 /// Why a stream did not give what it should.

@@ -1,8 +1,6 @@
 //! A node's records as Potree's BROTLI encoding keeps them.
 
-use std::io;
-
-use crate::{Attribute, AttributeType};
+use crate::{Attribute, AttributeType, WriteError};
 
 use super::metadata::planar_size;
 use super::{brotli, morton};
@@ -34,14 +32,14 @@ pub struct BrotliScratch {
 /// Positions are stored as they are. (PotreeConverter 2.1.1 stores every coordinate plus one.)
 ///
 /// # Errors
-/// `InvalidInput` for attributes, lengths or a quality other than these, or more than 2^32 points.
+/// [`WriteError::Input`] for attributes, lengths or a quality other than these, or more than 2^32 points.
 pub fn encode_brotli(
     attributes: &[Attribute],
     records: &[u8],
     quality: u8,
     scratch: &mut BrotliScratch,
     out: &mut Vec<u8>,
-) -> io::Result<()> {
+) -> Result<(), WriteError> {
     let record_len: usize = attributes.iter().map(Attribute::size).sum();
     check(attributes, records.len(), record_len)?;
     scratch.sort(records, record_len);
@@ -49,9 +47,9 @@ pub fn encode_brotli(
     brotli::compress(&scratch.planar, quality, out)
 }
 
-fn check(attributes: &[Attribute], len: usize, record_len: usize) -> io::Result<()> {
+fn check(attributes: &[Attribute], len: usize, record_len: usize) -> Result<(), WriteError> {
     let is = |a: &Attribute, name, ty| a.name == name && a.ty == ty && a.elements == 3;
-    let refuse = |what: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+    let refuse = |what: &str| Err(WriteError::input(what));
     if !attributes.first().is_some_and(|a| is(a, "position", AttributeType::Int32)) {
         return refuse("the first attribute is not position, int32 x 3");
     }

@@ -1,9 +1,10 @@
 //! What every reader of scans offers: pieces that decode alone, in batches of points.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use super::{Piece, ScanInfo};
-use crate::{PointBatch, ReadError};
+use super::{Piece, ScanInfo, Wanted};
+use crate::{Attribute, PointBatch, Positions, ReadError};
 
 /// No batch handed to a sink is larger than this.
 pub const MAX_BATCH_POINTS: usize = 65_536;
@@ -11,24 +12,9 @@ pub const MAX_BATCH_POINTS: usize = 65_536;
 /// Takes the batches of a decode, one after the other; [`ControlFlow::Break`] ends the decode early.
 pub type Sink<'a> = dyn FnMut(&PointBatch) -> ControlFlow<()> + 'a;
 
-/// Which columns a decode shall fill: one flag for each of [`ScanInfo::attributes`]. Positions always come.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Wanted(pub Vec<bool>);
-
-impl Wanted {
-    /// Everything.
-    pub fn all(info: &ScanInfo) -> Self {
-        Self(vec![true; info.attributes.len()])
-    }
-
-    /// Positions alone.
-    pub fn positions(info: &ScanInfo) -> Self {
-        Self(vec![false; info.attributes.len()])
-    }
-}
-
 /// Memory that a thread reuses from piece to piece, of any scan.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct Scratch {
     /// Bytes as read from the file.
     pub raw: Vec<u8>,
@@ -38,7 +24,51 @@ pub struct Scratch {
     pub batch: Option<PointBatch>,
 }
 
+/// The batch of the scratch memory with these columns and, if `is_quantized`, integer positions; its memory is kept
+/// where the types agree.
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+pub(super) fn fitting_batch<'a>(
+    batch: &'a mut Option<PointBatch>,
+    attributes: &Arc<[Attribute]>,
+    is_quantized: bool,
+) -> &'a mut PointBatch {
+    let fits = |b: &PointBatch| matches!(b.positions, Positions::Quantized(_)) == is_quantized && b.fits(attributes);
+    match batch {
+        Some(b) if fits(b) => b.set_attributes(attributes),
+        _ => *batch = None,
+    }
+    batch.get_or_insert_with(|| {
+        let quantized = || Positions::Quantized(Default::default());
+        let positions = if is_quantized { quantized() } else { Positions::World(Default::default()) };
+        PointBatch::new(0, positions, Arc::clone(attributes))
+    })
+}
+
 /// A scan that is open for reading; any number of threads may decode different pieces at once.
+///
+/// [`crate::open_scan`] opens one. Where one thread is enough, [`Scan::batches`](trait.Scan.html#method.batches) is
+/// simpler than [`Self::decode`]:
+///
+/// ```
+/// # #[cfg(feature = "text")] {
+/// use pointmill_format::{OpenOptions, Scratch, Wanted, open_scan};
+/// use std::ops::ControlFlow;
+///
+/// let file = std::env::temp_dir().join(format!("pointmill-decode-{}.xyz", std::process::id()));
+/// std::fs::write(&file, "1 2 3\n4 5 6\n")?;
+/// let scan = open_scan(&file, &OpenOptions::default())?;
+/// let (wanted, mut scratch, mut points) = (Wanted::all(scan.info()), Scratch::default(), 0);
+/// for piece in 0..scan.pieces().len() {
+///     scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
+///         points += batch.len();
+///         ControlFlow::Continue(())
+///     })?;
+/// }
+/// assert_eq!(points, 2);
+/// # std::fs::remove_file(file)?;
+/// # }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Scan: Send + Sync {
     /// What is known without decoding.
     fn info(&self) -> &ScanInfo;

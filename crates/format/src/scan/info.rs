@@ -1,11 +1,13 @@
 //! What is known of a scan before its points are decoded.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use crate::{Aabb, Attribute, Lattice};
+use crate::{Aabb, Attribute, Lattice, ScanWarning};
 
-/// The coordinate reference system as the file tells it; nothing is derived.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// The coordinate reference system as the file declares it; nothing is derived.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Crs {
     /// OGC WKT text, as stored, without trailing zero bytes.
     pub wkt: Option<String>,
@@ -15,8 +17,16 @@ pub struct Crs {
     pub vertical_epsg: Option<u32>,
 }
 
+impl Crs {
+    /// What is known: WKT text, code of the (projected) system, code of the vertical one.
+    pub fn new(wkt: Option<String>, epsg: Option<u32>, vertical_epsg: Option<u32>) -> Self {
+        Self { wkt, epsg, vertical_epsg }
+    }
+}
+
 /// What is known of a scan before its points are decoded. Header values are claims, not facts.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ScanInfo {
     /// The file.
     pub path: PathBuf,
@@ -28,18 +38,42 @@ pub struct ScanInfo {
     pub bounds_declared: Option<Aabb>,
     /// The lattice of [`crate::Positions::Quantized`] batches; `None` for world coordinates.
     pub lattice: Option<Lattice>,
-    /// How finely the file stores world coordinates; nothing is told by it of scans that have a lattice.
+    /// How finely the file stores world coordinates; meaningless for scans that have a lattice.
     pub resolution: Resolution,
     /// The scans within the file, where its format knows such (E57, PTX); else empty.
     pub parts: Vec<ScanPart>,
     /// The columns beside the position, in order.
-    pub attributes: Vec<Attribute>,
+    pub attributes: Arc<[Attribute]>,
     /// The coordinate reference system.
     pub crs: Crs,
     /// Bytes of the file.
     pub file_bytes: u64,
-    /// Disagreements that did not stop the reader ("the header declares 10 points, 3 are there"), a line each.
-    pub warnings: Vec<String>,
+    /// Disagreements that did not stop the reader ("the header declares 10 points, 3 are there").
+    pub warnings: Vec<ScanWarning>,
+}
+
+impl ScanInfo {
+    /// A scan of which nothing else is known: world coordinates in double precision, without attributes.
+    pub fn new(path: impl Into<PathBuf>, format: impl Into<String>, points_declared: u64) -> Self {
+        Self {
+            path: path.into(),
+            format: format.into(),
+            points_declared,
+            bounds_declared: None,
+            lattice: None,
+            resolution: Resolution::default(),
+            parts: Vec::new(),
+            attributes: [].into(),
+            crs: Crs::default(),
+            file_bytes: 0,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The column of that name: its index in [`Self::attributes`], and what it holds.
+    pub fn attribute(&self, name: &str) -> Option<(usize, &Attribute)> {
+        self.attributes.iter().enumerate().find(|(_, a)| a.name == name)
+    }
 }
 
 /// How finely coordinates are stored: steps below that carry nothing.
@@ -54,8 +88,9 @@ pub enum Resolution {
     Double,
 }
 
-/// A scan within a file, as the file tells of it.
+/// A scan within a file, as the file describes it.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ScanPart {
     /// Its name, or empty.
     pub name: String,

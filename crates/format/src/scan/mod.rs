@@ -1,12 +1,15 @@
 //! Scans: files of points, of any kind, opened by content and decoded in pieces.
 
+mod batches;
+#[cfg(any(feature = "e57", feature = "las"))]
+mod catch_panic;
 mod decode;
 mod info;
 mod open;
-#[cfg(any(feature = "e57", feature = "las"))]
-mod quiet;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
+mod wanted;
+mod warning;
 // each reader uses its part of it: a build with few of them leaves some of it idle
 #[cfg(any(feature = "pcd", feature = "ply", feature = "text"))]
 #[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code, unused_imports))]
@@ -23,6 +26,9 @@ pub mod ply;
 #[cfg(feature = "text")]
 pub mod text;
 
-pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink, Wanted};
+pub use batches::Batches;
+pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
+pub use wanted::{UnknownAttribute, Wanted};
+pub use warning::{Counted, ScanWarning};

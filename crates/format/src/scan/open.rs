@@ -4,8 +4,9 @@ use std::fmt;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
+use std::str::FromStr;
 
-use crate::{ReadError, Scan};
+use crate::{Advice, Fault, ReadError, Scan, UnknownName};
 
 /// Bytes from the start of a file that tell its kind, at most; text needs some lines.
 const SNIFF_BYTES: u64 = 4 << 10;
@@ -32,7 +33,15 @@ pub enum ScanKind {
 }
 
 /// What a file does not say of itself, for the kinds that need it.
+///
+/// ```
+/// use pointmill_format::OpenOptions;
+///
+/// let options = OpenOptions::default().columns(["x", "y", "z", "-", "i"]).separator(';');
+/// assert_eq!(options.separator, Some(';'));
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct OpenOptions {
     /// Text: the names of all columns in file order (`text::TextOptions::columns`); `None`: found.
     pub columns: Option<Vec<String>>,
@@ -42,7 +51,50 @@ pub struct OpenOptions {
     pub keep_row_column: bool,
 }
 
+impl OpenOptions {
+    /// Sets [`Self::columns`].
+    #[must_use]
+    pub fn columns<N: Into<String>>(mut self, names: impl IntoIterator<Item = N>) -> Self {
+        self.columns = Some(names.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Sets [`Self::separator`].
+    #[must_use]
+    pub fn separator(mut self, separator: char) -> Self {
+        self.separator = Some(separator);
+        self
+    }
+
+    /// Sets [`Self::keep_row_column`].
+    #[must_use]
+    pub fn keep_row_column(mut self, keep: bool) -> Self {
+        self.keep_row_column = keep;
+        self
+    }
+}
+
 impl ScanKind {
+    /// The kinds that this build reads.
+    pub const ALL: &[Self] = &[
+        #[cfg(feature = "las")]
+        Self::Las,
+        #[cfg(feature = "e57")]
+        Self::E57,
+        #[cfg(feature = "ply")]
+        Self::Ply,
+        #[cfg(feature = "pcd")]
+        Self::Pcd,
+        #[cfg(feature = "text")]
+        Self::Text(crate::scan::text::TextKind::Xyz),
+        #[cfg(feature = "text")]
+        Self::Text(crate::scan::text::TextKind::Pts),
+        #[cfg(feature = "text")]
+        Self::Text(crate::scan::text::TextKind::Ptx),
+        #[cfg(feature = "text")]
+        Self::Text(crate::scan::text::TextKind::Off),
+    ];
+
     /// The kind of a file that starts with these bytes (give some kB, or the whole file if it is shorter).
     #[allow(unused_variables)] // a build without readers asks nothing
     pub fn of(first_bytes: &[u8]) -> Option<Self> {
@@ -74,8 +126,8 @@ impl ScanKind {
     ///
     /// # Errors
     /// The operating system cannot read it. A pipe or a folder is of no kind and is not read.
-    pub fn of_file(path: &Path) -> Result<Option<Self>, ReadError> {
-        Ok(Self::of(&first_bytes(path)?))
+    pub fn of_file(path: impl AsRef<Path>) -> Result<Option<Self>, ReadError> {
+        Ok(Self::of(&first_bytes(path.as_ref())?))
     }
 
     /// The usual name: "LAS", "E57", "PTX" ….
@@ -106,6 +158,19 @@ impl fmt::Display for ScanKind {
     }
 }
 
+impl FromStr for ScanKind {
+    type Err = UnknownName;
+
+    /// [`Self::name`], in upper or lower case.
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        let mut kinds = Self::ALL.iter().copied();
+        kinds.find(|k| k.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
+            let known: Vec<_> = Self::ALL.iter().map(|k| k.name()).collect();
+            UnknownName::new(name, "kind of scan", &known)
+        })
+    }
+}
+
 /// What this build reads, for people: "LAS, LAZ, E57, …".
 pub fn supported_scans() -> String {
     let kinds = [
@@ -119,12 +184,13 @@ pub fn supported_scans() -> String {
     read.join(", ")
 }
 
-/// Opens a scan of any kind that this build reads; the kind is told by content, never by the name.
+/// Opens a scan of any kind that this build reads; the kind is detected from the content, the extension is ignored.
 ///
 /// # Errors
 /// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
 #[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
-pub fn open_scan(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+    let path = path.as_ref();
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
@@ -134,7 +200,7 @@ pub fn open_scan(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, Re
             ScanKind::Text(crate::scan::text::TextKind::Xyz)
         }
         None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {
-            return Err(ReadError::broken(path, 0, "the file is empty").advise("copy it again, or leave it out"));
+            return Err(ReadError::broken(path, 0, Fault::Empty).advise("copy it again, or leave it out"));
         }
         None => return Err(unknown(path, &first)),
     };
@@ -142,9 +208,10 @@ pub fn open_scan(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, Re
         #[cfg(feature = "las")]
         ScanKind::Las => crate::scan::las::open(path),
         #[cfg(feature = "e57")]
-        ScanKind::E57 => {
-            crate::scan::e57::open_with(path, crate::scan::e57::E57Options { keep_row_column: options.keep_row_column })
-        }
+        ScanKind::E57 => crate::scan::e57::open_with(
+            path,
+            crate::scan::e57::E57Options::default().keep_row_column(options.keep_row_column),
+        ),
         #[cfg(feature = "ply")]
         ScanKind::Ply => crate::scan::ply::open(path),
         #[cfg(feature = "pcd")]
@@ -164,14 +231,16 @@ const ENDINGS: [&str; 11] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "o
 /// Why a file of no kind is refused: as no scan at all, or as one of which too little is left.
 fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    let supported = format!("supported are {}", supported_scans());
+    let supported = Advice::Supported(supported_scans());
     match ending.filter(|e| ENDINGS.contains(&e.as_str())) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),
-        Some(ending) => ReadError::broken(path, 0, format!("called .{ending}, but it is no scan that is known here"))
-            .advise(format!("if it was cut short or damaged, copy it again; {supported}")),
-        None if starts_with_number(first) => ReadError::broken(path, 0, "no whole row of three numbers or more")
-            .advise("if it was cut short, copy it again; if its columns are x,y alone, say so with --columns"),
-        None => ReadError::unsupported(path, "this is no scan that is known here").advise(supported),
+        Some(ending) => ReadError::broken(path, 0, Fault::UnknownFormat { extension: Some(ending) })
+            .advise(Advice::CopyOrSupported(supported_scans())),
+        None if starts_with_number(first) => {
+            ReadError::broken(path, 0, Fault::Row("no whole row of three numbers or more".to_owned()))
+                .advise(Advice::NameColumns)
+        }
+        None => ReadError::unsupported(path, Fault::UnknownFormat { extension: None }).advise(supported),
     }
 }
 
@@ -209,10 +278,9 @@ mod tests {
 
     #[test]
     fn what_is_no_scan_is_refused_with_what_is_supported() {
-        let error =
-            open_scan(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml").as_ref(), &OpenOptions::default());
+        let error = open_scan(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"), &OpenOptions::default());
         let error = error.err().unwrap();
-        assert!(matches!(error.kind, ErrorKind::Unsupported));
+        assert!(matches!(error.kind(), ErrorKind::Unsupported));
         assert!(error.to_string().contains("LAS, LAZ, E57, PLY, PCD, text"), "{error}");
     }
 
@@ -223,10 +291,10 @@ mod tests {
             let path = dir.path().join(name);
             fs::write(&path, bytes).unwrap();
             let error = open_scan(&path, &OpenOptions::default()).err().unwrap();
-            assert!(matches!(error.kind, ErrorKind::Broken) && error.offset == Some(0), "{error}");
+            assert!(matches!(error.kind(), ErrorKind::Broken) && error.offset() == Some(0), "{error}");
         }
         fs::write(dir.path().join("a.txt"), "1 gallon\n").unwrap();
         let error = open_scan(&dir.path().join("a.txt"), &OpenOptions::default()).err().unwrap();
-        assert!(matches!(error.kind, ErrorKind::Broken), "{error}");
+        assert!(matches!(error.kind(), ErrorKind::Broken), "{error}");
     }
 }

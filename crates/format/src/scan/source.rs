@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::ReadError;
 use crate::bytes::read_exact_at;
+use crate::{Advice, Fault, ReadError};
 
 /// An open file of known length.
 #[derive(Debug)]
@@ -38,12 +38,14 @@ impl Source {
     /// Fills `buf` from `offset`.
     pub(crate) fn read_at(&self, offset: u64, buf: &mut [u8]) -> Result<(), ReadError> {
         read_exact_at(&self.file, buf, offset).map_err(|e| match e.kind() {
-            io::ErrorKind::UnexpectedEof => {
-                ReadError::broken(&self.path, offset, format!("{} bytes expected, the file ends before", buf.len()))
-                    .advise("it was cut short; copy or export it again")
-            }
+            io::ErrorKind::UnexpectedEof => self.cut_short(offset, buf.len() as u64).advise(Advice::CutShort),
             _ => ReadError::io(&self.path, "reading", e),
         })
+    }
+
+    fn cut_short(&self, offset: u64, needed: u64) -> ReadError {
+        let available = self.len.saturating_sub(offset);
+        ReadError::broken(&self.path, offset, Fault::CutShort { needed, available })
     }
 
     /// `N` bytes from `offset`.
@@ -67,8 +69,7 @@ impl Source {
     pub(crate) fn slice_at<'a>(&self, offset: u64, len: u64, buf: &'a mut Vec<u8>) -> Result<&'a [u8], ReadError> {
         let end = offset.checked_add(len).filter(|end| *end <= self.len);
         let Some(len) = end.and_then(|_| usize::try_from(len).ok()) else {
-            return Err(ReadError::broken(&self.path, offset, format!("{len} bytes expected, the file ends before"))
-                .advise("it was cut short; copy or export it again"));
+            return Err(self.cut_short(offset, len).advise(Advice::CutShort));
         };
         if buf.len() < len {
             buf.resize(len, 0);

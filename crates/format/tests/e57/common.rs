@@ -7,7 +7,7 @@ use pointmill_testkit::files::{self, ScanFixture};
 use pointmill_testkit::reader::{Cloud, Reader};
 
 pub(crate) const E57: Reader = Reader {
-    open: |path| e57::open_with(path, E57Options { keep_row_column: true }),
+    open: |path| e57::open_with(path, E57Options::default().keep_row_column(true)),
     // a bit per record, and scans of constants
     max_points: |bytes| 8 * bytes + 65_536 * 16,
     // text and padding aside, streams are copies of the file's bytes

@@ -36,8 +36,8 @@ fn cuts_at_64_places_are_one_clear_error() {
     for fixture in common::fixtures() {
         for cut in damage::cuts(&fixture.bytes()) {
             let error = E57.read_bytes(cut).unwrap_err();
-            let broken = matches!(error.kind, pointmill_format::ErrorKind::Broken);
-            assert!(broken && error.offset.is_some(), "{} cut to {}: {error}", fixture.name, cut.len());
+            let broken = matches!(error.kind(), pointmill_format::ErrorKind::Broken);
+            assert!(broken && error.offset().is_some(), "{} cut to {}: {error}", fixture.name, cut.len());
         }
     }
 }

@@ -8,8 +8,11 @@ use pointmill_testkit::reader::{Cloud, Reader};
 
 /// 2048 points per byte is the bound of the densest compression; one batch of records, which are
 /// shorter than 256 bytes in all fixtures, is decompressed at a time.
-pub(crate) const LAS: Reader =
-    Reader { open: las::open, max_points: |bytes| 2048 * bytes + 1, max_decoded: |_| (MAX_BATCH_POINTS * 256) as u64 };
+pub(crate) const LAS: Reader = Reader {
+    open: |path| las::open(path),
+    max_points: |bytes| 2048 * bytes + 1,
+    max_decoded: |_| (MAX_BATCH_POINTS * 256) as u64,
+};
 
 /// All fixtures but the large real scan.
 pub(crate) fn small_fixtures() -> Vec<ScanFixture> {

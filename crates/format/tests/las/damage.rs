@@ -54,7 +54,7 @@ fn the_last_chunk_of_records_is_counted_when_the_header_cannot_be_right() {
     put(&mut bytes, LEGACY_COUNT, &410u32.to_le_bytes());
     let cloud = read_bytes(&bytes).unwrap();
     assert_eq!(cloud.xyz, right.xyz);
-    assert!(cloud.errors[0].what.contains("gives 40 of its 50 points"), "{}", cloud.errors[0]);
+    assert!(cloud.errors[0].what().contains("gives 40 of its 50 points"), "{}", cloud.errors[0]);
 }
 
 #[test]

@@ -15,8 +15,10 @@ fn ply(kind: &str, rest: &str) -> String {
 }
 
 fn with(bytes: &str, columns: &[&str], separator: Option<char>) -> Result<Cloud, ReadError> {
-    let columns = (!columns.is_empty()).then(|| columns.iter().map(|c| (*c).to_owned()).collect());
-    let scan = text::open(&files::temporary(bytes.as_bytes()), &TextOptions { columns, separator })?;
+    let mut options = TextOptions::default();
+    options.columns = (!columns.is_empty()).then(|| columns.iter().map(|c| (*c).to_owned()).collect());
+    options.separator = separator;
+    let scan = text::open(&files::temporary(bytes.as_bytes()), &options)?;
     Ok(reader::read(scan.as_ref(), &Wanted::all(scan.info())))
 }
 
@@ -43,7 +45,7 @@ fn hostile_elements_before_the_vertices_end_at_the_file() {
             "{element}element vertex 1\nproperty float x\nproperty float y\nend_header\n\u{7f}\u{7f}\u{7f}\u{7f}"
         );
         let e = read_bytes(ply("binary_little_endian", &rest)).unwrap_err();
-        assert!(e.what.contains("of element a end outside the file"), "{e}");
+        assert!(e.what().contains("of element a end outside the file"), "{e}");
     }
     let nothing =
         "element a 18446744073709551615\nelement vertex 1\nproperty char x\nproperty char y\nend_header\n\x01\x02";
@@ -53,12 +55,12 @@ fn hostile_elements_before_the_vertices_end_at_the_file() {
 #[test]
 fn a_bad_number_is_named_with_its_byte_and_the_points_of_other_pieces_stay() {
     let e = &read_bytes("1 2 3\n4 five 6\n").unwrap().errors[0];
-    assert_eq!(e.offset, Some(8));
-    assert!(e.what.contains("\"five\" is not a number"), "{e}");
+    assert_eq!(e.offset(), Some(8));
+    assert!(e.what().contains("\"five\" is not a number"), "{e}");
     let e = &read_bytes("1 2 3\n4 5\n").unwrap().errors[0];
-    assert_eq!(e.what, "the line has 2 numbers, 3 are expected");
+    assert_eq!(e.what(), "the line has 2 numbers, 3 are expected");
     let e = &read_bytes("1 2 3\n4 5 6 7\n").unwrap().errors[0];
-    assert_eq!((e.what.as_str(), e.offset), ("the line has more than the 3 numbers that are expected", Some(12)));
+    assert_eq!((e.what().as_str(), e.offset()), ("the line has more than the 3 numbers that are expected", Some(12)));
 }
 
 #[test]
@@ -76,7 +78,10 @@ fn a_class_that_does_not_fit_is_an_error() {
     let bytes: Vec<u8> = [1i16, 2, 3, 4, 5, 300].iter().flat_map(|v| v.to_le_bytes()).collect();
     let bytes = [ply("binary_little_endian", header).into_bytes(), bytes].concat();
     let e = &read_bytes(&bytes).unwrap().errors[0];
-    assert_eq!((e.what.as_str(), e.offset), ("the value 300 does not fit its column", Some(bytes.len() as u64 - 2)));
+    assert_eq!(
+        (e.what().as_str(), e.offset()),
+        ("the value 300 does not fit its column", Some(bytes.len() as u64 - 2))
+    );
 }
 
 #[test]
@@ -105,7 +110,7 @@ trait KindName {
 
 impl KindName for ReadError {
     fn kind_name(&self) -> &'static str {
-        match self.kind {
+        match self.kind() {
             pointmill_format::ErrorKind::Broken => "Broken",
             pointmill_format::ErrorKind::Unsupported => "Unsupported",
             pointmill_format::ErrorKind::Io(_) => "Io",
@@ -146,9 +151,9 @@ fn a_wrong_count_in_pts_is_told() {
 fn a_grid_that_cannot_be_and_a_cut_ptx_header_are_told() {
     let head = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
     let e = read_bytes(format!("99999999999999\n99999999999999\n{head}")).unwrap_err();
-    assert!(e.what.contains("cannot be"), "{e}");
+    assert!(e.what().contains("cannot be"), "{e}");
     let e = read_bytes("2\n3\n0 0 0\n1 0 0\n").unwrap_err();
-    assert!(e.what.contains("4 of 10 header lines"), "{e}");
+    assert!(e.what().contains("4 of 10 header lines"), "{e}");
     let cloud = read_bytes(format!("2\n3\n{head}1 2 3 0.5\n")).unwrap();
     assert!(cloud.warned("declares 6 points, 1 whole"), "{:?}", cloud.info);
     assert_eq!(cloud.info.points_declared, 6);
@@ -163,7 +168,7 @@ fn pcd_blocks_that_cannot_be_are_refused_before_memory_is_taken() {
     bytes.extend(3_600_000_000u32.to_le_bytes());
     bytes.extend([1, 2, 3, 4]);
     let e = read_bytes(&bytes).unwrap_err();
-    assert!(e.what.contains("cannot be in a block of 4 bytes"), "{e}");
+    assert!(e.what().contains("cannot be in a block of 4 bytes"), "{e}");
 }
 
 #[test]
@@ -178,7 +183,7 @@ fn very_many_empty_scans_take_time_for_their_bytes_only() {
 #[test]
 fn very_wide_rows_are_refused_or_come_in_small_batches() {
     let e = read_bytes("1 ".repeat(5000) + "\n1\n").unwrap_err();
-    assert!(e.what.contains("5000 columns"), "{e}");
+    assert!(e.what().contains("5000 columns"), "{e}");
     let mut header = "element vertex 100000\nproperty float x\nproperty float y\n".to_owned();
     (0..4000).for_each(|i| header += &format!("property double p{i}\n"));
     let scan =
@@ -186,7 +191,7 @@ fn very_wide_rows_are_refused_or_come_in_small_batches() {
             .unwrap();
     let mut scratch = pointmill_format::Scratch::default();
     let result = scan.decode(0, &Wanted::all(scan.info()), &mut scratch, &mut |_| ControlFlow::Continue(()));
-    assert!(result.unwrap_err().what.contains("the line has 1 numbers, 4002 are expected"));
+    assert!(result.unwrap_err().what().contains("the line has 1 numbers, 4002 are expected"));
     let batch = scratch.batch.unwrap();
     assert!(batch.columns.iter().map(|c| c.len() * 8).sum::<usize>() <= 64 << 20);
 }

@@ -51,7 +51,7 @@ impl Cloud {
 
     /// True if a warning contains these words.
     pub fn warned(&self, words: &str) -> bool {
-        self.info.warnings.iter().any(|w| w.contains(words))
+        self.info.warnings.iter().any(|w| w.to_string().contains(words))
     }
 
     /// "name typexelements" of every attribute.

@@ -51,7 +51,7 @@ pub fn columns_are_independent(scan: &dyn Scan) {
     let all = read(scan, &Wanted::all(scan.info()));
     for (i, attribute) in all.info.attributes.iter().enumerate() {
         let mut wanted = Wanted::positions(scan.info());
-        wanted.0[i] = true;
+        wanted.set(i, true);
         let one = read(scan, &wanted);
         let bits = |c: &Cloud| c.xyz.iter().flatten().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert!(bits(&one) == bits(&all), "positions change when {} alone is wanted", attribute.name);
@@ -138,7 +138,7 @@ fn check_batch(info: &ScanInfo, wanted: &Wanted, batch: &PointBatch) {
     assert_eq!(is_lattice, info.lattice.is_some(), "positions are on a lattice, or the scan has none");
     assert_eq!(lengths, [batch.len(); 3], "the axes have the same length");
     assert_eq!(batch.columns.len(), info.attributes.len(), "one column for each attribute");
-    for ((column, attribute), wanted) in batch.columns.iter().zip(&info.attributes).zip(&wanted.0) {
+    for ((column, attribute), wanted) in batch.columns.iter().zip(info.attributes.iter()).zip(wanted.flags()) {
         let name = &attribute.name;
         assert_eq!(column.ty(), attribute.ty, "the type of {name}");
         let expected = if *wanted { batch.len() * attribute.elements } else { 0 };
@@ -159,6 +159,8 @@ pub(super) fn check_description(scan: &dyn Scan) -> u64 {
     }
     let warnings = &info.warnings;
     assert!(warnings.len() < MAX_WARNINGS, "{} warnings", warnings.len());
-    warnings.iter().for_each(|w| assert!(!w.contains(char::is_control), "a warning is not one line: {w:?}"));
+    warnings
+        .iter()
+        .for_each(|w| assert!(!w.to_string().contains(char::is_control), "a warning is not one line: {w:?}"));
     next
 }

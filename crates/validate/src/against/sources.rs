@@ -50,7 +50,7 @@ impl Sources {
 
     /// Names of columns of the scans that the dataset does not have, sorted.
     pub(crate) fn not_in_dataset(&self, rules: &Rules) -> Vec<String> {
-        let names = self.list.iter().flat_map(|s| &s.scan.info().attributes).map(|a| &a.name);
+        let names = self.list.iter().flat_map(|s| s.scan.info().attributes.iter()).map(|a| &a.name);
         let mut names: Vec<String> =
             names.filter(|name| rules.attributes.iter().all(|a| a.name != **name)).cloned().collect();
         names.sort_unstable();
@@ -134,7 +134,7 @@ impl Source {
         let mut wanted = Wanted::positions(self.scan.info());
         let columns = self.columns.iter().flatten().map(|c| c.0);
         for i in columns.chain(self.classification).chain(self.constants.iter().map(|c| c.0)) {
-            wanted.0[i] = true;
+            wanted.set(i, true);
         }
         wanted
     }

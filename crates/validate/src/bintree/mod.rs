@@ -28,7 +28,7 @@ mod tree;
 use std::path::Path;
 
 use pointmill_format::bintree::{Bintree, PACKED_FILE};
-use pointmill_format::{DatasetKind, ErrorKind, ReadError};
+use pointmill_format::{DatasetKind, ReadError};
 
 use crate::against::{Against, Context};
 use crate::check::Check;
@@ -49,7 +49,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let findings = Findings::new(DatasetKind::Bintree, options.max_problems);
     let dataset = match Bintree::from_source(Lenient::new(folder)) {
         Ok(dataset) => dataset,
-        Err(error) if matches!(error.kind, ErrorKind::Io(_)) => return Err(error),
+        Err(error) if error.is_io() => return Err(error),
         Err(error) => return Ok(unreadable_index(findings, error)),
     };
     let tree = Tree::new(&dataset);
@@ -157,13 +157,13 @@ fn compare(
 
 /// The outcome for a dataset whose index is not a tree.
 fn unreadable_index(findings: Findings, error: ReadError) -> Outcome {
-    let is_leaves = error.path.file_name().is_some_and(|name| name == PACKED_FILE);
+    let is_leaves = error.path().file_name().is_some_and(|name| name == PACKED_FILE);
     let (check, subject) = if is_leaves { (Check::LeafFiles, PACKED_FILE) } else { (Check::Index, "index.json") };
     for other in Check::BINTREE.iter().filter(|c| **c != check) {
         findings.skip(*other, "index.json cannot be used");
     }
-    let at = error.offset.map_or_else(String::new, |at| format!(" (byte {at})"));
-    findings.push(Finding::new(check, subject, "a tree", error.what + &at));
+    let at = error.offset().map_or_else(String::new, |at| format!(" (byte {at})"));
+    findings.push(Finding::new(check, subject, "a tree", error.what() + &at));
     let (checks, problems) = findings.finish();
     Outcome {
         ok: false,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pointmill_format::bintree::NodeKind;
-use pointmill_format::{Attribute, AttributeType, ErrorKind, ReadError};
+use pointmill_format::{Attribute, AttributeType, ReadError};
 use rayon::prelude::*;
 use serde_json::Value;
 
@@ -115,7 +115,7 @@ impl against::Records for Records<'_> {
                 return Ok(());
             };
             match self.tree.dataset.read_leaf_bytes(index, &mut points.bytes) {
-                Err(error) if !matches!(error.kind, ErrorKind::Io(_)) => return Ok(()), // reported by the pass
+                Err(error) if !error.is_io() => return Ok(()), // reported by the pass
                 other => other?,
             }
             points.decode(header.record.stride(), center, &header.lattice);

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
+use pointmill_format::ReadError;
 use pointmill_format::bintree::NodeKind;
-use pointmill_format::{ErrorKind, ReadError};
 use rayon::prelude::*;
 
 use super::leaf::{Exactness, Leaf, Points};
@@ -83,11 +83,11 @@ impl Scan<'_> {
         let NodeKind::Leaf { center, .. } = node.kind else { return Ok(None) };
         let place = tree.place(index);
         if let Err(error) = tree.dataset.read_leaf_bytes(index, &mut points.bytes) {
-            if matches!(error.kind, ErrorKind::Io(_)) {
+            if error.is_io() {
                 return Err(error);
             }
             let expected = format!("{} points", node.count);
-            self.findings.push(Finding::new(Check::LeafFiles, "leaf", expected, error.what).at(place));
+            self.findings.push(Finding::new(Check::LeafFiles, "leaf", expected, error.what()).at(place));
             return Ok(None);
         }
         let stride = header.record.stride();

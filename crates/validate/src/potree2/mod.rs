@@ -26,7 +26,7 @@ use std::path::Path;
 
 use pointmill_format::bytes::Folder;
 use pointmill_format::potree2::{Dataset, Encoding, METADATA_FILE, OCTREE_FILE};
-use pointmill_format::{DatasetKind, ErrorKind, ReadError};
+use pointmill_format::{DatasetKind, ReadError};
 use serde_json::Value;
 
 use crate::against::{Against, Context, Rules};
@@ -49,7 +49,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let findings = Findings::new(DatasetKind::Potree2, options.max_problems);
     let dataset = match Dataset::open(folder) {
         Ok(dataset) => dataset,
-        Err(error) if matches!(error.kind, ErrorKind::Io(_)) => return Err(error),
+        Err(error) if error.is_io() => return Err(error),
         Err(error) => return unreadable_metadata(folder, findings, error),
     };
     checks::metadata::check(&read_json(folder)?.unwrap_or_default(), &findings);
@@ -127,7 +127,7 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: ReadError) -> R
         checks::metadata::check(&json, &findings);
     }
     if findings.found(Check::Metadata) == 0 {
-        findings.push(Finding::new(Check::Metadata, "metadata.json", "valid metadata", error.what));
+        findings.push(Finding::new(Check::Metadata, "metadata.json", "valid metadata", error.what()));
     }
     let (checks, problems) = findings.finish();
     Ok(Outcome {

@@ -1,7 +1,7 @@
 //! Records of nodes as the comparison with the sources wants them.
 
 use pointmill_format::potree2::{Dataset, Node};
-use pointmill_format::{ErrorKind, NodePoints, ReadError};
+use pointmill_format::{NodePoints, ReadError};
 use rayon::prelude::*;
 
 use super::tree::Tree;
@@ -20,7 +20,7 @@ impl against::Records for Records<'_> {
         let readable = self.tree.nodes.par_iter().filter(|n| n.readable);
         readable.try_for_each_init(<(NodePoints, Block)>::default, |(points, block), node| {
             match self.dataset.read_points(&Node { key: node.key, record: node.record }, points) {
-                Err(error) if !matches!(error.kind, ErrorKind::Io(_)) => return Ok(()), // reported by the walk
+                Err(error) if !error.is_io() => return Ok(()), // reported by the walk
                 other => other?,
             }
             fill_blocks(points, rules, block, &mut |block| work(block, node.key.into()));

@@ -1,7 +1,7 @@
 //! From stored records to the grid of the batches, and the size of the grid's cells.
 
-use pointmill_format::batches::{Grid, WriteError, morton32};
-use pointmill_format::{Aabb, DatasetKind, Lattice};
+use pointmill_format::batches::{Grid, morton32};
+use pointmill_format::{Aabb, DatasetKind, Lattice, WriteError};
 
 use crate::cloud::morton::interleave;
 use crate::cloud::{Cloud, JobBounds, JobPoint, StoredOrigin, StoredPoint};

@@ -183,12 +183,12 @@ fn write_index(
     };
     let file = staged.create(INDEX_FILE)?;
     let fail = |e| file.failed("writing the index", e);
-    let mut index =
-        IndexWriter::new(BufWriter::with_capacity(1 << 20, Sequential::new(&file)), &header).map_err(fail)?;
+    let mut index = IndexWriter::new(BufWriter::with_capacity(1 << 20, Sequential::new(&file)), &header)
+        .map_err(|e| fail(e.into()))?;
     for node in nodes {
-        index.node(node).map_err(fail)?;
+        index.node(node).map_err(|e| fail(e.into()))?;
     }
-    let written = index.finish().map_err(fail)?.into_inner().map_err(|e| fail(e.into_error()))?;
+    let written = index.finish().map_err(|e| fail(e.into()))?.into_inner().map_err(|e| fail(e.into_error()))?;
     file.sync("writing the index")?;
     Ok(written.len())
 }

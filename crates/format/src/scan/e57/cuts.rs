@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 
 use super::fields::Field;
-use super::packets::{Fault, Packet, Section};
+use super::packets::{BrokenChain, Packet, Section};
 use super::pages::Pages;
 
 /// A run of records of one scan.
@@ -22,7 +22,7 @@ pub(super) struct Cut {
     /// For each field: bytes of its stream, from the first packet on, that belong to earlier records.
     pub(super) skip: Box<[u64]>,
     /// Why it cannot be read, if that is known already.
-    pub(super) lost: Option<Fault>,
+    pub(super) lost: Option<BrokenChain>,
 }
 
 /// What a pass over the packets of a scan found.
@@ -32,13 +32,13 @@ pub(super) struct Found {
     /// Declared records that are not there although no packet is damaged.
     pub(super) missing: u64,
     /// What ended the pass early, if no record is lost by it.
-    pub(super) fault: Option<Fault>,
+    pub(super) fault: Option<BrokenChain>,
 }
 
 /// Cuts `records` records of `fields` into pieces of `step` (a multiple of 8, so that each starts at a byte border).
 pub(super) fn cut(
     pages: &mut Pages<'_>,
-    section: Result<Section, Fault>,
+    section: Result<Section, BrokenChain>,
     scan: usize,
     fields: &[Field],
     records: u64,

@@ -6,7 +6,8 @@ use super::pose::{Pose, spherical_to_cartesian};
 use super::schema::{Fill, PositionFields, Roles, Triple};
 use super::streams::Streams;
 use super::unpack::{each, each_integer, fill};
-use crate::{Column, PointBatch, Positions, ReadError, Scratch, Sink, Wanted, with_column};
+use crate::scan::decode::fitting_batch;
+use crate::{Column, Fault, Positions, ReadError, Scratch, Sink, Wanted, with_column};
 
 /// [`crate::Scan::decode`].
 pub(super) fn piece(
@@ -17,15 +18,15 @@ pub(super) fn piece(
     sink: &mut Sink<'_>,
 ) -> Result<(), ReadError> {
     let (Some(piece), Some(cut)) = (scan.pieces.get(index), scan.cuts.get(index)) else {
-        let what = format!("there is no piece {index} (there are {})", scan.pieces.len());
-        return Err(ReadError::unsupported(scan.source.path(), what));
+        let fault = Fault::NoSuchPiece { piece: index, pieces: scan.pieces.len() };
+        return Err(ReadError::unsupported(scan.source.path(), fault));
     };
     let plan = &scan.scans[cut.scan];
     if let Some(fault) = &cut.lost {
         let what = format!("{}; {} points of scan {} are lost", fault.what, cut.records, plan.index);
         return Err(ReadError::broken(scan.source.path(), fault.byte, what).advise(fault.advice.clone()));
     }
-    let is_wanted = |column: usize| wanted.0.get(column).copied().unwrap_or(false);
+    let is_wanted = |column: usize| wanted.is_wanted(column);
     let mut needed = vec![false; plan.fields.len()];
     plan.positions.mark(&mut needed);
     for (_, fill) in plan.fills.iter().enumerate().filter(|(column, _)| is_wanted(*column)) {
@@ -35,13 +36,13 @@ pub(super) fn piece(
     let streams = Streams::gather(&scan.source, cut, &plan.fields, &needed, raw, decoded)?;
     let n = cut.records as usize;
     let values = Values { fields: &plan.fields, streams, n };
-    let batch = fitting_batch(batch, scan);
+    let batch = fitting_batch(batch, &scan.info.attributes, false);
     batch.first_point = piece.first_point;
     if let Positions::World(xyz) = &mut batch.positions {
         xyz.iter_mut().for_each(|axis| axis.resize(n, 0.0));
         values.positions(&plan.positions, &plan.pose, xyz.each_mut().map(Vec::as_mut_slice));
     }
-    for (i, (column, attribute)) in batch.columns.iter_mut().zip(&scan.info.attributes).enumerate() {
+    for (i, (column, attribute)) in batch.columns.iter_mut().zip(scan.info.attributes.iter()).enumerate() {
         let len = if is_wanted(i) { n * attribute.elements } else { 0 };
         with_column!(&mut *column, v => v.resize(len, Default::default()));
         if len > 0 {
@@ -51,22 +52,6 @@ pub(super) fn piece(
     // the last batch of the piece: whether the sink wants more makes no difference
     let _ = sink(batch);
     Ok(())
-}
-
-/// The batch of the scratch memory, with columns of this scan's types.
-fn fitting_batch<'a>(batch: &'a mut Option<PointBatch>, scan: &E57Scan) -> &'a mut PointBatch {
-    let types = || scan.info.attributes.iter().map(|a| a.ty);
-    let fits = batch
-        .as_ref()
-        .is_some_and(|b| matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types()));
-    if !fits {
-        *batch = None;
-    }
-    batch.get_or_insert_with(|| PointBatch {
-        first_point: 0,
-        positions: Positions::World(Default::default()),
-        columns: types().map(Column::new).collect(),
-    })
 }
 
 /// The packed values of a run of records.

@@ -22,7 +22,7 @@
 //! use pointmill_format::{Scan, Scratch, Wanted};
 //! use std::ops::ControlFlow;
 //!
-//! let scan = e57::open("scan.e57".as_ref())?;
+//! let scan = e57::open("scan.e57")?;
 //! let (wanted, mut scratch, mut points) = (Wanted::all(scan.info()), Scratch::default(), 0);
 //! for piece in 0..scan.pieces().len() {
 //!     scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
@@ -72,7 +72,7 @@ pub fn is_e57(first_bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// Not E57, cut short before the XML, XML that is damaged or not understood, a scan without positions.
-pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     open_with(path, E57Options::default())
 }
 
@@ -80,8 +80,8 @@ pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
 ///
 /// # Errors
 /// Those of [`open`].
-pub fn open_with(path: &Path, options: E57Options) -> Result<Box<dyn Scan>, ReadError> {
-    Ok(Box::new(open::open(path, options)?))
+pub fn open_with(path: impl AsRef<Path>, options: E57Options) -> Result<Box<dyn Scan>, ReadError> {
+    Ok(Box::new(open::open(path.as_ref(), options)?))
 }
 
 impl Scan for E57Scan {

@@ -1,42 +1,31 @@
-//! Warnings that many scans share, as one line.
+//! Warnings that many scans share, as one.
 
-/// At most so many lines; a file may have thousands of scans.
-const MAX_LINES: usize = 20;
-/// At most so many scans are named in a line.
-const MAX_NAMED: usize = 5;
+use crate::ScanWarning;
 
-/// What is to be told of the scans of a file.
+/// Warnings at most; a file may have thousands of scans.
+const MAX_WARNINGS: usize = 20;
+
+/// The warnings about the scans of a file, each with the scans that share it.
 #[derive(Debug, Default)]
-pub(super) struct Notes(Vec<(String, Vec<usize>)>);
+pub(super) struct Notes(Vec<(ScanWarning, Vec<usize>)>);
 
 impl Notes {
-    /// Notes `what` of a scan.
-    pub(super) fn add(&mut self, scan: usize, what: impl Into<String>) {
-        let what = what.into();
-        if let Some((_, scans)) = self.0.iter_mut().find(|(text, _)| *text == what) {
+    /// Notes a warning about a scan.
+    pub(super) fn add(&mut self, scan: usize, warning: ScanWarning) {
+        if let Some((_, scans)) = self.0.iter_mut().find(|(noted, _)| *noted == warning) {
             scans.push(scan);
-        } else if self.0.len() < 10 * MAX_LINES {
-            self.0.push((what, vec![scan]));
+        } else if self.0.len() < 10 * MAX_WARNINGS {
+            self.0.push((warning, vec![scan]));
         }
     }
 
-    /// The lines: "scans 0, 3: …", in the order in which the notes were first added.
-    pub(super) fn lines(&self) -> Vec<String> {
-        let mut lines: Vec<_> = self.0.iter().take(MAX_LINES).map(|(what, scans)| line(what, scans)).collect();
-        if self.0.len() > MAX_LINES {
-            lines.push("there is more of this kind".to_owned());
-        }
-        lines
+    /// In the order in which the warnings were first added.
+    pub(super) fn warnings(self) -> Vec<ScanWarning> {
+        let is_cut = self.0.len() > MAX_WARNINGS;
+        let kept = self.0.into_iter().take(MAX_WARNINGS);
+        let in_scans = |(warning, scans)| ScanWarning::InScans { scans, warning: Box::new(warning) };
+        kept.map(in_scans).chain(is_cut.then_some(ScanWarning::More)).collect()
     }
-}
-
-fn line(what: &str, scans: &[usize]) -> String {
-    let named: Vec<_> = scans.iter().take(MAX_NAMED).map(usize::to_string).collect();
-    let more = match scans.len() - named.len() {
-        0 => String::new(),
-        n => format!(" and {n} more"),
-    };
-    format!("scan{} {}{more}: {what}", if scans.len() == 1 { "" } else { "s" }, named.join(", "))
 }
 
 #[cfg(test)]
@@ -45,11 +34,14 @@ mod tests {
 
     #[test]
     fn the_same_note_of_many_scans_is_one_line() {
+        let note = |text: &str| ScanWarning::Other(text.to_owned());
         let mut notes = Notes::default();
-        notes.add(2, "b");
-        (0..9).for_each(|scan| notes.add(scan, "a"));
-        assert_eq!(notes.lines(), ["scan 2: b", "scans 0, 1, 2, 3, 4 and 4 more: a"]);
-        (0..1000).for_each(|i| notes.add(i, format!("c{i}")));
-        assert_eq!(notes.lines().len(), MAX_LINES + 1);
+        notes.add(2, note("b"));
+        (0..9).for_each(|scan| notes.add(scan, note("a")));
+        (0..1000).for_each(|i| notes.add(i, note(&format!("c{i}"))));
+        let warnings = notes.warnings();
+        assert_eq!(warnings.len(), MAX_WARNINGS + 1);
+        assert_eq!(warnings[0].to_string(), "scan 2: b");
+        assert_eq!(warnings[1].to_string(), "scans 0, 1, 2, 3, 4 and 4 more: a");
     }
 }

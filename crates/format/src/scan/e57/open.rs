@@ -19,7 +19,7 @@ use super::schema::{Roles, ScanFields, Schema, fields};
 use super::streams::Streams;
 use super::{header, xml};
 use crate::scan::source::Source;
-use crate::{Aabb, Crs, Piece, ReadError, Resolution, ScanInfo, ScanPart};
+use crate::{Aabb, Advice, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning};
 
 /// Records of a piece: a batch of its own; a multiple of 8, so that packed values start at a byte border.
 const PIECE_RECORDS: u64 = 50_000;
@@ -45,9 +45,9 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     let xml_bytes = header::read_xml(&source, &mut warnings)?;
     let document = xml::parse(&xml_bytes).map_err(|why| {
         let what = format!("the XML section cannot be read: {why}");
-        ReadError::broken(path, 24, what).advise("export it again from its source")
+        ReadError::broken(path, 24, Fault::Header(what)).advise(Advice::ExportAgain)
     })?;
-    tell_of_the_rest(&document, &mut warnings);
+    warn_of_the_rest(&document, &mut warnings);
     let mut notes = Notes::default();
     let mut drafts = drafts(&source, &document.clouds, options, &mut notes)?;
     cut_all(&source, &document.clouds, &mut drafts, &mut notes);
@@ -55,9 +55,9 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     let views: Vec<_> = drafts.iter().zip(&scalings).map(|(draft, s)| draft.view(s)).collect();
     let Schema { attributes, fills } = Schema::new(&views).map_err(|what| ReadError::unsupported(path, what))?;
     if document.clouds.len() > usize::from(u16::MAX) + 1 {
-        warnings.push(format!("{} scans: from 65,535 on they share a point source id", document.clouds.len()));
+        warnings.push(ScanWarning::SourceIdsShared { scans: document.clouds.len() });
     }
-    warnings.extend(notes.lines());
+    warnings.extend(notes.warnings());
     let bounds_declared = bounds(&drafts);
     let resolution = resolution(&source, &drafts);
     let parts = document.clouds.iter().map(part).collect();
@@ -75,10 +75,10 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
         lattice: None,
         resolution,
         parts,
-        attributes,
+        attributes: attributes.into(),
         crs: crs(document.coordinate_metadata.as_deref(), &mut warnings),
         file_bytes: source.len(),
-        warnings: crate::error::as_lines(warnings),
+        warnings,
     };
     Ok(E57Scan { source, info, scans, pieces: pieces(&cuts), cuts })
 }
@@ -127,7 +127,7 @@ fn cut_all(source: &Source, clouds: &[PointCloud], drafts: &mut [Draft<'_>], not
         let at = logical(draft.cloud.file_offset);
         // no byte belongs to two scans, so that a small file cannot claim many points
         if !taken.insert(at) {
-            notes.add(draft.index, "its points are those of an earlier scan; they are read once");
+            notes.add(draft.index, ScanWarning::PointsShared);
             continue;
         }
         let next = starts.partition_point(|start| *start <= at);
@@ -137,9 +137,9 @@ fn cut_all(source: &Source, clouds: &[PointCloud], drafts: &mut [Draft<'_>], not
         draft.cuts = found.cuts;
         if found.missing > 0 {
             let declared = draft.cloud.records;
-            let why = found.fault.map_or(String::new(), |f| format!(" ({} at byte {})", f.what, f.byte));
-            let there = declared - found.missing;
-            notes.add(draft.index, format!("{declared} points are declared, {there} are there{why}"));
+            let counted = Counted::Scan(found.fault.map(|f| format!("{} at byte {}", f.what, f.byte)));
+            let found = declared - found.missing;
+            notes.add(draft.index, ScanWarning::PointsMissing { declared, found, counted });
         }
     }
 }
@@ -147,14 +147,11 @@ fn cut_all(source: &Source, clouds: &[PointCloud], drafts: &mut [Draft<'_>], not
 /// What colour and intensity of a scan are scaled by.
 fn scalings(source: &Source, draft: &Draft<'_>, notes: &mut Notes) -> (Option<[Scaling; 3]>, Option<Scaling>) {
     let Draft { cloud, fields, roles, .. } = draft;
-    let mut sampled = |what: &str, ids: &[usize]| {
+    let mut sampled = |what: &'static str, ids: &[usize]| {
         let is_float = ids.iter().any(|i| fields[*i].range.is_none() && fields[*i].encoding.bits() >= 32);
         let seen = sample(source, draft, ids);
         let (low, high) = scaling::usual(seen, is_float);
-        notes.add(
-            draft.index,
-            format!("no limits are declared for its {what}; {low} to {high} are taken, by a sample of the values"),
-        );
+        notes.add(draft.index, ScanWarning::NoLimits { what, low, high });
         (low, high)
     };
     let intensity = roles.intensity.map(|i| {
@@ -234,7 +231,7 @@ fn bounds(drafts: &[Draft<'_>]) -> Option<Aabb> {
 }
 
 /// `coordinateMetadata` is to be OGC WKT; codes are found in practice, too.
-fn crs(text: Option<&str>, warnings: &mut Vec<String>) -> Crs {
+fn crs(text: Option<&str>, warnings: &mut Vec<ScanWarning>) -> Crs {
     let Some(text) = text else { return Crs::default() };
     let code = text.to_ascii_uppercase().strip_prefix("EPSG:").and_then(|code| code.trim().parse().ok());
     if text.contains('[') {
@@ -242,20 +239,17 @@ fn crs(text: Option<&str>, warnings: &mut Vec<String>) -> Crs {
     }
     if code.is_none() {
         let start: String = text.chars().take(60).collect();
-        warnings.push(format!("the coordinate metadata is no WKT and is not read: {start:?}"));
+        warnings.push(ScanWarning::CrsUnknown { start });
     }
     Crs { epsg: code, ..Crs::default() }
 }
 
-fn tell_of_the_rest(document: &xml::Document, warnings: &mut Vec<String>) {
-    match document.images {
-        Some(0) => {}
-        Some(1) => warnings.push("1 image is in the file; it is not read".to_owned()),
-        Some(n) => warnings.push(format!("{n} images are in the file; they are not read")),
-        None => warnings.push("images are in the file; they are not read, nor can their description be".to_owned()),
+fn warn_of_the_rest(document: &xml::Document, warnings: &mut Vec<ScanWarning>) {
+    if document.images != Some(0) {
+        warnings.push(ScanWarning::Images { count: document.images });
     }
     if document.clouds.is_empty() {
-        warnings.push("the file has no scans".to_owned());
+        warnings.push(ScanWarning::NoScans);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Packets of a compressed vector section (ASTM E2807 §9.3): heads, chained by their lengths.
 
 use super::pages::Pages;
-use crate::ReadError;
+use crate::{Advice, ReadError};
 
 /// Bytes of the head of a compressed vector section.
 pub(super) const SECTION_HEAD: usize = 32;
@@ -22,18 +22,21 @@ impl Section {
     ///
     /// # Errors
     /// Why there is no section, as an offset and text.
-    pub(super) fn read(pages: &mut Pages<'_>, at: u64, limit: u64) -> Result<Self, Fault> {
+    pub(super) fn read(pages: &mut Pages<'_>, at: u64, limit: u64) -> Result<Self, BrokenChain> {
         let mut head = [0; SECTION_HEAD];
         pages.read(at, &mut head)?;
         let field = |at: usize| head[at..].first_chunk::<8>().map_or(0, |b| u64::from_le_bytes(*b));
         if head[0] != 1 {
-            return Err(Fault::at(at, format!("no points here: the section is of type {}, not 1", head[0])));
+            return Err(BrokenChain::at(at, format!("no points here: the section is of type {}, not 1", head[0])));
         }
         // the length counts the head; the file's end bounds it, and the next scan's start
         let end = at.saturating_add(field(8)).min(limit);
         let packets = super::pages::logical(field(16));
         if packets < at + SECTION_HEAD as u64 || packets > end {
-            return Err(Fault::at(at, format!("the points should start at byte {}, outside their section", field(16))));
+            return Err(BrokenChain::at(
+                at,
+                format!("the points should start at byte {}, outside their section", field(16)),
+            ));
         }
         Ok(Self { packets, end })
     }
@@ -41,24 +44,24 @@ impl Section {
 
 /// Why a chain of packets ends before its time.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Fault {
+pub(super) struct BrokenChain {
     /// Physical offset.
     pub(super) byte: u64,
     pub(super) what: String,
-    pub(super) advice: String,
+    pub(super) advice: Advice,
 }
 
-impl Fault {
+impl BrokenChain {
     /// At a logical offset.
     fn at(logical: u64, what: String) -> Self {
-        let advice = "the file was damaged; copy or export it again".to_owned();
-        Self { byte: super::pages::physical(logical), what, advice }
+        Self { byte: super::pages::physical(logical), what, advice: Advice::Damaged }
     }
 }
 
-impl From<ReadError> for Fault {
+impl From<ReadError> for BrokenChain {
     fn from(e: ReadError) -> Self {
-        Self { byte: e.offset.unwrap_or(0), what: e.what, advice: e.advice }
+        let advice = e.advice().cloned().unwrap_or(Advice::Damaged);
+        Self { byte: e.offset().unwrap_or(0), what: e.what(), advice }
     }
 }
 
@@ -83,7 +86,7 @@ impl Packet {
         end: u64,
         fields: usize,
         sizes: &mut Vec<u64>,
-    ) -> Result<Self, Fault> {
+    ) -> Result<Self, BrokenChain> {
         sizes.clear();
         let mut head = [0; MIN_PACKET as usize];
         pages.read(at, &mut head)?;
@@ -91,26 +94,26 @@ impl Packet {
         let len = u64::from(u16::from_le_bytes(len)) + 1;
         if kind > 2 || !len.is_multiple_of(4) || at + len > end {
             let what = format!("no packet of points: type {kind}, {len} bytes, {} are left", end - at);
-            return Err(Fault::at(at, what));
+            return Err(BrokenChain::at(at, what));
         }
         if kind != 1 {
             return Ok(Self { len, streams: None });
         }
         let streams = 6 + 2 * fields as u64;
         if streams > len {
-            return Err(Fault::at(at, format!("a packet of {len} bytes cannot hold {fields} streams")));
+            return Err(BrokenChain::at(at, format!("a packet of {len} bytes cannot hold {fields} streams")));
         }
         let mut bytes = vec![0; streams as usize - MIN_PACKET as usize];
         pages.read(at + MIN_PACKET, &mut bytes)?;
         let mut words = bytes.as_chunks().0.iter().map(|b| u64::from(u16::from_le_bytes(*b)));
         let count = words.next().unwrap_or(0);
         if count != fields as u64 {
-            return Err(Fault::at(at, format!("a packet has {count} streams, a record {fields} fields")));
+            return Err(BrokenChain::at(at, format!("a packet has {count} streams, a record {fields} fields")));
         }
         sizes.extend(words);
         let sum: u64 = sizes.iter().sum();
         if streams + sum > len {
-            return Err(Fault::at(at, format!("streams of {sum} bytes in a packet of {len}")));
+            return Err(BrokenChain::at(at, format!("streams of {sum} bytes in a packet of {len}")));
         }
         Ok(Self { len, streams: Some(streams) })
     }

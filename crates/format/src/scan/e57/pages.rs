@@ -2,8 +2,8 @@
 //!
 //! Offsets are *physical* (of the file) or *logical* (without the checksums). Structures are contiguous logically.
 
-use crate::ReadError;
 use crate::scan::source::Source;
+use crate::{Advice, Fault, ReadError};
 
 /// Bytes of a page; E57 1.0 knows no other size.
 pub(super) const PAGE: u64 = 1024;
@@ -74,16 +74,14 @@ impl<'a> Pages<'a> {
         let pages = self.ahead.min((self.source.len() / PAGE).saturating_sub(index));
         if pages == 0 {
             let what = format!("page {index} is wanted, the file has {}", self.source.len() / PAGE);
-            return Err(ReadError::broken(self.source.path(), self.source.len(), what)
-                .advise("it was cut short; copy or export it again"));
+            return Err(ReadError::broken(self.source.path(), self.source.len(), what).advise(Advice::CutShort));
         }
         self.good = 0;
         let bytes = self.source.slice_at(index * PAGE, pages * PAGE, self.window)?;
         let good = bytes.chunks_exact(PAGE as usize).take_while(|page| is_sound(page)).count() as u64;
         if good == 0 {
-            let what = format!("page {index} does not match its checksum");
-            return Err(ReadError::broken(self.source.path(), index * PAGE, what)
-                .advise("the file was damaged; copy or export it again"));
+            return Err(ReadError::broken(self.source.path(), index * PAGE, Fault::Checksum { page: index })
+                .advise(Advice::Damaged));
         }
         (self.first, self.good) = (index, good);
         Ok(())

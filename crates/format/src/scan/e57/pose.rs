@@ -2,7 +2,7 @@
 
 use ::e57::{CartesianBounds, PointCloud, SphericalBounds};
 
-use crate::Aabb;
+use crate::{Aabb, ScanWarning};
 
 /// From the scan's own coordinates to those of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,16 +14,16 @@ pub(super) struct Pose {
 
 impl Pose {
     /// The pose of a scan. `Err` holds a pose without rotation and why the file's cannot be one.
-    pub(super) fn new(cloud: &PointCloud) -> (Self, Option<&'static str>) {
+    pub(super) fn new(cloud: &PointCloud) -> (Self, Option<ScanWarning>) {
         let Some(transform) = &cloud.transform else { return (Self::identity(), None) };
         let t = &transform.translation;
         let q = &transform.rotation;
         let translation = [t.x, t.y, t.z];
         let norm = [q.w, q.x, q.y, q.z].iter().fold(0.0f64, |sum, v| sum.hypot(*v));
         if !norm.is_finite() || norm == 0.0 {
-            return (Self { rotation: None, translation }, Some("the rotation is no quaternion; it is left out"));
+            return (Self { rotation: None, translation }, Some(ScanWarning::Rotation { normalised: false }));
         }
-        let note = ((norm - 1.0).abs() > 1e-6).then_some("the rotation is no unit quaternion; it is normalised");
+        let note = ((norm - 1.0).abs() > 1e-6).then_some(ScanWarning::Rotation { normalised: true });
         // a quaternion within rounding of 1 is one: dividing by its norm would only add noise
         let by = if (norm - 1.0).abs() <= 4.0 * f64::EPSILON { 1.0 } else { norm };
         let [w, x, y, z] = [q.w / by, q.x / by, q.y / by, q.z / by];
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use ::e57::{Quaternion, Transform, Translation};
 
-    fn pose(q: [f64; 4], t: [f64; 3]) -> (Pose, Option<&'static str>) {
+    fn pose(q: [f64; 4], t: [f64; 3]) -> (Pose, Option<ScanWarning>) {
         let cloud = cloud(q, t);
         Pose::new(&cloud)
     }

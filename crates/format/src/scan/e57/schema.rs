@@ -6,7 +6,7 @@ use super::fields::{Encoding, Field};
 use super::notes::Notes;
 use super::options::E57Options;
 use super::scaling::Scaling;
-use crate::{Attribute, AttributeType};
+use crate::{Attribute, AttributeType, ScanWarning};
 
 /// Columns that a file may have: more is not a scan.
 const MAX_ATTRIBUTES: usize = 1000;
@@ -88,8 +88,8 @@ impl Roles {
         };
         match (positions.cartesian, positions.spherical) {
             (None, None) => return Err("its points have neither x and y nor range and azimuth"),
-            (Some([.., None]), _) => notes.add(scan, "its points have no z; it is taken as 0"),
-            (None, Some([.., None])) => notes.add(scan, "its points have no elevation; it is taken as 0"),
+            (Some([.., None]), _) => notes.add(scan, ScanWarning::NoZ),
+            (None, Some([.., None])) => notes.add(scan, ScanWarning::NoElevation),
             _ => {}
         }
         let normal = {
@@ -108,7 +108,7 @@ impl Roles {
         };
         for (i, field) in fields.iter().enumerate() {
             if is_text(i) {
-                notes.add(scan, format!("the field {} holds text; it is not read", field.tag()));
+                notes.add(scan, ScanWarning::TextField { name: field.tag().to_owned() });
                 continue;
             }
             match field.name {
@@ -117,7 +117,7 @@ impl Roles {
                 N::RowIndex | N::ColumnIndex if options.keep_row_column => roles.extras.push((i, None)),
                 N::Unknown { .. } if roles.normal.is_none_or(|n| !n.contains(&i)) => roles.extras.push((i, None)),
                 N::ColorRed | N::ColorGreen | N::ColorBlue if roles.colour.is_none() => {
-                    notes.add(scan, "its colour lacks red, green or blue; it is not read");
+                    notes.add(scan, ScanWarning::ColourIncomplete);
                 }
                 _ => {}
             }

@@ -10,7 +10,7 @@ use ::e57::{E57Reader, PointCloud};
 
 use super::header::{LEN, SIGNATURE};
 use super::pages::{DATA, PAGE};
-use crate::scan::quiet;
+use crate::scan::catch_panic::catch_panic;
 
 /// Stands for a text field: minimum and maximum of a constant integer ("string" in ASCII).
 pub(super) const TEXT_MARK: i64 = 0x7374_7269_6e67;
@@ -36,7 +36,7 @@ pub(super) fn parse(xml: &[u8]) -> Result<Document, String> {
     check_size(text)?;
     let text = mark_text_fields(text);
     let read = |text: &str| {
-        let reader = quiet::catch(|| E57Reader::new(Cursor::new(file_of(text.as_bytes()))))?;
+        let reader = catch_panic(|| E57Reader::new(Cursor::new(file_of(text.as_bytes()))))?;
         reader.map_err(|e| with_causes(&e))
     };
     let (reader, images) = match read(&text) {

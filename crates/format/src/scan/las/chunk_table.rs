@@ -7,7 +7,7 @@ use laz::decompressors::IntegerDecompressorBuilder;
 
 use super::bytes::{i64_at, u32_at};
 use crate::ReadError;
-use crate::scan::quiet;
+use crate::scan::catch_panic::catch_panic;
 use crate::scan::source::Source;
 
 /// So many chunks may be empty (some writers close a chunk that they never fill).
@@ -54,15 +54,15 @@ impl Layout {
     /// Why the table cannot be used, as text; the points may still be whole.
     pub(super) fn read_table(&self, source: &Source) -> Result<Vec<Chunk>, String> {
         let table = self.table_offset(source)?;
-        let head: [u8; 8] = source.array_at(table).map_err(|e| e.what)?;
+        let head: [u8; 8] = source.array_at(table).map_err(|e| e.what())?;
         let (version, count) = (u32_at(&head, 0), u64::from(u32_at(&head, 4)));
         let data_bytes = table - self.chunks_start();
         if version != 0 || count > data_bytes / self.record_len as u64 + EMPTY_CHUNKS {
             return Err(format!("it declares version {version} and {count} chunks in {data_bytes} bytes of points"));
         }
         // an entry is two corrected integers of at most 32 bits and their contexts: 16 bytes are ample
-        let coded = source.vec_at(table + 8, 16 * count + 64).map_err(|e| e.what)?;
-        let mut chunks = quiet::catch(|| self.decode_entries(coded, count as usize))
+        let coded = source.vec_at(table + 8, 16 * count + 64).map_err(|e| e.what())?;
+        let mut chunks = catch_panic(|| self.decode_entries(coded, count as usize))
             .unwrap_or_else(Err)
             .map_err(|e| format!("it does not decode: {e}"))?;
         self.check(&chunks, data_bytes)?;
@@ -94,12 +94,12 @@ impl Layout {
             let offset = u64::try_from(offset).ok()?;
             (offset >= self.chunks_start() && offset.checked_add(8)? <= source.len()).then_some(offset)
         };
-        let head: [u8; 8] = source.array_at(self.points_start).map_err(|e| e.what)?;
+        let head: [u8; 8] = source.array_at(self.points_start).map_err(|e| e.what())?;
         let first = i64_at(&head, 0);
         if let Some(offset) = fits(first) {
             return Ok(offset);
         }
-        let tail: [u8; 8] = source.array_at(source.len().saturating_sub(8)).map_err(|e| e.what)?;
+        let tail: [u8; 8] = source.array_at(source.len().saturating_sub(8)).map_err(|e| e.what())?;
         fits(i64_at(&tail, 0)).ok_or_else(|| format!("it should be at byte {first} of {}", source.len()))
     }
 

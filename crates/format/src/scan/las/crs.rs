@@ -2,7 +2,7 @@
 
 use super::bytes::u16_at;
 use super::records::Records;
-use crate::Crs;
+use crate::{Crs, ScanWarning};
 
 const USER_ID: &str = "LASF_Projection";
 /// GeoTIFF key ids (GeoTIFF 1.1 §7).
@@ -11,7 +11,7 @@ const PROJECTED_CRS: u16 = 3072;
 const VERTICAL_CRS: u16 = 4096;
 
 /// Collects what the file says; malformed keys become a line in `warnings`.
-pub(super) fn read(records: &Records, warnings: &mut Vec<String>) -> Crs {
+pub(super) fn read(records: &Records, warnings: &mut Vec<ScanWarning>) -> Crs {
     let mut crs = Crs::default();
     if let Some(record) = records.find(USER_ID, 2112) {
         let text = String::from_utf8_lossy(&record.data);
@@ -32,14 +32,11 @@ pub(super) fn read(records: &Records, warnings: &mut Vec<String>) -> Crs {
 struct GeoKeys(Vec<(u16, u16)>);
 
 impl GeoKeys {
-    fn parse(data: &[u8], warnings: &mut Vec<String>) -> Self {
+    fn parse(data: &[u8], warnings: &mut Vec<ScanWarning>) -> Self {
         let declared = usize::from(u16_at(data, 6));
         let there = (data.len() / 8).saturating_sub(1);
         if data.len() < 8 || u16_at(data, 0) != 1 || declared > there {
-            warnings.push(format!(
-                "the GeoTIFF keys are malformed (version {}, {declared} keys declared, room for {there})",
-                u16_at(data, 0)
-            ));
+            warnings.push(ScanWarning::GeoTiffKeys { version: u16_at(data, 0), declared, room: there });
         }
         let entry = |i: usize| 8 + 8 * i;
         let keys = (0..declared.min(there))
@@ -61,7 +58,7 @@ mod tests {
     use super::super::records::Record;
     use super::*;
 
-    fn with(record_id: u16, data: Vec<u8>) -> (Crs, Vec<String>) {
+    fn with(record_id: u16, data: Vec<u8>) -> (Crs, Vec<ScanWarning>) {
         let record = Record { user_id: USER_ID.to_owned(), record_id, data_offset: 0, data };
         let mut warnings = Vec::new();
         (read(&Records { kept: vec![record], evlr_start: None }, &mut warnings), warnings)

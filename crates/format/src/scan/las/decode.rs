@@ -5,13 +5,13 @@ use std::ops::ControlFlow;
 
 use super::decompress::{self, Decompressor, Stop};
 use super::file::LasScan;
-use super::header::CUT_SHORT;
 use super::kernels;
 use super::laszip::LaszipRecord;
 use super::pieces::Storage;
 use super::schema::Schema;
+use crate::scan::decode::fitting_batch;
 use crate::scan::source::Source;
-use crate::{Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Scratch, Sink, Wanted};
+use crate::{Advice, Fault, MAX_BATCH_POINTS, Piece, PointBatch, ReadError, Scratch, Sink, Wanted};
 
 /// A chunk larger than this is read through a buffer instead of at once.
 const MAX_CHUNK_IN_MEMORY: u64 = 64 << 20;
@@ -29,11 +29,11 @@ pub(super) fn piece(
     sink: &mut Sink<'_>,
 ) -> Result<(), ReadError> {
     let Some(piece) = scan.plan.pieces.get(index) else {
-        let what = format!("there is no piece {index} (there are {})", scan.plan.pieces.len());
-        return Err(ReadError::unsupported(scan.source.path(), what));
+        let fault = Fault::NoSuchPiece { piece: index, pieces: scan.plan.pieces.len() };
+        return Err(ReadError::unsupported(scan.source.path(), fault));
     };
     let Scratch { raw, decoded, batch } = scratch;
-    let batch = fitting_batch(batch, &scan.schema);
+    let batch = fitting_batch(batch, &scan.info.attributes, true);
     let mut out = Emitter {
         record_len: scan.record_len,
         schema: &scan.schema,
@@ -52,22 +52,6 @@ pub(super) fn piece(
         Storage::Chunk => laz.chunk(raw, decoded, &mut out),
         Storage::Stream { chunk_points } => laz.stream(chunk_points, decoded, &mut out),
     }
-}
-
-/// The batch of the scratch memory, with columns of this scan's types.
-fn fitting_batch<'a>(batch: &'a mut Option<PointBatch>, schema: &Schema) -> &'a mut PointBatch {
-    let types = || schema.attributes.iter().map(|a| a.ty);
-    let fits = batch.as_ref().is_some_and(|b| {
-        matches!(b.positions, Positions::Quantized(_)) && b.columns.iter().map(Column::ty).eq(types())
-    });
-    if !fits {
-        *batch = None;
-    }
-    batch.get_or_insert_with(|| PointBatch {
-        first_point: 0,
-        positions: Positions::Quantized(Default::default()),
-        columns: types().map(Column::new).collect(),
-    })
 }
 
 /// Turns records into columns and hands them over.
@@ -211,15 +195,15 @@ impl Laz<'_> {
 
     fn error(&self, out: &Emitter<'_, '_>, stop: Stop) -> ReadError {
         let Piece { first_point, points, byte_offset, byte_len } = *self.piece;
-        let done = out.next_point - first_point;
-        let of = self.scan.plan.pieces.len();
+        let decoded = out.next_point - first_point;
+        let pieces = self.scan.plan.pieces.len();
         let (why, advice) = match stop {
-            Stop::CutShort => ("the bytes end".to_owned(), CUT_SHORT),
-            Stop::Corrupt(why) => (why, "it is damaged; copy or export it again"),
+            Stop::CutShort => ("the bytes end".to_owned(), Advice::CutShort),
+            Stop::Corrupt(why) => (why, Advice::Damaged),
         };
-        let what =
-            format!("chunk {} of {of} ({byte_len} bytes) gives {done} of its {points} points: {why}", self.index + 1);
-        ReadError::broken(self.scan.source.path(), byte_offset, what).advise(advice)
+        let (piece, bytes) = (self.index, byte_len);
+        let fault = Fault::Decode { piece, pieces, bytes, decoded, points, why };
+        ReadError::broken(self.scan.source.path(), byte_offset, fault).advise(advice)
     }
 }
 

@@ -8,7 +8,7 @@ use laz::{DecompressionSelection, LazItem};
 use super::chunk_table::{Chunk, Layout};
 use super::schema::{Layer, Schema};
 use crate::Wanted;
-use crate::scan::quiet;
+use crate::scan::catch_panic::catch_panic;
 use crate::scan::source::Source;
 
 /// Why a decode ended before its points were complete.
@@ -71,7 +71,7 @@ impl<'a, R> Decompressor<'a, R> {
     /// Fills `out` with whole records. Returns how many are good, and why it stopped if that is not all.
     pub(super) fn fill(&mut self, out: &mut [u8]) -> (usize, Result<(), Stop>) {
         let mut good = 0;
-        let result = quiet::catch(|| -> std::io::Result<()> {
+        let result = catch_panic(|| -> std::io::Result<()> {
             for record in out.chunks_exact_mut(self.record_len) {
                 self.inner.decompress_next(record)?;
                 good += 1;
@@ -109,7 +109,7 @@ pub(super) fn count_points(source: &Source, items: &Vec<LazItem>, at: u64, chunk
 /// The layers that `wanted` needs. Waveform packets are never among them.
 pub(super) fn selection(schema: &Schema, wanted: &Wanted) -> DecompressionSelection {
     use DecompressionSelection as S;
-    let fields = schema.fields.iter().zip(&wanted.0).filter(|(_, wanted)| **wanted);
+    let fields = schema.fields.iter().zip(wanted.flags()).filter(|(_, wanted)| **wanted);
     let bits = fields.fold(S::Z, |bits, (field, _)| {
         bits | match field.layer {
             Layer::Base => 0,

@@ -3,7 +3,7 @@
 use super::bytes::{f64_at, i64_at, text, u64_at};
 use super::header::Header;
 use super::records::Records;
-use crate::{Attribute, AttributeType};
+use crate::{Attribute, AttributeType, ScanWarning};
 
 const DESCRIPTOR: usize = 192;
 
@@ -18,34 +18,31 @@ pub(super) struct ExtraBytes {
 
 impl ExtraBytes {
     /// The attributes that fit the record; whatever remains undocumented becomes a line in `warnings`.
-    pub(super) fn read_all(header: &Header, records: &Records, warnings: &mut Vec<String>) -> Vec<Self> {
+    pub(super) fn read_all(header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) -> Vec<Self> {
         let mut at = header.format_len();
         let mut found = Vec::new();
         if records.kept.iter().filter(|r| r.is("LASF_Spec", 4)).count() > 1 {
-            warnings.push("there is more than one Extra Bytes record; the first is taken".to_owned());
+            warnings.push(ScanWarning::ExtraBytesRecords);
         }
         let data = records.find("LASF_Spec", 4).map_or(&[][..], |r| &r.data);
         if !data.len().is_multiple_of(DESCRIPTOR) {
-            warnings.push(format!("the Extra Bytes record has {} bytes, not a multiple of {DESCRIPTOR}", data.len()));
+            warnings.push(ScanWarning::ExtraBytesLength { bytes: data.len(), descriptor: DESCRIPTOR });
         }
         for descriptor in data.chunks_exact(DESCRIPTOR) {
             let name = text(&descriptor[4..36]);
             let Some(len) = byte_len(descriptor).filter(|len| at + len <= header.record_len) else {
-                warnings.push(format!(
-                    "extra bytes \"{name}\" (type {}) do not fit the record of {} bytes; they and what follows are not read",
-                    descriptor[2], header.record_len
-                ));
+                let (data_type, record_len) = (descriptor[2], header.record_len);
+                warnings.push(ScanWarning::ExtraBytesOutside { name, data_type, record_len });
                 break;
             };
             match attribute(name, descriptor, warnings) {
                 Some(attribute) => found.push(Self { attribute, at }),
-                None => warnings.push(format!("{len} extra bytes at byte {at} of each record have no type; not read")),
+                None => warnings.push(ScanWarning::ExtraBytesUntyped { bytes: len, at }),
             }
             at += len;
         }
         if at < header.record_len {
-            let rest = header.record_len - at;
-            warnings.push(format!("the last {rest} bytes of each record are not documented; not read"));
+            warnings.push(ScanWarning::ExtraBytesUndocumented { bytes: header.record_len - at });
         }
         found
     }
@@ -77,7 +74,7 @@ fn scalar_type(data_type: u8) -> Option<(AttributeType, usize)> {
     (data_type <= 30).then_some((ty, usize::from((data_type - 1) / 10) + 1))
 }
 
-fn attribute(name: String, descriptor: &[u8], warnings: &mut Vec<String>) -> Option<Attribute> {
+fn attribute(name: String, descriptor: &[u8], warnings: &mut Vec<ScanWarning>) -> Option<Attribute> {
     let (ty, elements) = scalar_type(descriptor[2])?;
     let has = |bit: u8| descriptor[3] >> bit & 1 == 1;
     let doubles = |at: usize| (0..elements).map(|e| f64_at(descriptor, at + 8 * e)).collect::<Vec<_>>();
@@ -91,7 +88,7 @@ fn attribute(name: String, descriptor: &[u8], warnings: &mut Vec<String>) -> Opt
         if scale.iter().all(|s| s.is_finite() && *s != 0.0) {
             out.scale = scale;
         } else {
-            warnings.push(format!("extra bytes \"{}\" declare the scale {scale:?}; 1 is taken", out.name));
+            warnings.push(ScanWarning::ExtraBytesScale { name: out.name.clone(), scale });
         }
     }
     if has(4) {
@@ -99,7 +96,7 @@ fn attribute(name: String, descriptor: &[u8], warnings: &mut Vec<String>) -> Opt
         if offset.iter().all(|o| o.is_finite()) {
             out.offset = offset;
         } else {
-            warnings.push(format!("extra bytes \"{}\" declare the offset {offset:?}; 0 is taken", out.name));
+            warnings.push(ScanWarning::ExtraBytesOffset { name: out.name.clone(), offset });
         }
     }
     Some(out)

@@ -2,7 +2,7 @@
 
 use super::bytes::{f64_at, f64x3_at, u16_at, u32_at, u64_at};
 use crate::scan::source::Source;
-use crate::{Aabb, Lattice, ReadError};
+use crate::{Aabb, Advice, Fault, Lattice, ReadError, ScanWarning};
 
 /// Bytes of the LAS 1.0–1.2 header; every later one starts with these.
 const MIN_HEADER: u64 = 227;
@@ -47,21 +47,23 @@ impl Header {
     }
 
     /// Reads and checks the header. What does not keep points from being read becomes a line in `warnings`.
-    pub(super) fn read(source: &Source, warnings: &mut Vec<String>) -> Result<Self, ReadError> {
+    pub(super) fn read(source: &Source, warnings: &mut Vec<ScanWarning>) -> Result<Self, ReadError> {
         let path = source.path();
         let bytes = source.vec_at(0, HEADER_1_4)?;
         if !is_las(&bytes) {
-            let what = if bytes.is_empty() { "the file is empty" } else { "not a LAS or LAZ file (no LASF signature)" };
-            return Err(ReadError::broken(path, 0, what).advise("see which file was meant"));
+            let not_las = || Fault::Header("not a LAS or LAZ file (no LASF signature)".to_owned());
+            let fault = if bytes.is_empty() { Fault::Empty } else { not_las() };
+            return Err(ReadError::broken(path, 0, fault).advise(Advice::WrongFile));
         }
         if source.len() < MIN_HEADER {
             let what = format!("the header has {} of at least {MIN_HEADER} bytes", source.len());
-            return Err(ReadError::broken(path, source.len(), what).advise(CUT_SHORT));
+            return Err(ReadError::broken(path, source.len(), Fault::Header(what)).advise(Advice::CutShort));
         }
         let version = (bytes[24], bytes[25]);
         if version.0 != 1 || version.1 > 5 {
-            let what = format!("LAS version {}.{} is not known (1.0 to 1.5 are)", version.0, version.1);
-            return Err(ReadError::unsupported(path, what));
+            let found = (u32::from(version.0), u32::from(version.1));
+            let fault = Fault::UnknownVersion { format: "LAS", found, known: "1.0 to 1.5 are" };
+            return Err(ReadError::unsupported(path, fault));
         }
         let point_format = bytes[104] & 0x3f;
         if point_format > 10 {
@@ -87,7 +89,7 @@ impl Header {
         header.with_1_4_fields(&bytes, warnings).checked(source, warnings)
     }
 
-    fn with_1_4_fields(mut self, bytes: &[u8], warnings: &mut Vec<String>) -> Self {
+    fn with_1_4_fields(mut self, bytes: &[u8], warnings: &mut Vec<ScanWarning>) -> Self {
         if self.version.1 < 4 || self.header_size < HEADER_1_4 || (bytes.len() as u64) < HEADER_1_4 {
             return self;
         }
@@ -95,52 +97,50 @@ impl Header {
         self.evlr_count = u32_at(bytes, 243);
         let (legacy, count) = (self.point_count, u64_at(bytes, 247));
         if count == 0 && legacy != 0 {
-            warnings.push(format!("the 64-bit point count is 0; the legacy count {legacy} is taken"));
+            warnings.push(ScanWarning::LegacyCount { legacy, count });
             return self;
         }
         if legacy != 0 && legacy != count {
-            warnings.push(format!("the legacy point count is {legacy}, the 64-bit one {count}; the latter is taken"));
+            warnings.push(ScanWarning::LegacyCount { legacy, count });
         }
         self.point_count = count;
         self
     }
 
     /// Refuses what makes records impossible to find or to place.
-    fn checked(self, source: &Source, warnings: &mut Vec<String>) -> Result<Self, ReadError> {
+    fn checked(self, source: &Source, warnings: &mut Vec<ScanWarning>) -> Result<Self, ReadError> {
         let path = source.path();
         let need = self.format_len();
         if self.record_len < need {
             let what =
                 format!("records are {} bytes long, point format {} needs {need}", self.record_len, self.point_format);
-            return Err(ReadError::broken(path, 105, what).advise(EXPORT_AGAIN));
+            return Err(ReadError::broken(path, 105, Fault::Header(what)).advise(Advice::ExportAgain));
         }
         if self.points_start < MIN_HEADER {
             let what = format!("the points are said to start at byte {}, inside the header", self.points_start);
-            return Err(ReadError::broken(path, 96, what).advise(EXPORT_AGAIN));
+            return Err(ReadError::broken(path, 96, Fault::Header(what)).advise(Advice::ExportAgain));
         }
         if self.points_start > source.len() {
-            let what = format!("the points start at byte {} but the file has {}", self.points_start, source.len());
-            return Err(ReadError::broken(path, source.len(), what).advise(CUT_SHORT));
+            let (offset, file_bytes) = (self.points_start, source.len());
+            let fault = Fault::OutsideFile { part: "the points", offset, bytes: None, file_bytes };
+            return Err(ReadError::broken(path, source.len(), fault).advise(Advice::CutShort));
         }
         if !self.lattice.is_valid() && self.point_count > 0 {
             let Lattice { scale, offset } = self.lattice;
             let what = format!("scale {scale:?} or offset {offset:?} cannot place a point (scales must be > 0)");
-            return Err(ReadError::broken(path, 131, what).advise(EXPORT_AGAIN));
+            return Err(ReadError::broken(path, 131, Fault::Header(what)).advise(Advice::ExportAgain));
         }
         if self.bounds.is_none() && self.point_count > 0 {
-            warnings.push("the header's bounds are inverted or not finite; they are not used".to_owned());
+            warnings.push(ScanWarning::Bounds);
         }
         Ok(self)
     }
 }
 
-pub(super) const CUT_SHORT: &str = "it was cut short; copy or export it again";
-pub(super) const EXPORT_AGAIN: &str = "export it again from its source";
-
-fn header_size(bytes: &[u8], warnings: &mut Vec<String>) -> u64 {
+fn header_size(bytes: &[u8], warnings: &mut Vec<ScanWarning>) -> u64 {
     let size = u64::from(u16_at(bytes, 94));
     if size < MIN_HEADER {
-        warnings.push(format!("the header says it has {size} bytes; {MIN_HEADER} are taken"));
+        warnings.push(ScanWarning::HeaderSize { declared: size, taken: MIN_HEADER });
         return MIN_HEADER;
     }
     size

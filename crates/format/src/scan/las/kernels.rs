@@ -51,7 +51,7 @@ pub(super) fn fill(
 }
 
 fn is_wanted(wanted: &Wanted, index: usize) -> bool {
-    wanted.0.get(index).copied().unwrap_or(false)
+    wanted.is_wanted(index)
 }
 
 /// `LEN`: the record length, or 0 for any (`record_len`).
@@ -175,12 +175,9 @@ mod tests {
                 field(0, 1, FieldKind::Plain),
             ];
             let types = [AttributeType::UInt8, AttributeType::UInt16, AttributeType::Float64, AttributeType::Int8];
-            let mut batch = PointBatch {
-                first_point: 0,
-                positions: Positions::Quantized(Default::default()),
-                columns: types.map(Column::new).into(),
-            };
-            let wanted = Wanted(vec![true, true, true, false]);
+            let mut batch = PointBatch::new(0, Positions::Quantized(Default::default()), []);
+            batch.columns = types.map(Column::new).into();
+            let wanted = Wanted::from_iter([true, true, true, false]);
             resize(points, &fields, &wanted, &mut batch);
             let (head, tail) = raw.split_at(700 * len);
             fill(tail, len, 700, &fields, &wanted, &mut batch);

@@ -15,7 +15,7 @@
 //! use pointmill_format::{Scan, Scratch, Wanted};
 //! use std::ops::ControlFlow;
 //!
-//! let scan = las::open("scan.laz".as_ref())?;
+//! let scan = las::open("scan.laz")?;
 //! let (wanted, mut scratch, mut points) = (Wanted::all(scan.info()), Scratch::default(), 0);
 //! for piece in 0..scan.pieces().len() {
 //!     scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
@@ -46,10 +46,10 @@ mod schema;
 use std::path::Path;
 
 use crate::scan::source::Source;
-use crate::{Piece, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
+use crate::{Advice, Fault, Piece, ReadError, Scan, ScanInfo, ScanWarning, Scratch, Sink, Wanted};
 use chunk_table::Layout;
 use file::LasScan;
-use header::{EXPORT_AGAIN, Header};
+use header::Header;
 use laszip::{Arrangement, LaszipRecord};
 use pieces::Planner;
 use records::Records;
@@ -62,8 +62,8 @@ pub use header::is_las;
 /// # Errors
 /// Not LAS, cut short before the points, a point format or compression that is not known, records that cannot hold
 /// their point format, or a scale that cannot place a point.
-pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
-    Ok(Box::new(LasScan::open(path)?))
+pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
+    Ok(Box::new(LasScan::open(path.as_ref())?))
 }
 
 impl LasScan {
@@ -88,10 +88,10 @@ impl LasScan {
             lattice: header.lattice.is_valid().then_some(header.lattice),
             resolution: Default::default(),
             parts: Vec::new(),
-            attributes: schema.attributes.clone(),
+            attributes: schema.attributes.clone().into(),
             crs,
             file_bytes: source.len(),
-            warnings: crate::error::as_lines(warnings),
+            warnings,
         };
         Ok(Self { source, info, schema, record_len: header.record_len, laszip, plan })
     }
@@ -135,17 +135,18 @@ fn find_laszip(
     source: &Source,
     header: &Header,
     records: &Records,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<ScanWarning>,
 ) -> Result<Option<LaszipRecord>, ReadError> {
-    let broken = |offset: u64, what: String| ReadError::broken(source.path(), offset, what).advise(EXPORT_AGAIN);
+    let broken = |offset: u64, what: String| {
+        ReadError::broken(source.path(), offset, Fault::Header(what)).advise(Advice::ExportAgain)
+    };
     let Some(record) = records.find("laszip encoded", 22204) else {
         let what = "the points are marked as compressed but there is no LASzip record";
         return if header.compressed_bit { Err(broken(104, what.to_owned())) } else { Ok(None) };
     };
     let plain_len = header.point_count.saturating_mul(header.record_len as u64).saturating_add(header.points_start);
     if !header.compressed_bit && plain_len <= source.len() {
-        warnings
-            .push("there is a LASzip record, but the points are not marked as compressed; it is ignored".to_owned());
+        warnings.push(ScanWarning::LaszipIgnored);
         return Ok(None);
     }
     let laszip = LaszipRecord::parse(record, header).map_err(|what| broken(record.data_offset, what))?;

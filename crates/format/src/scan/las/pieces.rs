@@ -6,7 +6,7 @@ use super::header::Header;
 use super::laszip::{Arrangement, LaszipRecord};
 use super::records::Records;
 use crate::scan::source::Source;
-use crate::{Piece, ReadError};
+use crate::{Counted, Piece, ReadError, ScanWarning};
 
 /// Records of a LAS piece: 1.7 MB of format 3, a batch of its own.
 const LAS_PIECE_POINTS: u64 = 50_000;
@@ -39,7 +39,7 @@ pub(super) struct Planner<'a> {
     pub(super) source: &'a Source,
     pub(super) header: &'a Header,
     pub(super) records: &'a Records,
-    pub(super) warnings: &'a mut Vec<String>,
+    pub(super) warnings: &'a mut Vec<ScanWarning>,
 }
 
 impl Planner<'_> {
@@ -51,15 +51,11 @@ impl Planner<'_> {
         let there = bytes / record_len;
         let points = point_count.min(there);
         if there < point_count {
-            self.warn(format!(
-                "the header declares {point_count} points, {there} whole records are there: {} are missing",
-                point_count - there
-            ));
+            let (declared, found, counted) = (point_count, there, Counted::Records);
+            self.warnings.push(ScanWarning::PointsMissing { declared, found, counted });
         } else if there > point_count {
-            let rest = bytes - point_count * record_len;
-            self.warn(format!(
-                "the header declares {point_count} points; the {rest} bytes that follow them are not read"
-            ));
+            let bytes = bytes - point_count * record_len;
+            self.warnings.push(ScanWarning::BytesIgnored { declared: point_count, bytes });
         }
         let mut pieces = Vec::new();
         for first_point in (0..points).step_by(LAS_PIECE_POINTS as usize) {
@@ -82,7 +78,7 @@ impl Planner<'_> {
             let rest = self.points_end() - layout.points_start;
             // an empty LAZ file has an offset and a table without entries
             if rest > 32 {
-                self.warn(format!("the header declares no points; the {rest} bytes behind it are not read"));
+                self.warnings.push(ScanWarning::BytesIgnored { declared: 0, bytes: rest });
             }
             return Ok(Plan { storage: Storage::Layered, pieces: Vec::new() });
         }
@@ -106,10 +102,7 @@ impl Planner<'_> {
             Ok(chunks) => chunks,
             Err(why) => {
                 let chunks = layout.walk(self.source, self.points_end(), self.header.point_count)?;
-                self.warn(format!(
-                    "the chunk table is unusable ({why}); {} chunks were found without it",
-                    chunks.len()
-                ));
+                self.warnings.push(ScanWarning::ChunkTable { why, chunks: Some(chunks.len()) });
                 chunks
             }
         };
@@ -125,7 +118,7 @@ impl Planner<'_> {
         for (i, chunk) in chunks.iter_mut().enumerate() {
             let next = at + chunk.bytes;
             if (i % step == 0 || i == last) && chunk.points > 0 {
-                let own = layout.layered_chunk(self.source, at, next).map_err(|e| e.what)?;
+                let own = layout.layered_chunk(self.source, at, next).map_err(|e| e.what())?;
                 let own = own.ok_or_else(|| format!("no chunk starts at byte {at}"))?;
                 let fewer_at_the_end = i == last && layout.chunk_points.is_some() && own.points <= chunk.points;
                 if own.bytes != chunk.bytes || (own.points != chunk.points && !fewer_at_the_end) {
@@ -147,7 +140,7 @@ impl Planner<'_> {
                     let what = format!("the chunk table is unusable ({why}) and the chunks differ in size");
                     return Err(ReadError::broken(self.source.path(), layout.points_start, what).advise(advice));
                 };
-                self.warn(format!("the chunk table is unusable ({why}); the points are decoded one after the other"));
+                self.warnings.push(ScanWarning::ChunkTable { why, chunks: None });
                 return Ok(self.stream(layout, layout.chunks_start(), Some(chunk_points)));
             }
         };
@@ -171,10 +164,10 @@ impl Planner<'_> {
         let declared = self.header.point_count;
         let there: u64 = chunks.iter().map(|c| c.points).sum();
         if there < declared {
-            let missing = declared - there;
-            self.warn(format!("the header declares {declared} points, the chunks hold {there}: {missing} are missing"));
+            let counted = Counted::Chunks;
+            self.warnings.push(ScanWarning::PointsMissing { declared, found: there, counted });
         } else if there > declared {
-            self.warn(format!("the chunks hold {there} points; the {declared} that the header declares are read"));
+            self.warnings.push(ScanWarning::PointsIgnored { declared, found: there });
         }
         let (mut first_point, mut byte_offset) = (0, layout.chunks_start());
         let mut pieces = Vec::with_capacity(chunks.len());
@@ -195,14 +188,10 @@ impl Planner<'_> {
         let byte_len = self.points_end().saturating_sub(byte_offset);
         let points = declared.min(layout.max_points(byte_len));
         if points < declared {
-            self.warn(format!("the header declares {declared} points, more than {byte_len} bytes can hold"));
+            self.warnings.push(ScanWarning::PointsImpossible { declared, bytes: byte_len });
         }
         let pieces =
             if points > 0 { vec![Piece { first_point: 0, points, byte_offset, byte_len }] } else { Vec::new() };
         Plan { storage: Storage::Stream { chunk_points }, pieces }
-    }
-
-    fn warn(&mut self, line: String) {
-        self.warnings.push(line);
     }
 }

@@ -2,8 +2,8 @@
 
 use super::bytes::{text, u16_at, u64_at};
 use super::header::Header;
-use crate::ReadError;
 use crate::scan::source::Source;
+use crate::{ReadError, ScanWarning};
 
 const VLR_HEADER: u64 = 54;
 const EVLR_HEADER: u64 = 60;
@@ -45,7 +45,7 @@ impl Records {
     }
 
     /// Reads all records; those that do not fit become a line in `warnings`.
-    pub(super) fn read(source: &Source, header: &Header, warnings: &mut Vec<String>) -> Result<Self, ReadError> {
+    pub(super) fn read(source: &Source, header: &Header, warnings: &mut Vec<ScanWarning>) -> Result<Self, ReadError> {
         let mut records = Self::default();
         let vlrs = Area { kind: "VLR", count: header.vlr_count, start: header.header_size, end: header.points_start };
         records.read_area(source, &vlrs, VLR_HEADER, warnings)?;
@@ -63,13 +63,13 @@ impl Records {
         source: &Source,
         area: &Area,
         header_len: u64,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<ScanWarning>,
     ) -> Result<bool, ReadError> {
         let Area { kind, count, start, end } = *area;
         let mut at = start;
         for index in 0..count.min(MAX_RECORDS) {
             let Some(data_offset) = at.checked_add(header_len).filter(|data| *data <= end) else {
-                warnings.push(format!("{kind} {index} of {count} would lie outside its place, at byte {at}"));
+                warnings.push(ScanWarning::RecordOutside { kind, index, count, at });
                 return Ok(false);
             };
             let mut head = [0; EVLR_HEADER as usize];
@@ -77,9 +77,8 @@ impl Records {
             let len = if header_len == VLR_HEADER { u64::from(u16_at(&head, 20)) } else { u64_at(&head, 20) };
             let (user_id, record_id) = (text(&head[2..18]), u16_at(&head, 18));
             let Some(next) = data_offset.checked_add(len).filter(|next| *next <= end) else {
-                warnings.push(format!(
-                    "{kind} {index} of {count} ({user_id} {record_id}) claims {len} bytes at byte {data_offset}, more than there are"
-                ));
+                let (bytes, at) = (len, data_offset);
+                warnings.push(ScanWarning::RecordTooLong { kind, index, count, user_id, record_id, bytes, at });
                 return Ok(false);
             };
             if is_of_interest(&user_id, record_id) {
@@ -87,13 +86,13 @@ impl Records {
                     let data = source.vec_at(data_offset, len)?;
                     self.kept.push(Record { user_id, record_id, data_offset, data });
                 } else {
-                    warnings.push(format!("{kind} {index} ({user_id} {record_id}) has {len} bytes; it is not read"));
+                    warnings.push(ScanWarning::RecordIgnored { kind, index, user_id, record_id, bytes: len });
                 }
             }
             at = next;
         }
         if count > MAX_RECORDS {
-            warnings.push(format!("the header declares {count} {kind}s; the first {MAX_RECORDS} are read"));
+            warnings.push(ScanWarning::RecordsIgnored { kind, count, read: MAX_RECORDS });
         }
         Ok(count <= MAX_RECORDS)
     }

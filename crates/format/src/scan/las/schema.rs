@@ -3,7 +3,7 @@
 use super::extra_bytes::ExtraBytes;
 use super::header::Header;
 use super::records::Records;
-use crate::{Attribute, AttributeType};
+use crate::{Attribute, AttributeType, ScanWarning};
 
 /// Where the values of a column lie in a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +75,7 @@ const STANDARD_NAMES: [&str; 17] = [
 
 impl Schema {
     /// Standard columns first (colour before the rest), then the documented extra bytes.
-    pub(super) fn new(header: &Header, records: &Records, warnings: &mut Vec<String>) -> Self {
+    pub(super) fn new(header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) -> Self {
         let mut schema = Self::default();
         schema.colours(header.point_format);
         if header.point_format < 6 {
@@ -84,10 +84,7 @@ impl Schema {
             schema.extended();
         }
         if matches!(header.point_format, 4 | 5 | 9 | 10) {
-            warnings.push(format!(
-                "point format {} carries waveform packets; they are not read, all other values are",
-                header.point_format
-            ));
+            warnings.push(ScanWarning::Waveforms { point_format: header.point_format });
         }
         schema.extra_bytes(header, records, warnings);
         schema
@@ -140,7 +137,7 @@ impl Schema {
         self.bits("edge of flight line", 15, 7, 1, Layer::Flags);
     }
 
-    fn extra_bytes(&mut self, header: &Header, records: &Records, warnings: &mut Vec<String>) {
+    fn extra_bytes(&mut self, header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) {
         for ExtraBytes { mut attribute, at } in ExtraBytes::read_all(header, records, warnings) {
             attribute.name = self.free_name(&attribute.name);
             let (elements, kind) = (attribute.elements, FieldKind::Plain);

@@ -1,8 +1,8 @@
 //! The header: lines of a word and its values, up to DATA.
 
 use crate::scan::source::Source;
-use crate::scan::tabular::{CUT_SHORT, EXPORT_AGAIN, lines};
-use crate::{AttributeType, ReadError};
+use crate::scan::tabular::lines;
+use crate::{Advice, AttributeType, Fault, ReadError, ScanWarning};
 
 /// No header is longer; most have 200 bytes.
 const MAX_HEADER: u64 = 1 << 20;
@@ -35,7 +35,7 @@ pub(super) struct Header {
     pub(super) points: u64,
     /// First byte of the data.
     pub(super) end: u64,
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<ScanWarning>,
 }
 
 /// The values of the lines, as they are found.
@@ -50,7 +50,7 @@ struct Lines {
     width: Option<u64>,
     height: Option<u64>,
     points: Option<u64>,
-    warnings: Vec<String>,
+    warnings: Vec<ScanWarning>,
 }
 
 /// True if the first bytes of a file say that it is PCD: a line of its header, behind comments.
@@ -69,14 +69,15 @@ impl Header {
         if !is_pcd(&bytes) {
             let what =
                 if bytes.is_empty() { "the file is empty" } else { "not a PCD file (no VERSION or FIELDS line)" };
-            return Err(
-                ReadError::broken(source.path(), 0, what).advise("if it holds lines of numbers, name it .xyz or .txt")
-            );
+            return Err(ReadError::broken(source.path(), 0, Fault::Header(what.to_owned()))
+                .advise("if it holds lines of numbers, name it .xyz or .txt"));
         }
         let mut found = Lines::default();
         for (at, line) in lines::lines(&bytes) {
             let text = String::from_utf8_lossy(line);
-            let broken = |what: String| ReadError::broken(source.path(), at as u64, what).advise(EXPORT_AGAIN);
+            let broken = |what: String| {
+                ReadError::broken(source.path(), at as u64, Fault::Header(what)).advise(Advice::ExportAgain)
+            };
             let mut words = text.split_whitespace();
             let word = words.next().unwrap_or_default();
             let values: Vec<String> = words.map(str::to_owned).collect();
@@ -93,7 +94,7 @@ impl Header {
             found.line(word, values, at as u64).map_err(broken)?;
         }
         let what = format!("the header has no DATA line in its {} bytes", bytes.len());
-        Err(ReadError::broken(source.path(), bytes.len() as u64, what).advise(CUT_SHORT))
+        Err(ReadError::broken(source.path(), bytes.len() as u64, Fault::Header(what)).advise(Advice::CutShort))
     }
 }
 
@@ -115,7 +116,7 @@ impl Lines {
             "VIEWPOINT" => {
                 let numbers: Vec<_> = values.iter().filter_map(|v| v.parse::<f64>().ok()).collect();
                 if numbers != [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] {
-                    self.warnings.push(format!("the sensor's viewpoint ({}) is not applied", values.join(" ")));
+                    self.warnings.push(ScanWarning::ViewpointIgnored { viewpoint: values.join(" ") });
                 }
             }
             comment if comment.is_empty() || comment.starts_with('#') => {}
@@ -135,8 +136,7 @@ impl Lines {
         if let (Some(width), Some(height)) = (self.width, self.height)
             && width.checked_mul(height) != Some(points)
         {
-            self.warnings
-                .push(format!("WIDTH {width} times HEIGHT {height} is not POINTS {points}; the latter is taken"));
+            self.warnings.push(ScanWarning::GridSize { width, height, points });
         }
         let fields = self.fields()?;
         let Self { version, names_at: fields_at, warnings, .. } = self;

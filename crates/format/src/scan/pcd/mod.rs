@@ -17,10 +17,10 @@ use std::path::Path;
 
 use crate::scan::source::Source;
 use crate::scan::tabular::{
-    CUT_SHORT, Endian, LineRule, Planes, Property, Role, RowScan, Schema, Storage, binary, lines, precision, reconcile,
+    Endian, LineRule, Planes, Property, Role, RowScan, Schema, Storage, binary, lines, precision, reconcile,
     resolution, settle_float_colours,
 };
-use crate::{AttributeType, Piece, ReadError, Scan};
+use crate::{Advice, AttributeType, Fault, Piece, ReadError, Scan, ScanWarning};
 use header::{Encoding, Header};
 
 pub use header::is_pcd;
@@ -30,21 +30,22 @@ pub use header::is_pcd;
 ///
 /// # Errors
 /// Not PCD, a header that makes no sense or is cut short, fields without x and y, a compressed block outside the file.
-pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
+    let path = path.as_ref();
     let source = Source::open(path)?;
     let header = Header::read(&source)?;
     let mut warnings = header.warnings.clone();
     let properties = properties(&header.fields);
     let schema = Schema::new(&properties, &mut warnings).map_err(|what| {
-        ReadError::broken(path, header.fields_at, format!("the points cannot be placed: {what}"))
-            .advise("export it with x, y and z")
+        ReadError::broken(path, header.fields_at, Fault::NoPositions(format!("the points cannot be placed: {what}")))
+            .advise(Advice::ExportPositions)
     })?;
     let (pieces, storage) = place(&source, &header, &properties, &mut warnings)?;
     let axis = properties.iter().find(|p| p.role == Role::Axis(0)).map_or(AttributeType::Float32, |p| p.ty);
     let format = format!("PCD {}, {}, {} positions", header.version, header.encoding.name(), precision(axis));
     let mut scan = RowScan::new(source, format, header.points, schema, storage);
     scan.pieces = pieces;
-    scan.info.warnings = crate::error::as_lines(warnings);
+    scan.info.warnings = warnings;
     scan.info.resolution = resolution(axis);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))
@@ -68,7 +69,7 @@ fn place(
     source: &Source,
     header: &Header,
     properties: &[Property],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<ScanWarning>,
 ) -> Result<(Vec<Piece>, Storage), ReadError> {
     let stride: usize = properties.iter().map(|p| p.ty.size() * p.elements).sum();
     match header.encoding {
@@ -115,7 +116,7 @@ fn compressed_piece(source: &Source, header: &Header, stride: usize) -> Result<V
     }
     let broken = |at: u64, what: String| ReadError::broken(source.path(), at, what);
     if source.len() < header.end + 8 {
-        return Err(broken(source.len(), "the compressed block is missing".to_owned()).advise(CUT_SHORT));
+        return Err(broken(source.len(), "the compressed block is missing".to_owned()).advise(Advice::CutShort));
     }
     let [c0, c1, c2, c3, d0, d1, d2, d3] = source.array_at::<8>(header.end)?;
     let byte_len = u64::from(u32::from_le_bytes([c0, c1, c2, c3]));
@@ -123,14 +124,16 @@ fn compressed_piece(source: &Source, header: &Header, stride: usize) -> Result<V
     let byte_offset = header.end + 8;
     if byte_len > source.len() - byte_offset {
         let there = source.len() - byte_offset;
-        return Err(broken(source.len(), format!("{there} of {byte_len} compressed bytes are there")).advise(CUT_SHORT));
+        return Err(
+            broken(source.len(), format!("{there} of {byte_len} compressed bytes are there")).advise(Advice::CutShort)
+        );
     }
     if header.points.checked_mul(stride as u64) != Some(decompressed) || decompressed > lzf::most(byte_len) {
         let what = format!(
             "{} points of {stride} bytes cannot be in a block of {byte_len} bytes that claims to become {decompressed}",
             header.points
         );
-        return Err(broken(header.end, what).advise("it is damaged; copy or export it again"));
+        return Err(broken(header.end, what).advise(Advice::Damaged));
     }
     Ok(vec![Piece { first_point: 0, points: header.points, byte_offset, byte_len }])
 }

@@ -1,8 +1,7 @@
 //! The header: elements and their properties.
 
 use crate::scan::source::Source;
-use crate::scan::tabular::{CUT_SHORT, EXPORT_AGAIN};
-use crate::{AttributeType, ReadError};
+use crate::{Advice, AttributeType, Fault, ReadError, ScanWarning};
 
 /// No header is longer; most have some hundred bytes.
 const MAX_HEADER: u64 = 1 << 20;
@@ -47,7 +46,7 @@ pub(super) struct Header {
     pub(super) elements: Vec<Element>,
     /// First byte of the data.
     pub(super) end: u64,
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<ScanWarning>,
 }
 
 /// True if the first bytes of a file say that it is PLY.
@@ -61,12 +60,14 @@ impl Header {
         if !is_ply(&bytes) {
             let what =
                 if bytes.is_empty() { "the file is empty" } else { "not a PLY file (it does not start with ply)" };
-            return Err(ReadError::broken(source.path(), 0, what).advise("see which file was meant"));
+            return Err(ReadError::broken(source.path(), 0, Fault::Header(what.to_owned())).advise(Advice::WrongFile));
         }
         let mut parser = Parser { encoding: None, elements: Vec::new(), warnings: Vec::new() };
         for (at, line) in crate::scan::tabular::lines::lines(&bytes).skip(1) {
             let text = String::from_utf8_lossy(line);
-            let broken = |what: String| ReadError::broken(source.path(), at as u64, what).advise(EXPORT_AGAIN);
+            let broken = |what: String| {
+                ReadError::broken(source.path(), at as u64, Fault::Header(what)).advise(Advice::ExportAgain)
+            };
             if text.trim() == "end_header" {
                 // its line ends with LF or CR LF; the data follows at once
                 let newline = at + line.len();
@@ -81,7 +82,7 @@ impl Header {
             parser.line(&text, at as u64).map_err(broken)?;
         }
         let what = format!("the header has no end_header in its {} bytes", bytes.len());
-        Err(ReadError::broken(source.path(), bytes.len() as u64, what).advise(CUT_SHORT))
+        Err(ReadError::broken(source.path(), bytes.len() as u64, Fault::Header(what)).advise(Advice::CutShort))
     }
 
     /// Index of the element that holds the points.
@@ -102,7 +103,7 @@ impl Header {
 struct Parser {
     encoding: Option<Encoding>,
     elements: Vec<Element>,
-    warnings: Vec<String>,
+    warnings: Vec<ScanWarning>,
 }
 
 impl Parser {
@@ -118,7 +119,7 @@ impl Parser {
                     other => return Err(format!("the encoding {other:?} is not known")),
                 });
                 if rest != ["1.0"] {
-                    self.warnings.push(format!("the format version {:?} is read as 1.0", rest.join(" ")));
+                    self.warnings.push(ScanWarning::PlyVersion { version: rest.join(" ") });
                 }
             }
             ["element", name, count] => {

@@ -15,7 +15,7 @@
 //! use pointmill_format::{Scan, Scratch, Wanted};
 //! use std::ops::ControlFlow;
 //!
-//! let scan = ply::open("scan.ply".as_ref())?;
+//! let scan = ply::open("scan.ply")?;
 //! let (wanted, mut scratch, mut points) = (Wanted::all(scan.info()), Scratch::default(), 0);
 //! for piece in 0..scan.pieces().len() {
 //!     scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
@@ -35,7 +35,7 @@ use std::path::Path;
 
 use crate::scan::source::Source;
 use crate::scan::tabular::{Property, RowScan, Schema, precision, resolution, settle_float_colours};
-use crate::{AttributeType, ReadError, Scan};
+use crate::{Advice, AttributeType, Fault, ReadError, Scan};
 use header::{Encoding, Header, Kind};
 
 pub use header::is_ply;
@@ -45,15 +45,20 @@ pub use header::is_ply;
 ///
 /// # Errors
 /// Not PLY, a header that is cut short or makes no sense, no vertices, vertices without x and y.
-pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
+    let path = path.as_ref();
     let source = Source::open(path)?;
     let header = Header::read(&source)?;
     let mut warnings = header.warnings.clone();
     let vertices = header.vertices(&source)?;
     let properties = properties(&header.elements[vertices].properties);
     let schema = Schema::new(&properties, &mut warnings).map_err(|what| {
-        ReadError::broken(path, header.elements[vertices].at, format!("the vertices cannot be placed: {what}"))
-            .advise("export it with x, y and z")
+        ReadError::broken(
+            path,
+            header.elements[vertices].at,
+            Fault::NoPositions(format!("the vertices cannot be placed: {what}")),
+        )
+        .advise(Advice::ExportPositions)
     })?;
     let placed = vertices::place(&source, &header, vertices, &properties, &mut warnings)?;
     let axis = properties
@@ -63,7 +68,7 @@ pub fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
     let format = format!("PLY 1.0, {}, {} positions", header.encoding.name(), precision(axis));
     let mut scan = RowScan::new(source, format, header.elements[vertices].count, schema, placed.storage);
     scan.pieces = placed.pieces;
-    scan.info.warnings = crate::error::as_lines(warnings);
+    scan.info.warnings = warnings;
     scan.info.resolution = resolution(axis);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))

@@ -2,8 +2,8 @@
 
 use super::header::{Element, Encoding, Header, Kind};
 use crate::scan::source::Source;
-use crate::scan::tabular::{self, CUT_SHORT, Endian, LineRule, Part, Storage, binary, lines, reconcile};
-use crate::{Piece, ReadError};
+use crate::scan::tabular::{self, Endian, LineRule, Part, Storage, binary, lines, reconcile};
+use crate::{Advice, Piece, ReadError, ScanWarning};
 
 /// Bytes that are read at once while lists are followed.
 const WINDOW: u64 = 1 << 20;
@@ -24,7 +24,7 @@ pub(super) fn place(
     header: &Header,
     vertices: usize,
     properties: &[tabular::Property],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<ScanWarning>,
 ) -> Result<Placed, ReadError> {
     let (before, vertex) = (&header.elements[..vertices], &header.elements[vertices]);
     let endian = match header.encoding {
@@ -54,14 +54,14 @@ fn ascii(
     start: u64,
     before: &[Element],
     vertex: &Element,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<ScanWarning>,
 ) -> Result<Placed, ReadError> {
     let rows = before.iter().filter(|e| !e.properties.is_empty()).map(|e| e.count);
     let rows = rows.fold(0, u64::saturating_add);
     let (from, missing) = lines::skip(source, start, rows)?;
     if missing > 0 {
         let what = format!("{missing} of {rows} lines before the vertices are missing");
-        return Err(ReadError::broken(source.path(), from, what).advise(CUT_SHORT));
+        return Err(ReadError::broken(source.path(), from, what).advise(Advice::CutShort));
     }
     let index = lines::index(source, from, vertex.count, lines::is_filled)?;
     reconcile(vertex.count, index.rows, warnings);
@@ -97,7 +97,7 @@ impl Walker<'_> {
         let parts = parts(element);
         let cut = |at| {
             let what = format!("the {} rows of element {} end outside the file", element.count, element.name);
-            ReadError::broken(self.source.path(), at, what).advise(CUT_SHORT)
+            ReadError::broken(self.source.path(), at, what).advise(Advice::CutShort)
         };
         if let [] | [Part::Plain(_)] = parts.as_slice() {
             let stride = parts.iter().map(|p| if let Part::Plain(len) = p { *len as u64 } else { 0 }).sum();
@@ -119,9 +119,7 @@ impl Walker<'_> {
             let Some(end) = self.row_end(parts)? else { break };
             if end - self.at > MAX_ROW {
                 let what = format!("a vertex has {} bytes of lists", end - self.at);
-                return Err(
-                    ReadError::broken(self.source.path(), self.at, what).advise("it is damaged, export it again")
-                );
+                return Err(ReadError::broken(self.source.path(), self.at, what).advise(Advice::Damaged));
             }
             self.at = end;
             open.points += 1;
@@ -148,7 +146,7 @@ impl Walker<'_> {
                     let Some(bytes) = self.bytes(at, count.size())? else { return Ok(None) };
                     let items = binary::count(bytes, count, endian).ok_or_else(|| {
                         ReadError::broken(source.path(), at, "a list has a negative number of items")
-                            .advise("it is damaged; copy or export it again")
+                            .advise(Advice::Damaged)
                     })?;
                     items.checked_mul(item_bytes).and_then(|len| at.checked_add(count.size() as u64)?.checked_add(len))
                 }

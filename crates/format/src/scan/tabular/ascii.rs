@@ -1,9 +1,9 @@
 //! Rows written as text to columns.
 
-use super::binary::{InColumn, Misfit, out_of_range, unpack};
+use super::binary::{Misfit, out_of_range, unpack};
 use super::number::{Number, unit_to_u16};
 use super::schema::{Field, Rule, Target};
-use crate::{AttributeType, Column, PointBatch, Positions, Wanted};
+use crate::{AttributeType, Column, Element, PointBatch, Positions, Wanted};
 
 /// How the numbers of a line are set apart: by blanks, and by this byte if there is one.
 pub(crate) type Separator = Option<u8>;
@@ -57,7 +57,7 @@ impl RowParser<'_> {
                     *out = v;
                 }
             }
-            Target::Value { column, element, rule } if self.wanted.0.get(column) == Some(&true) => {
+            Target::Value { column, element, rule } if self.wanted.is_wanted(column) => {
                 let index = row * self.elements[column] + element;
                 self.value(field.ty, rule, tokens, index, &mut batch.columns[column])?;
             }
@@ -150,8 +150,8 @@ fn store_checked<T>(
 }
 
 /// Values side by side, if the column is of their type and not left out.
-fn put<T: InColumn + Copy, const N: usize>(column: &mut Column, at: usize, values: [T; N]) {
-    if let Some(out) = T::column(column).and_then(|v| v.get_mut(at..at + N)) {
+fn put<T: Element, const N: usize>(column: &mut Column, at: usize, values: [T; N]) {
+    if let Some(out) = column.values_mut::<T>().and_then(|v| v.get_mut(at..at + N)) {
         out.copy_from_slice(&values);
     }
 }

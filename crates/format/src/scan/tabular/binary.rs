@@ -2,7 +2,7 @@
 
 use super::number::{Endian, Number, unit_to_u16};
 use super::schema::{Field, Rule, Target};
-use crate::{AttributeType, Column, Piece, PointBatch, Positions, Wanted};
+use crate::{AttributeType, Column, Element, Piece, PointBatch, Positions, Wanted};
 
 /// Points of a piece of binary rows: a batch of its own, some MB.
 pub(crate) const PIECE_POINTS: u64 = 50_000;
@@ -89,7 +89,7 @@ pub(crate) fn field_to_column(
     first: usize,
     batch: &mut PointBatch,
 ) -> Result<(), Misfit> {
-    let is_wanted = |column: usize| wanted.0.get(column).copied().unwrap_or(false);
+    let is_wanted = |column: usize| wanted.is_wanted(column);
     match field.target {
         Target::Skip | Target::List => Ok(()),
         Target::Axis(axis) => {
@@ -126,7 +126,7 @@ struct Place {
 }
 
 impl Place {
-    fn fill<T: Number + InColumn, const N: usize>(
+    fn fill<T: Number + Element, const N: usize>(
         &self,
         rows: Rows<'_>,
         rule: Rule,
@@ -136,7 +136,7 @@ impl Place {
         let numbers = || rows.numbers::<N>(self.at).map(read);
         let wrong = match (rule, column) {
             (Rule::Keep, column) => {
-                if let Some(out) = T::column(column) {
+                if let Some(out) = column.values_mut::<T>() {
                     self.slots(out).zip(numbers()).for_each(|(out, v)| *out = v);
                 }
                 None
@@ -192,26 +192,6 @@ pub(crate) fn out_of_range(value: f64, rule: Rule) -> String {
     }
 }
 
-/// The typed vector of a column.
-pub(crate) trait InColumn: Sized {
-    fn column(column: &mut Column) -> Option<&mut Vec<Self>>;
-}
-
-macro_rules! columns {
-    ($($ty:ty => $kind:ident),*) => {$(
-        impl InColumn for $ty {
-            fn column(column: &mut Column) -> Option<&mut Vec<Self>> {
-                match column {
-                    Column::$kind(v) => Some(v),
-                    _ => None,
-                }
-            }
-        }
-    )*};
-}
-columns!(i8 => Int8, u8 => UInt8, i16 => Int16, u16 => UInt16, i32 => Int32, u32 => UInt32, i64 => Int64,
-    u64 => UInt64, f32 => Float32, f64 => Float64);
-
 /// The length of a list; `None` if it is negative or no integer.
 pub(crate) fn count(bytes: &[u8], ty: AttributeType, endian: Endian) -> Option<u64> {
     match ty {
@@ -251,7 +231,9 @@ mod tests {
     use super::*;
 
     fn batch(columns: Vec<Column>) -> PointBatch {
-        PointBatch { first_point: 0, positions: Positions::World([vec![0.0; 2], vec![0.0; 2], vec![0.0; 2]]), columns }
+        let mut batch = PointBatch::new(0, Positions::World([vec![0.0; 2], vec![0.0; 2], vec![0.0; 2]]), []);
+        batch.columns = columns;
+        batch
     }
 
     fn value(at: usize, ty: AttributeType, element: usize, rule: Rule) -> Field {
@@ -265,7 +247,7 @@ mod tests {
         let rows = Rows { bytes: &bytes, stride: 7, endian: Endian::Big };
         let mut fields = vec![Field { at: 0, ty: AttributeType::Float32, target: Target::Axis(1) }];
         fields.extend((0..3).map(|e| value(4 + e, AttributeType::UInt8, e, Rule::Convert)));
-        fill(rows, &fields, &Wanted(vec![true]), 0, &mut b).unwrap();
+        fill(rows, &fields, &Wanted::from_iter([true]), 0, &mut b).unwrap();
         assert_eq!(b.columns, [Column::UInt16(vec![7, 8, 9, 10, 11, 12])]);
         let Positions::World(xyz) = b.positions else { panic!() };
         assert_eq!(xyz[1], [1.0, 2.0]);
@@ -276,7 +258,7 @@ mod tests {
         let mut b = batch(vec![Column::UInt8(vec![0; 2])]);
         let rows = Rows { bytes: &[1, 0, 44, 1], stride: 2, endian: Endian::Little };
         let field = value(0, AttributeType::Int16, 0, Rule::Convert);
-        let misfit = fill(rows, &[field], &Wanted(vec![true]), 0, &mut b).unwrap_err();
+        let misfit = fill(rows, &[field], &Wanted::from_iter([true]), 0, &mut b).unwrap_err();
         assert_eq!((misfit.row, misfit.what.as_str()), (1, "the value 300 does not fit its column"));
     }
 

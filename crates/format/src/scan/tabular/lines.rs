@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn a_line_without_end_is_refused() {
         let bytes = vec![b'1'; 3 << 20];
-        assert!(index(&source(&bytes), 0, 10, is_filled).unwrap_err().what.contains("a line of more"));
+        assert!(index(&source(&bytes), 0, 10, is_filled).unwrap_err().what().contains("a line of more"));
     }
 
     #[test]

@@ -21,18 +21,12 @@ pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};
 pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage};
 pub(crate) use schema::{Field, MAX_FIELDS, Property, Rule, Schema, Target};
 
-/// Advice for files that end early.
-pub(crate) const CUT_SHORT: &str = "it was cut short; copy or export it again";
-/// Advice for files whose header cannot be.
-pub(crate) const EXPORT_AGAIN: &str = "export it again from its source";
+use crate::{Counted, ScanWarning};
 
 /// Warns if the file holds another number of points than it declares; returns the number to read.
-pub(crate) fn reconcile(declared: u64, there: u64, warnings: &mut Vec<String>) -> u64 {
+pub(crate) fn reconcile(declared: u64, there: u64, warnings: &mut Vec<ScanWarning>) -> u64 {
     if there < declared {
-        let missing = declared - there;
-        warnings.push(format!(
-            "the header declares {declared} points, {there} whole ones are there: {missing} are missing"
-        ));
+        warnings.push(ScanWarning::PointsMissing { declared, found: there, counted: Counted::Rows });
     }
     declared.min(there)
 }

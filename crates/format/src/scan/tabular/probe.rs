@@ -61,8 +61,15 @@ pub(crate) fn probe_rows(scan: &RowScan, picks: &[usize], mut visit: impl FnMut(
         return;
     }
     let schema = probe_schema(&scan.schema, picks);
-    let wanted = Wanted(vec![true]);
-    let decoder = Decoder { source: &scan.source, schema: &schema, storage: &scan.storage, wanted: &wanted };
+    let wanted = Wanted::from_iter([true]);
+    let attributes = schema.attributes.clone().into();
+    let decoder = Decoder {
+        source: &scan.source,
+        schema: &schema,
+        attributes: &attributes,
+        storage: &scan.storage,
+        wanted: &wanted,
+    };
     let mut scratch = Scratch::default();
     let step = scan.pieces.len().div_ceil(PLACES).max(1);
     let last = scan.pieces.len().checked_sub(1);

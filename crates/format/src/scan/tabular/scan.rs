@@ -1,14 +1,18 @@
 //! A scan of rows: pieces to batches, whatever the storage.
 
+use crate::{Advice, Fault};
+use std::sync::Arc;
+
 use super::ascii::{RowParser, Separator};
 use super::binary::{self, Misfit, Rows};
 use super::lines;
 use super::number::Endian;
 use super::schema::Schema;
+use crate::scan::decode::fitting_batch;
 use crate::scan::source::Source;
 use crate::{
-    Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo, Scratch, Sink,
-    Wanted,
+    Attribute, Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo, Scratch,
+    Sink, Wanted,
 };
 
 /// Binary rows that are read at once, so that they are still in the second-level cache when they become columns.
@@ -102,7 +106,7 @@ impl RowScan {
             lattice: None,
             resolution: Resolution::Double,
             parts: Vec::new(),
-            attributes: schema.attributes.clone(),
+            attributes: schema.attributes.clone().into(),
             crs: Default::default(),
             file_bytes: source.len(),
             warnings: Vec::new(),
@@ -128,11 +132,17 @@ impl Scan for RowScan {
         sink: &mut Sink<'_>,
     ) -> Result<(), ReadError> {
         let Some(piece) = self.pieces.get(piece) else {
-            let what = format!("there is no piece {piece} (there are {})", self.pieces.len());
-            return Err(ReadError::unsupported(self.source.path(), what));
+            let fault = Fault::NoSuchPiece { piece, pieces: self.pieces.len() };
+            return Err(ReadError::unsupported(self.source.path(), fault));
         };
-        Decoder { source: &self.source, schema: &self.schema, storage: &self.storage, wanted }
-            .piece(piece, scratch, sink)
+        Decoder {
+            source: &self.source,
+            schema: &self.schema,
+            attributes: &self.info.attributes,
+            storage: &self.storage,
+            wanted,
+        }
+        .piece(piece, scratch, sink)
     }
 }
 
@@ -140,6 +150,8 @@ impl Scan for RowScan {
 pub(crate) struct Decoder<'a> {
     pub(crate) source: &'a Source,
     pub(crate) schema: &'a Schema,
+    /// Those of the schema.
+    pub(crate) attributes: &'a Arc<[Attribute]>,
     pub(crate) storage: &'a Storage,
     pub(crate) wanted: &'a Wanted,
 }
@@ -147,7 +159,7 @@ pub(crate) struct Decoder<'a> {
 impl Decoder<'_> {
     pub(crate) fn piece(&self, piece: &Piece, scratch: &mut Scratch, sink: &mut Sink<'_>) -> Result<(), ReadError> {
         let Scratch { raw, decoded, batch } = scratch;
-        let batch = fitting_batch(batch, self.schema);
+        let batch = fitting_batch(batch, self.attributes, false);
         match self.storage {
             Storage::Records { stride, endian } => self.records(piece, *stride, *endian, raw, batch, sink),
             Storage::Lists { parts, stride, endian } => {
@@ -228,10 +240,8 @@ impl Decoder<'_> {
     ) -> Result<(), ReadError> {
         let compressed = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
         let total = usize::try_from(planes.points).unwrap_or(usize::MAX);
-        (planes.decompress)(compressed, total.saturating_mul(planes.stride), decoded).map_err(|what| {
-            ReadError::broken(self.source.path(), piece.byte_offset, what)
-                .advise("it is damaged; copy or export it again")
-        })?;
+        (planes.decompress)(compressed, total.saturating_mul(planes.stride), decoded)
+            .map_err(|what| ReadError::broken(self.source.path(), piece.byte_offset, what).advise(Advice::Damaged))?;
         for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for (field, (property_at, width)) in self.schema.fields.iter().zip(&planes.properties) {
@@ -305,15 +315,14 @@ impl Decoder<'_> {
             }
         }
         for (i, (column, attribute)) in batch.columns.iter_mut().zip(&self.schema.attributes).enumerate() {
-            let wanted = self.wanted.0.get(i).copied().unwrap_or(false);
+            let wanted = self.wanted.is_wanted(i);
             let len = if wanted { points * attribute.elements } else { 0 };
             crate::with_column!(column, v => v.resize(len, Default::default()));
         }
     }
 
     fn misfit(&self, at: u64, misfit: Misfit) -> ReadError {
-        ReadError::broken(self.source.path(), at, misfit.what)
-            .advise("the file is damaged, or its columns are not what they are called; correct it or export it again")
+        ReadError::broken(self.source.path(), at, Fault::Row(misfit.what)).advise(Advice::CheckColumns)
     }
 }
 
@@ -323,22 +332,6 @@ fn batches(piece: &Piece, schema: &Schema) -> impl Iterator<Item = (u64, usize)>
     let most = (MAX_BATCH_BYTES / point_bytes).clamp(1, MAX_BATCH_POINTS);
     let (first, points) = (piece.first_point, piece.points);
     (0..points).step_by(most).map(move |done| (first + done, (points - done).min(most as u64) as usize))
-}
-
-/// The batch of the scratch memory, with columns of this scan's types.
-fn fitting_batch<'a>(batch: &'a mut Option<PointBatch>, schema: &Schema) -> &'a mut PointBatch {
-    let types = || schema.attributes.iter().map(|a| a.ty);
-    let fits = batch
-        .as_ref()
-        .is_some_and(|b| matches!(b.positions, Positions::World(_)) && b.columns.iter().map(Column::ty).eq(types()));
-    if !fits {
-        *batch = None;
-    }
-    batch.get_or_insert_with(|| PointBatch {
-        first_point: 0,
-        positions: Positions::World(Default::default()),
-        columns: types().map(Column::new).collect(),
-    })
 }
 
 /// Records with lists in them.

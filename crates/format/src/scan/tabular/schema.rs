@@ -1,7 +1,7 @@
 //! Which number of a row goes to which column.
 
 use super::names::{self, Role, role};
-use crate::{Attribute, AttributeType};
+use crate::{Attribute, AttributeType, ScanWarning};
 
 /// More numbers in a row than any scan has; a header that says more is refused.
 pub(crate) const MAX_FIELDS: usize = 4096;
@@ -76,7 +76,7 @@ impl Schema {
     /// Colour comes first, then intensity, classification, normals and the rest in file order.
     ///
     /// `Err` says what is missing. A missing z alone is no error.
-    pub(crate) fn new(properties: &[Property], warnings: &mut Vec<String>) -> Result<Self, String> {
+    pub(crate) fn new(properties: &[Property], warnings: &mut Vec<ScanWarning>) -> Result<Self, String> {
         let count = properties.iter().try_fold(0usize, |sum, p| sum.checked_add(p.elements));
         if count.is_none_or(|n| n > MAX_FIELDS) {
             return Err(format!("a row has more than {MAX_FIELDS} numbers"));
@@ -109,13 +109,13 @@ impl Builder<'_> {
         Some([self.find(&role(0))?, self.find(&role(1))?, self.find(&role(2))?])
     }
 
-    fn axes(&mut self, warnings: &mut Vec<String>) -> Result<(), String> {
+    fn axes(&mut self, warnings: &mut Vec<ScanWarning>) -> Result<(), String> {
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             match self.find(&Role::Axis(axis)) {
                 Some(i) => self.targets[i] = vec![Target::Axis(axis)],
                 None if axis == 2 => {
                     self.schema.flat = true;
-                    warnings.push("there is no z; it is 0 for every point".to_owned());
+                    warnings.push(ScanWarning::NoZ);
                 }
                 None => return Err(format!("there is no {name}")),
             }

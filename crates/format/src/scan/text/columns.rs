@@ -2,10 +2,10 @@
 
 use crate::scan::source::Source;
 use crate::scan::tabular::{
-    ColumnRange, EXPORT_AGAIN, Field, LineRule, MAX_FIELDS, Property, Role, RowScan, Rule, Schema, Storage, Target,
-    las_type, probe_rows, role,
+    ColumnRange, Field, LineRule, MAX_FIELDS, Property, Role, RowScan, Rule, Schema, Storage, Target, las_type,
+    probe_rows, role,
 };
-use crate::{AttributeType, Piece, ReadError};
+use crate::{Advice, AttributeType, Piece, ReadError, ScanWarning};
 
 /// Advice for types.
 const TYPES: &str = "types are int8, uint8, int16, uint16, int32, uint32, int64, uint64, float, double";
@@ -87,7 +87,7 @@ pub(super) struct Table {
     pub(super) declared: u64,
     pub(super) pieces: Vec<Piece>,
     pub(super) rule: LineRule,
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<ScanWarning>,
     /// For each column, whether its first value is a number.
     pub(super) numeric: Vec<bool>,
     /// −2048…2047 is shifted to 0–4095.
@@ -108,7 +108,7 @@ impl Table {
     pub(super) fn scan(mut self, columns: Option<Vec<Column>>) -> Result<RowScan, ReadError> {
         if self.numeric.len() > MAX_FIELDS {
             let what = format!("a row has {} columns, more than {MAX_FIELDS}", self.numeric.len());
-            return Err(ReadError::broken(self.source.path(), self.first_row, what).advise(EXPORT_AGAIN));
+            return Err(ReadError::broken(self.source.path(), self.first_row, what).advise(Advice::ExportAgain));
         }
         let fields = vec![Field { at: 0, ty: AttributeType::Float64, target: Target::Skip }; self.numeric.len()];
         let raw = Schema { attributes: Vec::new(), fields, flat: false };
@@ -118,7 +118,7 @@ impl Table {
         let mut columns = columns.unwrap_or_else(|| by_number(&sample));
         for (i, column) in columns.iter_mut().enumerate().filter(|(i, _)| self.numeric.get(*i) == Some(&false)) {
             if column.role != Role::Padding {
-                self.warnings.push(format!("column {} ({}) holds no numbers; it is left out", i + 1, column.name));
+                self.warnings.push(ScanWarning::ColumnIgnored { number: i + 1, name: column.name.clone() });
             }
             *column = Column::padding();
         }
@@ -141,8 +141,8 @@ impl Table {
         if let Some(i) = intensity {
             shift_intensity(&mut schema, i);
         }
-        scan.info.attributes = schema.attributes.clone();
-        scan.info.warnings = crate::error::as_lines(self.warnings);
+        scan.info.attributes = schema.attributes.clone().into();
+        scan.info.warnings = self.warnings;
         scan.schema = schema;
         Ok(scan)
     }

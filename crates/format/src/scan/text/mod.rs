@@ -39,13 +39,14 @@ mod xyz;
 use std::path::Path;
 
 use crate::scan::source::Source;
-use crate::{ReadError, Scan};
+use crate::{Advice, Fault, ReadError, Scan};
 use rows::{filled, is_comment, is_count, number_count};
 
 pub use options::TextOptions;
 
 /// The kinds of text that are told apart by content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TextKind {
     /// Lines of numbers: XYZ, TXT, CSV, ASC.
     Xyz,
@@ -107,19 +108,18 @@ pub fn is_xyz(first_bytes: &[u8]) -> bool {
 /// # Errors
 /// Not text, columns that cannot be told or do not fit `options`, a header (PTX, OFF) that is cut short or makes no
 /// sense, a line of more than 1 MiB.
-pub fn open(path: &Path, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
+    let path = path.as_ref();
     let source = Source::open(path)?;
     let first = source.vec_at(0, 64 << 10)?;
     if first.is_empty() {
-        return Err(ReadError::broken(path, 0, "the file is empty").advise("see which file was meant"));
+        return Err(ReadError::broken(path, 0, Fault::Empty).advise(Advice::WrongFile));
     }
     if first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff]) {
         return Err(ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8"));
     }
     if let Some(at) = first.iter().position(|b| *b == 0) {
-        return Err(
-            ReadError::broken(path, at as u64, "not text: it has zero bytes").advise("see which file was meant")
-        );
+        return Err(ReadError::broken(path, at as u64, "not text: it has zero bytes").advise(Advice::WrongFile));
     }
     match kind(&first) {
         Some(TextKind::Off) => off::open(source),

@@ -3,8 +3,8 @@
 use super::columns::{Column, Table};
 use super::rows::{BOM, fields, is_data, is_number};
 use crate::scan::source::Source;
-use crate::scan::tabular::{EXPORT_AGAIN, LineRule, lines, reconcile};
-use crate::{ReadError, Scan};
+use crate::scan::tabular::{LineRule, lines, reconcile};
+use crate::{Advice, ReadError, Scan};
 
 /// What the first word says of the vertices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl Keyword {
 
 pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
     let first = source.vec_at(0, 64 << 10)?;
-    let broken = |at: u64, what: String| ReadError::broken(source.path(), at, what).advise(EXPORT_AGAIN);
+    let broken = |at: u64, what: String| ReadError::broken(source.path(), at, what).advise(Advice::ExportAgain);
     let keyword = Keyword::find(&first).ok_or_else(|| broken(0, "the OFF keyword is missing".to_owned()))?;
     let (counts_at, counts, start) = counts(&source, &first, keyword)?;
     if counts.first().is_some_and(|c| *c == b"BINARY") || keyword.other_space {
@@ -107,7 +107,7 @@ fn counts<'a>(source: &Source, first: &'a [u8], keyword: Keyword) -> Result<(u64
         }
     }
     Err(ReadError::broken(source.path(), at as u64, "the counts of vertices and faces are missing")
-        .advise(crate::scan::tabular::CUT_SHORT))
+        .advise(Advice::CutShort))
 }
 
 fn without_comment(line: &[u8]) -> &[u8] {

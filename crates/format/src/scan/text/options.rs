@@ -2,6 +2,7 @@
 
 /// What the file does not say of itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TextOptions {
     /// Names of all columns in file order: `x`, `y`, `z`, `r`, `g`, `b`, `i` (intensity), `c` (classification), `nx`,
     /// `ny`, `nz`; `-` is left out; any other becomes an attribute of that name. A type may follow a colon
@@ -9,4 +10,20 @@ pub struct TextOptions {
     pub columns: Option<Vec<String>>,
     /// Between two fields; `None`: found. A blank means any blanks.
     pub separator: Option<char>,
+}
+
+impl TextOptions {
+    /// Sets [`Self::columns`].
+    #[must_use]
+    pub fn columns<N: Into<String>>(mut self, names: impl IntoIterator<Item = N>) -> Self {
+        self.columns = Some(names.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Sets [`Self::separator`].
+    #[must_use]
+    pub fn separator(mut self, separator: char) -> Self {
+        self.separator = Some(separator);
+        self
+    }
 }

@@ -8,7 +8,7 @@ use super::rows::{BOM, fields, is_count, is_data, is_number, separator};
 use super::xyz::{named, wanted_separator};
 use crate::scan::source::Source;
 use crate::scan::tabular::{LineRule, lines, reconcile};
-use crate::{ReadError, Scan};
+use crate::{Advice, ReadError, Scan, ScanWarning};
 
 pub(super) fn open(source: Source, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
     let from = if source.vec_at(0, 3)? == BOM { 3 } else { 0 };
@@ -26,13 +26,11 @@ pub(super) fn open(source: Source, options: &TextOptions) -> Result<Box<dyn Scan
     reconcile(declared, index.rows, &mut warnings);
     if index.rows > declared {
         let rows = index.rows;
-        warnings.push(format!("the header declares {declared} points; all {rows} that are there are read"));
+        warnings.push(ScanWarning::PointsUndeclared { declared, found: rows });
     }
     let first = lines::first_filled(&source, from, 64)?;
     let Some((first_row, row)) = first.into_iter().find(|(_, line)| is_row(line)) else {
-        return Err(
-            ReadError::broken(source.path(), from, "there are no rows of points").advise("see which file was meant")
-        );
+        return Err(ReadError::broken(source.path(), from, "there are no rows of points").advise(Advice::WrongFile));
     };
     let separator = wanted_separator(options).unwrap_or_else(|| separator(&row));
     let numeric: Vec<bool> = fields(&row, separator).iter().map(|f| is_number(f)).collect();

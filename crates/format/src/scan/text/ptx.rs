@@ -7,8 +7,8 @@ use super::columns::{Column, Table};
 use super::rows::{fields, is_number};
 use crate::scan::source::Source;
 use crate::scan::tabular::ascii::{Tokens, parse};
-use crate::scan::tabular::{CUT_SHORT, EXPORT_AGAIN, LineRule, Pose, lines, reconcile};
-use crate::{Attribute, AttributeType, Piece, ReadError, Scan, ScanPart};
+use crate::scan::tabular::{LineRule, Pose, lines, reconcile};
+use crate::{Advice, Attribute, AttributeType, Piece, ReadError, Scan, ScanPart};
 
 /// Lines of a scan before its cells.
 const HEADER_LINES: usize = 10;
@@ -62,7 +62,7 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
             rule.scan_column = Some(scan.schema.attributes.len());
         }
         scan.schema.attributes.push(attribute);
-        scan.info.attributes = scan.schema.attributes.clone();
+        scan.info.attributes = scan.schema.attributes.clone().into();
     }
     Ok(Box::new(scan))
 }
@@ -114,7 +114,7 @@ impl Grids {
         let width = match numbers {
             0..=2 => {
                 let what = format!("a grid cell has {numbers} numbers, 4 or 7 are expected");
-                return Err(ReadError::broken(source.path(), at, what).advise(EXPORT_AGAIN));
+                return Err(ReadError::broken(source.path(), at, what).advise(Advice::ExportAgain));
             }
             3 => 3,
             4..=6 => 4,
@@ -155,7 +155,7 @@ impl Header {
         let lines = lines::first_filled(source, at, HEADER_LINES)?;
         if lines.len() < HEADER_LINES {
             let what = format!("the scan that starts here has {} of {HEADER_LINES} header lines", lines.len());
-            return Err(ReadError::broken(source.path(), at, what).advise(CUT_SHORT));
+            return Err(ReadError::broken(source.path(), at, what).advise(Advice::CutShort));
         }
         let [columns, rows] = [0, 1].map(|i| numbers::<1>(source, &lines[i]));
         let ([columns], [rows]) = (columns?, rows?);
@@ -163,7 +163,7 @@ impl Header {
         let cells = whole(columns).zip(whole(rows)).and_then(|(c, r)| c.checked_mul(r));
         let cells = cells.ok_or_else(|| {
             let what = format!("a grid of {columns} by {rows} cells cannot be");
-            ReadError::broken(source.path(), at, what).advise(EXPORT_AGAIN)
+            ReadError::broken(source.path(), at, what).advise(Advice::ExportAgain)
         })?;
         for line in &lines[2..6] {
             numbers::<3>(source, line)?;
@@ -185,7 +185,7 @@ fn numbers<const N: usize>(source: &Source, (at, line): &(u64, Vec<u8>)) -> Resu
     values.and_then(|v| v.try_into().ok()).ok_or_else(|| {
         let shown: String = String::from_utf8_lossy(line).chars().take(40).collect();
         let what = format!("the header line {shown:?} should have {N} number{}", if N == 1 { "" } else { "s" });
-        ReadError::broken(source.path(), *at, what).advise(EXPORT_AGAIN)
+        ReadError::broken(source.path(), *at, what).advise(Advice::ExportAgain)
     })
 }
 

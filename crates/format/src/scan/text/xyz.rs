@@ -5,7 +5,7 @@ use super::options::TextOptions;
 use super::rows::{BOM, fields, is_comment, is_data, is_number, separator};
 use crate::scan::source::Source;
 use crate::scan::tabular::{LineRule, Role, lines};
-use crate::{ReadError, Scan};
+use crate::{Advice, ReadError, Scan};
 
 /// Lines before the first row that are looked at.
 const MAX_HEAD: usize = 1000;
@@ -50,9 +50,7 @@ impl Head {
         let from = if source.vec_at(0, 3)? == BOM { 3 } else { 0 };
         let lines = lines::first_filled(source, from, MAX_HEAD)?;
         let data: Vec<_> = lines.iter().filter(|(_, line)| is_data(line)).collect();
-        let none = || {
-            ReadError::broken(source.path(), from, "there are no lines of numbers").advise("see which file was meant")
-        };
+        let none = || ReadError::broken(source.path(), from, "there are no lines of numbers").advise(Advice::WrongFile);
         let (mut at, mut row) = data.first().map(|(at, line)| (*at, line)).ok_or_else(none)?;
         let mut separator = wanted_separator(options).unwrap_or_else(|| separator(row));
         let comment = lines.iter().rev().find(|(place, line)| *place < at && is_comment(line)).map(|(_, line)| line);

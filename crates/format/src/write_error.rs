@@ -1,4 +1,4 @@
-//! Why a cloud cannot be written as it was asked for.
+//! Why a dataset cannot be written as it was asked for.
 
 use std::io;
 
@@ -23,6 +23,15 @@ pub enum WriteError {
     Compress(String),
     #[error("writing: {0}")]
     Io(#[from] io::Error),
+}
+
+impl From<WriteError> for io::Error {
+    fn from(error: WriteError) -> Self {
+        match error {
+            WriteError::Io(error) => error,
+            other => Self::new(io::ErrorKind::InvalidInput, other),
+        }
+    }
 }
 
 impl WriteError {

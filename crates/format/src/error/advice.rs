@@ -1,0 +1,67 @@
+//! What the user can do about an error, as data.
+
+use std::fmt;
+
+/// What the user can do. A program with options of its own matches on it and names them; others print it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Advice {
+    /// The file ends early: a copy or an export did not finish.
+    CutShort,
+    /// The bytes are not what was written.
+    Damaged,
+    /// The program that wrote the file did not do it right.
+    ExportAgain,
+    /// The file lacks coordinates.
+    ExportPositions,
+    /// The file is none of the kind that it was opened as.
+    WrongFile,
+    /// A number does not fit its column.
+    CheckColumns,
+    /// Rows of two numbers: cut short, or x and y alone, which [`crate::OpenOptions::columns`] can say.
+    NameColumns,
+    /// The kinds of scans that this build reads ([`crate::supported_scans`]).
+    Supported(String),
+    /// Cut short or damaged, or of another kind than those that this build reads.
+    CopyOrSupported(String),
+    /// A conversion can skip what cannot be read and go on with the rest.
+    SkipUnreadable,
+    /// Anything else, as text.
+    Other(String),
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::CutShort => f.write_str("it was cut short; copy or export it again"),
+            Self::Damaged => f.write_str("it is damaged; copy or export it again"),
+            Self::ExportAgain => f.write_str("export it again from its source"),
+            Self::WrongFile => f.write_str("see which file was meant"),
+            Self::ExportPositions => f.write_str("export it with x, y and z"),
+            Self::CheckColumns => f.write_str(
+                "the file is damaged, or its columns are not what they are called; correct it or export it again",
+            ),
+            Self::NameColumns => {
+                f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")
+            }
+            Self::Supported(kinds) => write!(f, "supported are {kinds}"),
+            Self::CopyOrSupported(kinds) => {
+                write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")
+            }
+            Self::SkipUnreadable => f.write_str("copy the file again, or skip what cannot be read"),
+            Self::Other(text) => f.write_str(text),
+        }
+    }
+}
+
+impl From<String> for Advice {
+    fn from(text: String) -> Self {
+        Self::Other(text)
+    }
+}
+
+impl From<&str> for Advice {
+    fn from(text: &str) -> Self {
+        Self::Other(text.to_owned())
+    }
+}
