@@ -172,6 +172,8 @@ fn fits(min: i64, max: i64, bits: u32) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
 
     fn lattice(scale: [f64; 3]) -> Lattice {
@@ -213,12 +215,11 @@ mod tests {
         let bounds = JobBounds::new([-1_220_000_000, 450_000_000, 0], [-1_219_900_000, 450_100_000, 30_000]);
         for scale in [[1e-7, 1e-7, 0.01], [0.01; 3], [0.3, 0.001, 7.0]] {
             let Ok(cube) = Cube::around(&bounds, &lattice(scale)) else { continue };
-            let mut state = 1u64;
+            let mut random = Random::new(1);
             for _ in 0..2000 {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1442);
                 let q = JobPoint(std::array::from_fn(|a| {
                     let range = bounds.max[a] - bounds.min[a] + 1;
-                    bounds.min[a] + (state >> (8 * a + 3)) as i64 % range
+                    bounds.min[a] + random.below(range as u64) as i64
                 }));
                 for level in [0u8, 4, 9] {
                     let [x, y, z] = cube.tree(q).cell(TREE_BITS - u32::from(level));

@@ -42,6 +42,8 @@ pub(crate) fn child_index(t: TreePoint, level: u8) -> u8 {
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
 
     #[test]
@@ -54,11 +56,8 @@ mod tests {
 
     #[test]
     fn compare_agrees_with_the_codes() {
-        let mut state = 1u64;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 43) as u32
-        };
+        let mut random = Random::new(1);
+        let mut next = || random.below(1 << 21) as u32;
         for _ in 0..10_000 {
             let (a, b) = ([next(), next(), next()], [next(), next() >> 9, next()]);
             assert_eq!(compare(a, b), interleave(a).cmp(&interleave(b)), "{a:?} {b:?}");

@@ -124,14 +124,13 @@ fn radix_sort(keys: &mut Vec<u64>, swap: &mut Vec<u64>, from: u32, to: u32) {
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
 
     fn random() -> impl FnMut() -> u64 {
-        let mut state = 7u64;
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            state >> 1 ^ state >> 33
-        }
+        let mut random = Random::new(7);
+        move || random.next_u64() >> 1
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub(crate) fn order(records: &[u8], frame: &RecordFrame, level: u8, scratch: &mu
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
     use crate::cloud::{Cube, JobBounds, JobPoint, StoredOrigin};
     use pointmill_format::Lattice;
@@ -49,10 +51,9 @@ mod tests {
         let cube = Cube::around(&bounds, &Lattice { scale: [0.01; 3], offset: [0.0; 3] }).unwrap();
         let frame = RecordFrame { stride: 14, cube, origin: StoredOrigin(JobPoint([0; 3])) };
         let mut records = Vec::new();
-        let mut state = 7u64;
+        let mut random = Random::new(7);
         for i in 0..5000u32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            let q = [(state >> 50) as i32, (state >> 40) as i32 & 0xff, i as i32 % 3];
+            let q = [random.below(1 << 14) as i32, random.below(256) as i32, i as i32 % 3];
             records.extend(q.iter().flat_map(|v| v.to_le_bytes()));
             records.extend((i as u16 % 50).to_le_bytes());
         }

@@ -236,6 +236,8 @@ fn column(x: u32, y: u32) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
 
     fn squared(a: [u32; 3], b: [u32; 3]) -> u64 {
@@ -266,11 +268,8 @@ mod tests {
 
     #[test]
     fn no_two_taken_are_closer_than_the_spacing_and_no_candidate_is_farther_from_all() {
-        let mut state = 3u64;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 47) as u32
-        };
+        let mut random = Random::new(3);
+        let mut next = || random.below(1 << 17) as u32;
         // One node of level 14, a slab of it, with repeated points; then a volume.
         let mut slab: Vec<[u32; 3]> = (0..6000).map(|_| [next(), next(), next() >> 9]).collect();
         slab.extend_from_within(0..500);

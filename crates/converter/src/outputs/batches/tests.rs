@@ -9,6 +9,9 @@ use pointmill_format::batches::{
     eight_bit, write,
 };
 use pointmill_format::{Attribute, AttributeType, Lattice};
+use pointmill_testkit::Random;
+use pointmill_testkit::files::assert_same_bytes;
+use pointmill_testkit::las::{self, Las};
 
 use super::BatchesSettings;
 use crate::plan::{AttributeChoice, Plan, Setting};
@@ -27,20 +30,10 @@ struct Scan {
     values: Vec<[u16; 5]>,
 }
 
-/// Numbers that look random, the same each time.
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) * end) >> 31
-    }
-}
-
 impl Scan {
     /// Points on a wavy surface of that extent in steps.
     fn surface(points: usize, extent: u64, scale: f64) -> Self {
-        let mut n = Numbers(points as u64);
+        let mut n = Random::new(points as u64);
         let mut scan = Self { scale: [scale; 3], offset: [0.0; 3], positions: vec![], values: vec![] };
         for _ in 0..points {
             let (x, y) = (n.below(extent) as i32, n.below(extent) as i32);
@@ -50,7 +43,7 @@ impl Scan {
         scan
     }
 
-    fn push(&mut self, position: [i32; 3], n: &mut Numbers) {
+    fn push(&mut self, position: [i32; 3], n: &mut Random) {
         self.positions.push(position);
         self.values.push(std::array::from_fn(|i| n.below(if i == 4 { 7 } else { 65_536 }) as u16));
     }
@@ -64,31 +57,17 @@ impl Scan {
         Lattice { scale: self.scale, offset: self.offset }
     }
 
-    /// LAS 1.2, point format 2.
+    /// LAS, point format 2.
     fn write(&self, path: &Path) {
-        let mut b = vec![0u8; 227];
-        b[..4].copy_from_slice(b"LASF");
-        b[24..26].copy_from_slice(&[1, 2]);
-        b[94..96].copy_from_slice(&227u16.to_le_bytes());
-        b[96..100].copy_from_slice(&227u32.to_le_bytes());
-        b[104] = 2;
-        b[105..107].copy_from_slice(&26u16.to_le_bytes());
-        b[107..111].copy_from_slice(&(self.positions.len() as u32).to_le_bytes());
-        for a in 0..3 {
-            b[131 + 8 * a..][..8].copy_from_slice(&self.scale[a].to_le_bytes());
-            b[155 + 8 * a..][..8].copy_from_slice(&self.offset[a].to_le_bytes());
-            let world = |q: Option<i32>| f64::from(q.unwrap_or(0)) * self.scale[a] + self.offset[a];
-            let axis = || self.positions.iter().map(|p| p[a]);
-            b[179 + 16 * a..][..8].copy_from_slice(&world(axis().max()).to_le_bytes());
-            b[187 + 16 * a..][..8].copy_from_slice(&world(axis().min()).to_le_bytes());
-        }
-        for (position, [red, green, blue, intensity, class]) in self.positions.iter().zip(&self.values) {
-            b.extend(position.iter().flat_map(|v| v.to_le_bytes()));
-            b.extend(intensity.to_le_bytes());
-            b.extend([0x11, *class as u8, 0, 0, 0, 0]);
-            b.extend([red, green, blue].into_iter().flat_map(|v| v.to_le_bytes()));
-        }
-        fs::write(path, b).unwrap();
+        let point = |(xyz, [red, green, blue, intensity, class]): (&[i32; 3], &[u16; 5])| las::Point {
+            intensity: *intensity,
+            class: *class as u8,
+            rgb: [*red, *green, *blue],
+            ..las::Point::at(*xyz)
+        };
+        let points = self.positions.iter().zip(&self.values).map(point).collect();
+        let las = Las { point_format: 2, scale: self.scale, offset: self.offset, ..Las::new(points) };
+        fs::write(path, las.bytes()).unwrap();
     }
 
     /// What the plain writer makes of it; `like` gives cell, planes and description.
@@ -148,11 +127,6 @@ impl Bench {
     }
 }
 
-fn assert_same(ours: &[u8], expected: &[u8], what: &str) {
-    let first = ours.iter().zip(expected).position(|(a, b)| a != b);
-    assert!(ours == expected, "{what}: {} and {} bytes, first difference at {first:?}", ours.len(), expected.len());
-}
-
 fn cell(side: f64) -> BatchesSettings {
     BatchesSettings { lod_cell: Some(side), ..BatchesSettings::default() }
 }
@@ -171,7 +145,7 @@ fn check(what: &str, scan: &Scan, settings: BatchesSettings) {
         }
         let (ours, report) = bench.convert(&plan, settings).unwrap();
         let (expected, written) = scan.reference(&ours, extras);
-        assert_same(&ours, &expected, &format!("{what}, {threads} threads, tasks of {task_points} points"));
+        assert_same_bytes(&ours, &expected, &format!("{what}, {threads} threads, tasks of {task_points} points"));
         let details = &report.outputs[0].details;
         assert_eq!(details["lod_points"], serde_json::json!(written.lod_points), "{what}");
         assert_eq!((report.outputs[0].points, report.outputs[0].bytes), (points, written.bytes));
@@ -190,7 +164,7 @@ fn surfaces_give_the_bytes_of_the_plain_writer_with_cells_of_any_size() {
 
 #[test]
 fn positions_that_repeat_are_ordered_by_all_they_have() {
-    let mut n = Numbers(5);
+    let mut n = Random::new(5);
     let places = Scan::surface(200, 1_000, 0.01);
     let mut scan = Scan { positions: vec![], values: vec![], ..places };
     for _ in 0..25_000 {
@@ -257,7 +231,7 @@ fn neither_memory_nor_the_order_of_inputs_shows() {
     plan.memory_bytes = needed;
     let (spilled, report) = bench.convert(&plan, cell(1.0)).unwrap();
     assert!(report.temp_bytes > 0);
-    assert_same(&spilled, &expected, "spilled");
+    assert_same_bytes(&spilled, &expected, "spilled");
 
     let mut parts = [scan.clone(), scan.clone(), scan.clone()];
     for (k, part) in parts.iter_mut().enumerate() {
@@ -268,7 +242,7 @@ fn neither_memory_nor_the_order_of_inputs_shows() {
     let mut plan = bench.plan();
     plan.task_points = Some(9_999);
     let (joined, _) = bench.convert(&plan, cell(1.0)).unwrap();
-    assert_same(&joined, &expected, "three files");
+    assert_same_bytes(&joined, &expected, "three files");
 }
 
 #[test]
@@ -286,7 +260,7 @@ fn colours_of_eight_bits_keep_their_values_also_beside_others() {
     assert!(!report.warnings.contains(&Warning::ColoursNarrowed), "{:?}", report.warnings);
     let (widened, report) = ours(&wide);
     assert!(report.warnings.contains(&Warning::ColoursNarrowed), "{:?}", report.warnings);
-    assert_same(&narrow, &widened, "the same colours");
+    assert_same_bytes(&narrow, &widened, "the same colours");
 }
 
 #[test]
@@ -347,7 +321,7 @@ fn compressed_sections_are_those_of_the_plain_compressor() {
             plan.threads = threads;
             let zstd = BatchesSettings { zstd_level: Some(3), ..settings };
             let (ours, report) = bench.convert(&plan, zstd).unwrap();
-            assert_same(&ours, expected.get_ref(), "compressed");
+            assert_same_bytes(&ours, expected.get_ref(), "compressed");
             assert_eq!(report.output_bytes, ours.len() as u64);
         }
     }

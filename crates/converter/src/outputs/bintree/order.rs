@@ -32,6 +32,8 @@ pub(super) fn order(
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
     use crate::cloud::StoredPoint;
 
@@ -45,14 +47,11 @@ mod tests {
 
     #[test]
     fn all_bits_count_however_wide_the_leaf_and_ties_go_by_bytes() {
-        let mut state = 3u64;
+        let mut random = Random::new(3);
         for spread in [0, 3, 12, 31] {
             let mut items = Vec::new();
             for record in 0..4000 {
-                let q = StoredPoint(std::array::from_fn(|_| {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                    (state >> 32) as u32 as i32 >> (31 - spread).min(31)
-                }));
+                let q = StoredPoint(std::array::from_fn(|_| random.next_u32() as i32 >> (31 - spread).min(31)));
                 items.push(Item { q, record });
             }
             let min: [i32; 3] = std::array::from_fn(|a| items.iter().map(|i| i.q[a]).min().unwrap());
