@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use pointmill_converter::ConvertError;
-use pointmill_format::{Advice, ErrorKind, ReadError};
+use pointmill_format::{ErrorKind, ReadError};
 
 use crate::flags;
 
@@ -90,26 +90,13 @@ pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> 
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
-        let line = read_line(&error);
+        let line = flags::read_error_line(&error);
         match error.kind() {
             ErrorKind::Broken => Self::Input(line),
             ErrorKind::Unsupported => Self::Unsupported(line),
             ErrorKind::Io(_) => Self::Io(line),
         }
     }
-}
-
-/// The line of an error of the libraries; where options of the command line help, the advice names them.
-fn read_line(error: &ReadError) -> String {
-    let advice = match error.advice() {
-        None => return error.to_string(),
-        Some(Advice::SkipUnreadable) => "copy the file again, or pass --unreadable skip to convert the rest".to_owned(),
-        Some(Advice::NameColumns) => {
-            "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
-        }
-        Some(advice) => advice.to_string(),
-    };
-    format!("{}; {advice}", error.what_and_where())
 }
 
 impl From<ConvertError> for Failure {

@@ -1,7 +1,7 @@
 //! Where settings and advice of the libraries get the names of options: nothing below `src/` knows any.
 
 use pointmill_converter::{Advice, ConvertError, DropReason, PlanError, PlanFault, Setting, Warning};
-use pointmill_format::Aabb;
+use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError};
 
 /// The option that a setting comes from.
 fn option(setting: Setting) -> &'static str {
@@ -62,6 +62,21 @@ pub(crate) fn error_line(error: &ConvertError) -> String {
         ConvertError::Plan(error) => plan_line(error),
         other => with_advice(other.what(), other.advice().as_ref()),
     }
+}
+
+/// An error of a reader, one line.
+pub(crate) fn read_error_line(error: &ReadError) -> String {
+    let advice = match error.advice() {
+        None => return error.to_string(),
+        Some(ReadAdvice::SkipUnreadable) => {
+            "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
+        }
+        Some(ReadAdvice::NameColumns) => {
+            "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
+        }
+        Some(advice) => advice.to_string(),
+    };
+    format!("{}; {advice}", error.what_and_where())
 }
 
 fn plan_line(error: &PlanError) -> String {

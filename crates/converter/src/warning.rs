@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use pointmill_format::Aabb;
+use pointmill_format::{Aabb, ScanWarning};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::advice::Advice;
@@ -19,10 +19,12 @@ pub enum Warning {
         /// The scan.
         path: PathBuf,
         /// What was odd.
-        what: String,
+        warning: ScanWarning,
     },
     /// An input that cannot be read was skipped.
     InputSkipped {
+        /// The input.
+        path: PathBuf,
         /// Why, with path and byte.
         error: String,
     },
@@ -30,6 +32,8 @@ pub enum Warning {
     PointsSkipped {
         /// How many, by the declared counts.
         points: u64,
+        /// The scan that has them.
+        path: PathBuf,
         /// Why, with path and byte.
         error: String,
     },
@@ -187,9 +191,9 @@ impl Warning {
     /// The line without the advice.
     pub fn what(&self) -> String {
         match self {
-            Self::Scan { path, what } => format!("{}: {what}", path.display()),
-            Self::InputSkipped { error } => format!("input skipped: {error}"),
-            Self::PointsSkipped { points, error } => format!("{points} points skipped: {error}"),
+            Self::Scan { path, warning } => format!("{}: {warning}", path.display()),
+            Self::InputSkipped { error, .. } => format!("input skipped: {error}"),
+            Self::PointsSkipped { points, error, .. } => format!("{points} points skipped: {error}"),
             Self::ReadAgain => "the points lie outside the declared bounds, or their extent does not fit the chosen \
                                 step; reading again with the measured bounds"
                 .to_owned(),

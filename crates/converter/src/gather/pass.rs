@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::Scratch;
+use pointmill_format::{Advice, Scratch};
 
 use super::axis::SourceMap;
 use super::batch::Worker;
@@ -145,15 +145,14 @@ impl<'a> Pass<'a> {
                 scan.pieces()[piece].points
             ))),
             Err(error) if self.context.plan.unreadable == OnFault::Skip => {
-                let warning = Warning::PointsSkipped { points: lost, error: error.to_string() };
+                let path = scan.info().path.clone();
+                let warning = Warning::PointsSkipped { points: lost, path, error: error.what_and_where() };
                 self.rt.warn(&warning);
                 worker.stats.unreadable += lost;
                 worker.stats.warnings.push(warning);
                 Ok(())
             }
-            Err(error) if error.advice().is_none() => {
-                Err(error.advise(pointmill_format::Advice::SkipUnreadable).into())
-            }
+            Err(error) if error.advice().is_none() => Err(error.advise(Advice::SkipUnreadable).into()),
             Err(error) => Err(error.into()),
         }
     }

@@ -4,7 +4,7 @@ mod crs;
 mod extent;
 mod schema;
 
-use pointmill_format::{Aabb, ErrorKind, ReadError, Scan};
+use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
 pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
 pub(crate) use extent::{Extent, far_out, intersection};
@@ -51,12 +51,12 @@ impl Sources {
             match opened.and_then(|scan| Ok((missing_points(&*scan, plan.unreadable)?, scan))) {
                 Ok((missing, scan)) => {
                     let noticed = scan.info().warnings.iter();
-                    warnings.extend(noticed.map(|w| Warning::Scan { path: path.clone(), what: w.to_string() }));
+                    warnings.extend(noticed.map(|w| Warning::Scan { path: path.clone(), warning: w.clone() }));
                     points_missing = points_missing.saturating_add(missing);
                     scans.push(scan);
                 }
                 Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind(), ErrorKind::Unsupported) => {
-                    warnings.push(Warning::InputSkipped { error: error.to_string() });
+                    warnings.push(Warning::InputSkipped { path: path.clone(), error: error.what_and_where() });
                 }
                 Err(error) => return Err(error.into()),
             }
@@ -98,9 +98,7 @@ fn missing_points(scan: &dyn Scan, policy: OnFault) -> Result<u64, ReadError> {
     let missing = info.points_declared.saturating_sub(found);
     if missing > 0 && policy == OnFault::Fail {
         let fault = pointmill_format::Fault::PointsMissing { declared: info.points_declared, found };
-        return Err(
-            ReadError::broken(&info.path, info.file_bytes, fault).advise(pointmill_format::Advice::SkipUnreadable)
-        );
+        return Err(ReadError::broken(&info.path, info.file_bytes, fault).advise(Advice::SkipUnreadable));
     }
     Ok(missing)
 }

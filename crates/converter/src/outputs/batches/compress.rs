@@ -1,6 +1,6 @@
 //! Compressed sections: a second pass over the finished file (`docs/formats/batches.md`, §8).
 
-use pointmill_format::batches::{BATCH_POINTS, Flags, Header, SECTION_ALIGNMENT, Section};
+use pointmill_format::batches::{BATCH_POINTS, Flags, Header, Part, PointSection, SECTION_ALIGNMENT, Section};
 use zstd::bulk::Compressor;
 
 use super::finish::Finished;
@@ -25,16 +25,18 @@ pub(super) fn compress(
     let mut copy = Copy { rt, raw, to, level, at: pointmill_format::batches::HEADER_BYTES };
     let mut sections = end.header.sections;
     sections.batches = copy.plain(layout.records)?.offset;
-    sections.hi10 = copy.blocks(layout.hi10, 4)?.offset;
-    sections.colour = copy.blocks(layout.colour, 4)?.offset;
-    for (section, entry) in layout.attributes.iter().zip(&mut end.description.attributes) {
-        let size = section.bytes / layout.points.max(1);
-        let section = copy.blocks(*section, size)?;
-        (entry.offset, entry.bytes) = (section.offset, section.bytes);
-    }
-    for (section, offset) in [(layout.mid10, &mut sections.mid10), (layout.lo10, &mut sections.lo10)] {
-        if let Some(section) = section {
-            *offset = Some(copy.blocks(section, 4)?.offset);
+    for PointSection { part, section, bytes_per_point } in layout.sections() {
+        let Section { offset, bytes } = copy.blocks(section, bytes_per_point)?;
+        match part {
+            Part::Hi10 => sections.hi10 = offset,
+            Part::Mid10 => sections.mid10 = Some(offset),
+            Part::Lo10 => sections.lo10 = Some(offset),
+            Part::Colour => sections.colour = offset,
+            Part::Attribute(i) => {
+                if let Some(entry) = end.description.attributes.get_mut(i) {
+                    (entry.offset, entry.bytes) = (offset, bytes);
+                }
+            }
         }
     }
     if sections.originals.is_some() {
