@@ -24,18 +24,7 @@ const CIRCLES_NOT_YET: [&str; 1] = ["pointmill-testkit"];
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
 const LAYERS: [(&str, Layers<'static>); 4] = [
-    (
-        "pointmill",
-        &[
-            &["flags"],
-            &["flags"],
-            &["exit", "datasets"],
-            &["args", "interrupt"],
-            &["human"],
-            &["inputs"],
-            &["commands"],
-        ],
-    ),
+    ("pointmill", &[&["flags"], &["exit", "datasets"], &["args", "interrupt"], &["human"], &["inputs"], &["commands"]]),
     (
         "pointmill-format",
         &[
@@ -48,14 +37,7 @@ const LAYERS: [(&str, Layers<'static>); 4] = [
     ),
     (
         "pointmill-validate",
-        &[
-            &["check", "place"],
-            &["format"],
-            &["finding"],
-            &["options", "outcome"],
-            &["against"],
-            &["potree2", "bintree", "batches"],
-        ],
+        &[&["check", "place"], &["finding"], &["options", "outcome"], &["against"], &["potree2", "bintree", "batches"]],
     ),
     (
         "pointmill-converter",

@@ -46,7 +46,7 @@ fn lines(folder: &str) -> Vec<(String, String, Vec<String>)> {
     text.lines().filter(|l| !l.starts_with('#')).map(line).collect()
 }
 
-/// The values of a cloud under the names of the tables ("x", "intensity", "rgb[0]"), as whatever the test compares.
+/// The values of a cloud under the names of the tables (`x`, `intensity`, `rgb[0]`), as whatever the test compares.
 pub fn columns<T: Copy>(
     cloud: &Cloud,
     coordinate: fn(f64) -> T,

@@ -1,10 +1,9 @@
 //! What every reader of scans offers: pieces that decode alone, in batches of points.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use super::{Piece, ScanInfo, Wanted};
-use crate::{Attribute, PointBatch, Positions, ReadError};
+use crate::{PointBatch, ReadError};
 
 /// No batch handed to a sink is larger than this.
 pub const MAX_BATCH_POINTS: usize = 65_536;
@@ -29,9 +28,11 @@ pub struct Scratch {
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 pub(super) fn fitting_batch<'a>(
     batch: &'a mut Option<PointBatch>,
-    attributes: &Arc<[Attribute]>,
+    attributes: &std::sync::Arc<[crate::Attribute]>,
     is_quantized: bool,
 ) -> &'a mut PointBatch {
+    use crate::Positions;
+
     let fits = |b: &PointBatch| matches!(b.positions, Positions::Quantized(_)) == is_quantized && b.fits(attributes);
     match batch {
         Some(b) if fits(b) => b.set_attributes(attributes),
@@ -40,7 +41,7 @@ pub(super) fn fitting_batch<'a>(
     batch.get_or_insert_with(|| {
         let quantized = || Positions::Quantized(Default::default());
         let positions = if is_quantized { quantized() } else { Positions::World(Default::default()) };
-        PointBatch::new(0, positions, Arc::clone(attributes))
+        PointBatch::new(0, positions, attributes.clone())
     })
 }
 

@@ -17,7 +17,7 @@ pub struct Cloud {
     pub columns: Vec<Column>,
     /// Of pieces that failed.
     pub errors: Vec<ReadError>,
-    /// Memory taken by [`Scratch::decoded`].
+    /// Memory taken by [`pointmill_format::Scratch::decoded`].
     pub decoded_bytes: u64,
 }
 

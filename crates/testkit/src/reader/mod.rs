@@ -21,7 +21,7 @@ pub struct Reader {
     pub open: fn(&Path) -> Result<Box<dyn Scan>, ReadError>,
     /// Points at most in a file of so many bytes, which bounds what a few bytes can cost.
     pub max_points: fn(u64) -> u64,
-    /// Bytes at most of [`Scratch::decoded`] for a file of so many bytes.
+    /// Bytes at most of [`pointmill_format::Scratch::decoded`] for a file of so many bytes.
     pub max_decoded: fn(u64) -> u64,
 }
 
