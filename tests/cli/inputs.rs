@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use pointmill_testkit::files::{corpus, entries, fixture, scan_fixtures};
+use pointmill_testkit::files::{corpus, entries, fixture};
 use pointmill_testkit::las::Las;
+use pointmill_testkit::scans::scan_fixtures;
 use serde_json::{Value, json};
 
 use crate::support::Dir;

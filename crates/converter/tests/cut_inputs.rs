@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use pointmill_converter::{ConvertError, Plan, Potree2Settings, Report, Silent, convert};
 use pointmill_format::ErrorKind;
-use pointmill_testkit::{damage, files};
+use pointmill_testkit::{damage, scans};
 
 fn run(input: &Path, output: &Path) -> Result<Report, ConvertError> {
     let mut plan = Plan::new(vec![input.to_path_buf()], output.to_path_buf());
@@ -20,7 +20,7 @@ fn run(input: &Path, output: &Path) -> Result<Report, ConvertError> {
 fn check(folder: &str) {
     let dir = tempfile::tempdir().unwrap();
     let output = dir.path().join("out");
-    for fixture in files::scan_fixtures(folder).into_iter().filter(|f| f.is_small() && f.points > 0) {
+    for fixture in scans::scan_fixtures(folder).into_iter().filter(|f| f.is_small() && f.points > 0) {
         let whole = run(&fixture.path, &output).unwrap();
         assert_eq!(whole.points.read, fixture.points, "{}", fixture.name);
         fs::remove_dir_all(&output).unwrap();

@@ -1,7 +1,8 @@
 //! What the tests of all crates share. Not published; nothing but tests depends on it.
 //!
 //! * [`random`]: one generator, the same numbers everywhere.
-//! * [`files`]: fixtures with their right point counts, the corpus of real files, temporary files, files of a dataset.
+//! * [`files`]: paths of fixtures and of the corpus of real files, temporary files, files of a dataset.
+//! * [`scans`]: the scans among the fixtures, with kind and right point count.
 //! * [`golden`]: the tables of what other programs read from the fixtures (`fixtures/*/expected.tsv`).
 //! * [`damage`]: cut files, flipped bits, wrong fields.
 //! * [`las`]: LAS files of any points, any field of which may be wrong.
@@ -19,5 +20,6 @@ pub mod golden;
 pub mod las;
 pub mod random;
 pub mod reader;
+pub mod scans;
 
 pub use random::Random;

@@ -263,7 +263,7 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 
 #[cfg(all(test, feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod tests {
-    use pointmill_testkit::files::{SCAN_FOLDERS, scan_fixtures};
+    use pointmill_testkit::scans::{SCAN_FOLDERS, scan_fixtures};
 
     use super::*;
     use crate::ErrorKind;

@@ -3,8 +3,9 @@
 use pointmill_format::ReadError;
 use pointmill_format::scan::e57::{self, E57Options};
 use pointmill_testkit::damage::{put, u64_at};
-use pointmill_testkit::files::{self, ScanFixture};
+use pointmill_testkit::files;
 use pointmill_testkit::reader::{Cloud, Reader};
+use pointmill_testkit::scans::{ScanFixture, scan_fixtures};
 
 pub(crate) const E57: Reader = Reader {
     open: |path| e57::open_with(path, E57Options::default().keep_row_column(true)),
@@ -15,7 +16,7 @@ pub(crate) const E57: Reader = Reader {
 };
 
 pub(crate) fn fixtures() -> Vec<ScanFixture> {
-    files::scan_fixtures("e57")
+    scan_fixtures("e57")
 }
 
 /// Reads a fixture.

@@ -3,8 +3,9 @@
 use pointmill_format::scan::las;
 use pointmill_format::{MAX_BATCH_POINTS, ReadError};
 use pointmill_testkit::damage::u32_at;
-use pointmill_testkit::files::{self, ScanFixture};
+use pointmill_testkit::files;
 use pointmill_testkit::reader::{Cloud, Reader};
+use pointmill_testkit::scans::{ScanFixture, scan_fixtures};
 
 /// 2048 points per byte is the bound of the densest compression; one batch of records, which are
 /// shorter than 256 bytes in all fixtures, is decompressed at a time.
@@ -16,7 +17,7 @@ pub(crate) const LAS: Reader = Reader {
 
 /// All fixtures but the large real scan.
 pub(crate) fn small_fixtures() -> Vec<ScanFixture> {
-    files::scan_fixtures("las").into_iter().filter(ScanFixture::is_small).collect()
+    scan_fixtures("las").into_iter().filter(ScanFixture::is_small).collect()
 }
 
 /// Reads a fixture.

@@ -3,7 +3,7 @@
 use pointmill_format::AttributeType;
 use pointmill_format::scan::las;
 use pointmill_testkit::reader::{Cloud, columns_are_independent, integers};
-use pointmill_testkit::{files, golden};
+use pointmill_testkit::{golden, scans};
 
 use crate::common::{self, LAS, read};
 
@@ -21,7 +21,7 @@ fn table(cloud: &Cloud) -> golden::Columns<i128, 6> {
 #[test]
 fn every_fixture_gives_the_columns_that_laspy_reads() {
     let expected = golden::expected("las");
-    assert_eq!(expected.len(), files::scan_fixtures("las").len());
+    assert_eq!(expected.len(), scans::scan_fixtures("las").len());
     for (file, expected) in &expected {
         let cloud = read(file);
         assert!(cloud.errors.is_empty(), "{file}: {:?}", cloud.errors);

@@ -2,7 +2,7 @@
 //!
 //! `POINTMILL_MUTATIONS` sets the number of damaged files per fixture (default 10).
 
-use pointmill_testkit::{Random, damage, files};
+use pointmill_testkit::{Random, damage, scans};
 
 use crate::common::{self, LAS};
 
@@ -36,7 +36,7 @@ fn cuts_at_64_places_never_panic() {
 
 #[test]
 fn every_fixture_keeps_the_promises_of_a_scan() {
-    for fixture in files::scan_fixtures("las") {
+    for fixture in scans::scan_fixtures("las") {
         let cloud = LAS.check(&fixture.path, &fixture.name).unwrap();
         assert_eq!((cloud.len() as u64, cloud.errors.len()), (fixture.points, 0), "{}", fixture.name);
     }

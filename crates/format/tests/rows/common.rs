@@ -5,8 +5,9 @@ use std::path::Path;
 use pointmill_format::scan::text::{self, TextOptions};
 use pointmill_format::scan::{pcd, ply};
 use pointmill_format::{ReadError, Scan, ScanKind};
-use pointmill_testkit::files::{self, ScanFixture};
+use pointmill_testkit::files;
 use pointmill_testkit::reader::{Cloud, Reader};
+use pointmill_testkit::scans::{ScanFixture, scan_fixtures};
 
 /// By content; what is neither PLY nor PCD should be text.
 fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
@@ -25,7 +26,7 @@ pub(crate) const ROWS: Reader = Reader {
 };
 
 pub(crate) fn fixtures() -> Vec<ScanFixture> {
-    files::scan_fixtures("rows")
+    scan_fixtures("rows")
 }
 
 /// Reads a fixture.

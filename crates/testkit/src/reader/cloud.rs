@@ -2,7 +2,7 @@
 
 use pointmill_format::{Column, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted, with_column};
 
-use super::promises::{check_description, decode};
+use super::decode::{check_description, decode};
 
 /// Everything that a scan gave.
 #[derive(Debug)]

@@ -4,13 +4,16 @@
 //! promise is a panic that names it.
 
 mod cloud;
+mod decode;
+mod errors;
 mod promises;
 
 use std::path::Path;
 
-use pointmill_format::{ErrorKind, ReadError, Scan, Wanted};
+use pointmill_format::{ReadError, Scan, Wanted};
 
 pub use self::cloud::{Cloud, doubles, integers, read};
+pub use self::errors::{check_error, check_scan_error};
 pub use self::promises::{columns_are_independent, keeps_promises};
 use crate::files;
 
@@ -73,27 +76,5 @@ impl Drop for Context<'_> {
         if std::thread::panicking() {
             eprintln!("while testing {}", self.0);
         }
-    }
-}
-
-/// Checks that an error is one line for people.
-///
-/// # Panics
-/// If it is not.
-pub fn check_error(error: &ReadError) {
-    let line = error.to_string();
-    assert!(!line.contains(['\n', '\r']), "an error is not one line: {line:?}");
-    assert!(!error.what().is_empty(), "an error without a word: {line:?}");
-}
-
-/// [`check_error`], and that the error of a broken scan names the byte and what to do.
-///
-/// # Panics
-/// If it does not.
-pub fn check_scan_error(error: &ReadError) {
-    check_error(error);
-    if matches!(error.kind(), ErrorKind::Broken) {
-        assert!(error.offset().is_some(), "an error without its byte: {error}");
-        assert!(error.advice().is_some(), "an error without advice: {error}");
     }
 }

@@ -1,0 +1,73 @@
+//! One decode, and what each promises.
+
+use std::ops::ControlFlow;
+
+use pointmill_format::{MAX_BATCH_POINTS, PointBatch, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted};
+
+use super::errors::check_scan_error;
+
+/// Warnings of a file at most: a list of thousands helps nobody.
+const MAX_WARNINGS: usize = 50;
+
+/// Decodes a piece and checks what every decode promises.
+pub(super) fn decode(
+    scan: &dyn Scan,
+    index: usize,
+    wanted: &Wanted,
+    scratch: &mut Scratch,
+    each: &mut dyn FnMut(&PointBatch),
+) -> Result<(), ReadError> {
+    let piece = &scan.pieces()[index];
+    let (mut next, end) = (piece.first_point, piece.first_point + piece.points);
+    let result = scan.decode(index, wanted, scratch, &mut |batch| {
+        assert_eq!(batch.first_point, next, "batches are consecutive");
+        assert!((1..=MAX_BATCH_POINTS).contains(&batch.len()), "a batch of {} points", batch.len());
+        next += batch.len() as u64;
+        assert!(next <= end, "more points than piece {index} has");
+        check_batch(scan.info(), wanted, batch);
+        each(batch);
+        ControlFlow::Continue(())
+    });
+    match &result {
+        Ok(()) => assert_eq!(next, end, "points are missing in piece {index} without an error"),
+        Err(error) => check_scan_error(error),
+    }
+    let (raw, file_bytes) = (scratch.raw.len() as u64, scan.info().file_bytes);
+    assert!(raw <= file_bytes, "{raw} bytes are read from a file of {file_bytes}");
+    result
+}
+
+fn check_batch(info: &ScanInfo, wanted: &Wanted, batch: &PointBatch) {
+    let (lengths, is_lattice) = match &batch.positions {
+        Positions::Quantized(axes) => (axes.each_ref().map(Vec::len), true),
+        Positions::World(axes) => (axes.each_ref().map(Vec::len), false),
+    };
+    assert_eq!(is_lattice, info.lattice.is_some(), "positions are on a lattice, or the scan has none");
+    assert_eq!(lengths, [batch.len(); 3], "the axes have the same length");
+    assert_eq!(batch.columns.len(), info.attributes.len(), "one column for each attribute");
+    for ((column, attribute), wanted) in batch.columns.iter().zip(info.attributes.iter()).zip(wanted.flags()) {
+        let name = &attribute.name;
+        assert_eq!(column.ty(), attribute.ty, "the type of {name}");
+        let expected = if *wanted { batch.len() * attribute.elements } else { 0 };
+        assert_eq!(column.len(), expected, "values of {name}, which is {}wanted", if *wanted { "" } else { "not " });
+    }
+}
+
+/// Checks info and pieces; the sum of the pieces' points.
+pub(super) fn check_description(scan: &dyn Scan) -> u64 {
+    let info = scan.info();
+    let mut next = 0u64;
+    for (i, piece) in scan.pieces().iter().enumerate() {
+        assert_eq!(piece.first_point, next, "pieces are consecutive");
+        assert!(piece.points > 0, "piece {i} is empty");
+        next = piece.first_point.checked_add(piece.points).expect("the number of points overflows");
+        let end = piece.byte_offset.checked_add(piece.byte_len);
+        assert!(end.is_some_and(|end| end <= info.file_bytes), "piece {i} ends outside the file");
+    }
+    let warnings = &info.warnings;
+    assert!(warnings.len() < MAX_WARNINGS, "{} warnings", warnings.len());
+    warnings
+        .iter()
+        .for_each(|w| assert!(!w.to_string().contains(char::is_control), "a warning is not one line: {w:?}"));
+    next
+}
