@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         [input, output, cell] => (input, output, cell.parse()?),
         _ => return Err("usage: batches_from_las INPUT OUTPUT [CELL]".into()),
     };
-    let scan = las::open(&input)?;
+    let scan = las::open(input)?;
     let info = scan.info();
     let lattice = info.lattice.ok_or("the scan has no lattice")?;
     let find = |name: &str| info.attributes.iter().position(|a| a.name == name);

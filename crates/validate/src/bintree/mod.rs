@@ -50,7 +50,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let dataset = match Bintree::from_source(Lenient::new(folder)) {
         Ok(dataset) => dataset,
         Err(error) if error.is_io() => return Err(error),
-        Err(error) => return Ok(unreadable_index(findings, error)),
+        Err(error) => return Ok(unreadable_index(findings, &error)),
     };
     let tree = Tree::new(&dataset);
     let lattice_known = head::check(folder, &tree, &findings)?;
@@ -156,7 +156,7 @@ fn compare(
 }
 
 /// The outcome for a dataset whose index is not a tree.
-fn unreadable_index(findings: Findings, error: ReadError) -> Outcome {
+fn unreadable_index(findings: Findings, error: &ReadError) -> Outcome {
     let is_leaves = error.path().file_name().is_some_and(|name| name == PACKED_FILE);
     let (check, subject) = if is_leaves { (Check::LeafFiles, PACKED_FILE) } else { (Check::Index, "index.json") };
     for other in Check::BINTREE.iter().filter(|c| **c != check) {

@@ -50,7 +50,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let dataset = match Dataset::open(folder) {
         Ok(dataset) => dataset,
         Err(error) if error.is_io() => return Err(error),
-        Err(error) => return unreadable_metadata(folder, findings, error),
+        Err(error) => return unreadable_metadata(folder, findings, &error),
     };
     checks::metadata::check(&read_json(folder)?.unwrap_or_default(), &findings);
     let metadata = dataset.metadata();
@@ -119,7 +119,7 @@ fn read_json(folder: &Path) -> Result<Option<Value>, ReadError> {
 }
 
 /// The outcome for a dataset whose metadata is invalid.
-fn unreadable_metadata(folder: &Path, findings: Findings, error: ReadError) -> Result<Outcome, ReadError> {
+fn unreadable_metadata(folder: &Path, findings: Findings, error: &ReadError) -> Result<Outcome, ReadError> {
     for check in Check::POTREE2.iter().copied().filter(|c| *c != Check::Metadata) {
         findings.skip(check, "metadata.json cannot be used");
     }
