@@ -64,7 +64,7 @@ fn check(what: &str, targets: &[Target], change: impl Fn(&mut Plan)) {
     let dir = tempfile::tempdir().unwrap();
     let (scan, out) = (dir.path().join("scan.xyz"), dir.path().join("out"));
     fs::write(&scan, points(20_000)).unwrap();
-    let mut plan = Plan::new(vec![scan.clone()], out.clone());
+    let mut plan = Plan::new(vec![scan], out.clone());
     (plan.threads, plan.overwrite, plan.name) = (2, true, "cloud".into());
     plan.attributes = AttributeChoice::All;
     change(&mut plan);

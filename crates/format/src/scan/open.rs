@@ -294,7 +294,7 @@ mod tests {
             assert!(matches!(error.kind(), ErrorKind::Broken) && error.offset() == Some(0), "{error}");
         }
         fs::write(dir.path().join("a.txt"), "1 gallon\n").unwrap();
-        let error = open_scan(&dir.path().join("a.txt"), &OpenOptions::default()).err().unwrap();
+        let error = open_scan(dir.path().join("a.txt"), &OpenOptions::default()).err().unwrap();
         assert!(matches!(error.kind(), ErrorKind::Broken), "{error}");
     }
 }

@@ -96,7 +96,7 @@ fn columns_have_their_names_types_and_meaning() {
 
 #[test]
 fn rows_and_columns_come_only_if_asked_for() {
-    let scan = e57::open(&files::fixture("e57").join("scans.e57")).unwrap();
+    let scan = e57::open(files::fixture("e57").join("scans.e57")).unwrap();
     assert!(!scan.info().attributes.iter().any(|a| a.name.ends_with("Index") && a.name != "returnIndex"));
 }
 
@@ -109,7 +109,7 @@ fn a_selection_of_columns_leaves_the_others_empty_and_changes_no_value() {
 
 #[test]
 fn what_stands_around_the_points_is_told() {
-    let info = |file: &str| e57::open(&files::fixture("e57").join(file)).unwrap().info().clone();
+    let info = |file: &str| e57::open(files::fixture("e57").join(file)).unwrap().info().clone();
     let scans = info("scans.e57");
     assert_eq!((scans.format.as_str(), scans.points_declared, scans.lattice), ("E57 1.0, 3 scans", 600, None));
     assert_eq!(scans.bounds_declared, None, "two scans declare none");

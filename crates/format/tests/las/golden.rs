@@ -8,7 +8,7 @@ use pointmill_testkit::{golden, scans};
 use crate::common::{self, LAS, read};
 
 /// Points, sum, minimum, maximum, first, last.
-fn summary(values: &Vec<i128>) -> [i128; 6] {
+fn summary(values: &[i128]) -> [i128; 6] {
     let (min, max) = (values.iter().min().unwrap(), values.iter().max().unwrap());
     [values.len() as i128, values.iter().sum(), *min, *max, values[0], values[values.len() - 1]]
 }
@@ -96,7 +96,7 @@ fn extra_bytes_keep_type_scale_offset_and_no_data() {
 
 #[test]
 fn the_coordinate_system_is_found_wherever_it_stands() {
-    let crs = |file: &str| las::open(&files::fixture("las").join(file)).unwrap().info().crs.clone();
+    let crs = |file: &str| las::open(files::fixture("las").join(file)).unwrap().info().crs.clone();
     let wkt = "PROJCS[\"Höhe \\\"quoted\\\"\",GEOGCS[\"WGS 84\"],UNIT[\"metre\",1]]";
     for file in ["wkt_vlr.las", "evlrs.las", "evlrs.laz"] {
         assert_eq!(crs(file).wkt.as_deref(), Some(wkt), "{file}");
@@ -109,7 +109,7 @@ fn the_coordinate_system_is_found_wherever_it_stands() {
 
 #[test]
 fn the_header_is_told_as_it_is() {
-    let scan = las::open(&files::fixture("las").join("autzen_trim.laz")).unwrap();
+    let scan = las::open(files::fixture("las").join("autzen_trim.laz")).unwrap();
     let info = scan.info();
     assert_eq!((info.format.as_str(), info.points_declared), ("LAZ 1.2, point format 3", 110_000));
     let bounds = info.bounds_declared.unwrap();
@@ -119,6 +119,6 @@ fn the_header_is_told_as_it_is() {
     );
     assert_eq!(info.lattice.unwrap().scale, [0.01; 3]);
     assert_eq!(scan.pieces().iter().map(|p| p.points).collect::<Vec<_>>(), [50_000, 50_000, 10_000]);
-    let scan = las::open(&files::fixture("las").join("las_1_5.las")).unwrap();
+    let scan = las::open(files::fixture("las").join("las_1_5.las")).unwrap();
     assert_eq!(scan.info().format, "LAS 1.5, point format 6");
 }

@@ -18,7 +18,8 @@ fn with(bytes: &str, columns: &[&str], separator: Option<char>) -> Result<Cloud,
     let mut options = TextOptions::default();
     options.columns = (!columns.is_empty()).then(|| columns.iter().map(|c| (*c).to_owned()).collect());
     options.separator = separator;
-    let scan = text::open(&files::temporary(bytes.as_bytes()), &options)?;
+    let file = files::temporary(bytes.as_bytes());
+    let scan = text::open(&file, &options)?;
     Ok(reader::read(scan.as_ref(), &Wanted::all(scan.info())))
 }
 
