@@ -17,7 +17,8 @@ fn option(setting: Setting) -> &'static str {
         Setting::TempDir => "--temp-dir",
         Setting::Attributes => "--attributes",
         Setting::Crs => "--crs",
-        _ => "INPUT",
+        Setting::Inputs => "INPUT",
+        other => other.name(),
     }
 }
 
@@ -29,7 +30,7 @@ fn advice(advice: &Advice) -> String {
         Advice::FreeDisk => "free some space, or put temporary files elsewhere with --temp-dir".to_owned(),
         Advice::DropDuplicates => "pass --duplicates drop".to_owned(),
         Advice::KeepDuplicates => "leave out --duplicates drop, or convert to potree2".to_owned(),
-        Advice::CutBounds { bounds: Some(b) } => format!("--bounds {} leaves them out", bounds_value(b)),
+        Advice::CutBounds { bounds: Some(b) } => format!("--bounds {} keeps all others", bounds_value(b)),
         Advice::CutBounds { bounds: None } => "leave them out with --bounds, or correct the input".to_owned(),
         Advice::SkipInvalid => "pass --invalid skip to leave such points out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
@@ -83,7 +84,8 @@ fn plan_line(error: &PlanError) -> String {
     let option = option(error.setting);
     match &error.fault {
         PlanFault::Cell(what) if error.setting == Setting::LodCell => format!("{option}: {what}, or auto"),
-        PlanFault::Missing => format!("{option}: name at least one"),
+        PlanFault::NotPositive => format!("{option}: must be a number above 0, or auto"),
+        PlanFault::NotOneOf(_) if error.setting == Setting::Planes => format!("{option}: must be 10, 20, 30 or auto"),
         fault => format!("{option}: {fault}"),
     }
 }
@@ -110,8 +112,7 @@ mod tests {
         let others = Aabb { min: [0.0, -1.0, 2.5], max: [10.0, 20.0, 30.0] };
         let outliers = Warning::Outliers { points: 2, others, factor: 11.0, holds_back_step: false };
         let line = warning_line(&outliers);
-        assert!(line.ends_with("--bounds 0,-1,2.5..10,20,30 leaves them out"), "{line}");
-        assert_eq!(line.matches("leave").count(), 1);
+        assert!(line.ends_with("--bounds 0,-1,2.5..10,20,30 keeps all others"), "{line}");
         let memory = ConvertError::Memory {
             ceiling: 1 << 20,
             needed: 90 << 20,

@@ -23,7 +23,8 @@ impl Chunk {
         let origin = StoredOrigin(JobPoint([0; 3]));
         let mut bounds = JobBounds::EMPTY;
         for record in records.chunks_exact(schema.stride) {
-            bounds.grow(origin.job(position(record)));
+            let p = origin.job(position(record));
+            bounds.union(&JobBounds { min: p, max: p });
         }
         let lattice = Lattice { scale: [0.01; 3], offset: [0.0; 3] };
         let cube = Cube::around(&bounds, &lattice).ok().filter(|_| !bounds.is_empty())?;

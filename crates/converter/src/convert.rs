@@ -53,6 +53,7 @@ pub fn convert_on(
         let dataset = staged.dataset(target.kind(), targets.len() == 1)?;
         let mut output = target.output().write(&cloud, &rt, &dataset)?;
         dataset.sync()?;
+        output.warnings.iter().for_each(|w| events.warning(w));
         output.format = target.kind().name().into();
         output.folder = dataset.name().into();
         output.seconds = start.elapsed().as_secs_f64();

@@ -151,8 +151,8 @@ pub enum MemoryNeed {
     Threads {
         /// Worker threads.
         threads: u64,
-        /// Maximum points of a leaf.
-        leaf_capacity: u64,
+        /// Points that each of them must have in memory.
+        points: u64,
     },
     /// Points that share one place and must be written as one node.
     OnePlace {
@@ -220,9 +220,8 @@ impl fmt::Display for ConvertError {
 impl std::error::Error for ConvertError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            Self::Read(error) => Some(error),
-            Self::Plan(error) => Some(error),
-            Self::Io { error, .. } => Some(error),
+            // the line of the error itself is in `Display`
+            Self::Read(error) => error.source(),
             _ => None,
         }
     }
@@ -309,7 +308,7 @@ impl fmt::Display for InputFault {
                  classes, {thinned} thinned out, {invalid} without a valid position"
             ),
             Self::FarPoints { min, max } => {
-                write!(f, "points lie as far out as {min:?} to {max:?}, which cannot be coordinates")
+                write!(f, "there are points from {min:?} to {max:?}, which cannot be coordinates")
             }
             Self::InvalidPosition { path, point } => {
                 write!(f, "{}: point {point} has no finite position", path.display())
@@ -351,8 +350,8 @@ impl fmt::Display for OutputFault {
 impl fmt::Display for MemoryNeed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Threads { threads, leaf_capacity } => {
-                write!(f, "working threads: {threads}, points of a leaf: up to {leaf_capacity}")
+            Self::Threads { threads, points } => {
+                write!(f, "{threads} worker threads need {points} points each in memory")
             }
             Self::OnePlace { points } => {
                 write!(f, "{points} points share one place and must be written as one node")

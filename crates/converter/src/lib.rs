@@ -5,7 +5,7 @@
 //! 1. `sources`: the scans are opened; their headers give a lattice before the first point is read.
 //! 2. `gather`: every point is decoded once, in parallel, becomes integers on that lattice, and is kept as a record in
 //!    blocks that are grouped by the cells of a coarse grid, in memory or, beyond the budget, in one spill file. The
-//!    result is the `cloud`, which nothing changes afterwards.
+//!    result is the `cloud`: facts that nothing changes afterwards, and records that each output takes once.
 //! 3. `outputs`: each format builds its dataset from the cloud: the octree by sampling chunks in Morton order, the binary
 //!    tree by exact sums of cells, batches by sorting.
 //!
@@ -37,6 +37,7 @@ pub mod memory;
 mod octree;
 mod outputs;
 mod plan;
+mod reason;
 mod report;
 mod runtime;
 mod sources;
@@ -54,6 +55,7 @@ pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
     AttributeChoice, Duplicates, Filter, OnFault, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
 };
+pub use reason::{GridReason, LatticeBasis, LatticeReason};
 pub use report::{
     CoordinateChange, DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport,
     PointsReport, Report, TreeReport,

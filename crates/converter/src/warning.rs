@@ -3,10 +3,11 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use pointmill_format::{Aabb, ScanWarning};
+use pointmill_format::{Aabb, ReadError, ScanWarning};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::advice::Advice;
+use crate::reason::LatticeReason;
 
 /// What the user should know of a run that goes on.
 ///
@@ -49,7 +50,7 @@ pub enum Warning {
         /// The step per axis, world units.
         scale: [f64; 3],
         /// Why.
-        reason: String,
+        reason: LatticeReason,
     },
     /// A few points are far from all others.
     Outliers {
@@ -228,6 +229,14 @@ impl Warning {
             }
             Self::NoColour => "batches: no input has colour or intensity; all points are white".to_owned(),
         }
+    }
+}
+
+/// The line of an error of something that was skipped: without the advice to skip it.
+pub(crate) fn reason_of(error: &ReadError) -> String {
+    match error.advice() {
+        Some(pointmill_format::Advice::SkipUnreadable) | None => error.what_and_where(),
+        Some(_) => error.to_string(),
     }
 }
 

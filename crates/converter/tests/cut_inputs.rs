@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use pointmill_converter::{ConvertError, Plan, Potree2Settings, Report, Silent, convert};
 use pointmill_format::ErrorKind;
-use pointmill_testkit::{damage, scans};
+use pointmill_testkit::{damage, files, scans};
 
 fn run(input: &Path, output: &Path) -> Result<Report, ConvertError> {
     let mut plan = Plan::new(vec![input.to_path_buf()], output.to_path_buf());

@@ -1,4 +1,4 @@
-//! An order-independent checksum of records: the sum of one strong-enough hash a record.
+//! An order-independent checksum of records: the sum of one strong-enough hash per record.
 //!
 //! It proves to ourselves, on every run, that what was decoded is what was written. The validator has its own.
 

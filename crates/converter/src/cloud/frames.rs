@@ -96,12 +96,6 @@ impl JobBounds {
         }
     }
 
-    /// Includes a point.
-    #[inline]
-    pub(crate) fn grow(&mut self, p: JobPoint) {
-        self.union(&Self { min: p, max: p });
-    }
-
     /// Steps from the least to the greatest coordinate.
     pub(crate) fn extent(&self, axis: usize) -> u64 {
         self.max[axis].abs_diff(self.min[axis])
@@ -140,8 +134,8 @@ mod tests {
         assert_eq!(origin.stored(p), StoredPoint([-7, 2_000_000_005, -3]));
         assert_eq!(origin.job(origin.stored(p)), p);
         let mut bounds = JobBounds::EMPTY;
-        bounds.grow(p);
-        bounds.grow(JobPoint([0; 3]));
+        bounds.union(&JobBounds { min: p, max: p });
+        bounds.union(&JobBounds::new([0; 3], [0; 3]));
         assert_eq!((bounds.min[1], bounds.max[1], bounds.extent(2)), (0, 2_000_000_000, 3));
     }
 }

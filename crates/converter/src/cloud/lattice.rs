@@ -1,8 +1,8 @@
 //! The lattice of a run, and why it is that one.
 
-use std::fmt;
-
 use pointmill_format::Lattice;
+
+use crate::reason::LatticeReason;
 
 /// The lattice of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,77 +61,10 @@ fn tidy(step: f64) -> f64 {
     format!("{step:.12e}").parse().ok().filter(|t: &f64| ((t - step) / step).abs() < 1e-13).unwrap_or(step)
 }
 
-/// Why a lattice was chosen. `Display` is for people.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LatticeReason {
-    pub(crate) basis: Basis,
-    /// Made this many times coarser, because 31 bits could not hold the extent.
-    pub(crate) coarser: Option<f64>,
-}
-
-/// What a lattice was chosen by.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Basis {
-    /// The plan.
-    Requested,
-    /// The lattice that all sources share.
-    Sources,
-    /// The finest of the sources, per axis.
-    FinestOfSources,
-    /// The finest of the sources that have one, per axis.
-    FinestOfSome,
-    /// Decimal parts of that, for the others' sake.
-    PartOfFinest,
-    /// The resolution of single precision at the largest coordinate, world units.
-    SinglePrecision {
-        /// The largest coordinate.
-        farthest: f64,
-    },
-    /// The finest power of two; single precision would be finer.
-    PowerOfTwo,
-    /// The step in which the sources store coordinates.
-    StoredStep,
-    /// Neither lattice nor extent: the usual step.
-    Usual,
-    /// The finest power of ten.
-    PowerOfTen,
-}
-
-impl fmt::Display for LatticeReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.basis {
-            Basis::Requested => f.write_str("as requested"),
-            Basis::Sources => f.write_str("that of the sources"),
-            Basis::FinestOfSources => f.write_str("the finest scale of the sources, per axis"),
-            Basis::FinestOfSome => f.write_str(
-                "the finest scale of the sources that have a lattice, per axis; the others are rounded to it",
-            ),
-            Basis::PartOfFinest => f.write_str(
-                "a power of ten below the finest scale of the sources that have a lattice, for the other sources",
-            ),
-            Basis::SinglePrecision { farthest } => write!(
-                f,
-                "single precision of the sources: coordinates up to {farthest:.6} resolve no finer on every axis"
-            ),
-            Basis::PowerOfTwo => f.write_str(
-                "the finest power of two that 31-bit integers hold; single precision of the sources would be finer",
-            ),
-            Basis::StoredStep => f.write_str("the step in which the sources store coordinates"),
-            Basis::Usual => f.write_str("the inputs have no lattice and no extent"),
-            Basis::PowerOfTen => {
-                f.write_str("the sources have no lattice; the finest power of ten that 31-bit integers hold")
-            }
-        }?;
-        match self.coarser {
-            Some(factor) => write!(f, "; made {factor} times coarser, because 31 bits could not hold the extent"),
-            None => Ok(()),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reason::LatticeBasis;
 
     #[test]
     fn coarser_decimal_steps_stay_decimal() {
@@ -142,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_lattice_made_coarser_twice_is_held_back_and_says_by_how_much() {
-        let reason = LatticeReason { basis: Basis::Sources, coarser: None };
+        let reason = LatticeReason { basis: LatticeBasis::Sources, coarser: None };
         let lattice = Lattice { scale: [0.01; 3], offset: [0.0; 3] };
         let fine = JobLattice { lattice, reason, steps: Steps::Doubled };
         assert!(!fine.is_held_back());

@@ -1,5 +1,5 @@
 //! All points, once they are read: records grouped by cell in the store, and everything that an output may ask about
-//! them. Made by `gather`, unchanged afterwards.
+//! them. Made by `gather`; afterwards facts do not change, and each output takes every record out of the store once.
 
 mod cell;
 mod checksum;
@@ -26,7 +26,7 @@ pub(crate) use facts::Facts;
 pub(crate) use frames::{JobBounds, JobColumns, JobPoint, StoredOrigin, StoredPoint, TreePoint};
 pub(crate) use grouping::{CellHash, Grouping};
 pub(crate) use intake::Intake;
-pub(crate) use lattice::{Basis, JobLattice, LatticeReason, Steps};
+pub(crate) use lattice::{JobLattice, Steps};
 pub(crate) use ledger::Ledger;
 pub(crate) use moments::Moments;
 pub(crate) use morton_sort::MortonSorter;

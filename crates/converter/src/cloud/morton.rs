@@ -19,7 +19,7 @@ pub(crate) fn interleave(v: [u32; 3]) -> u64 {
     spread(v[0]) << 2 | spread(v[1]) << 1 | spread(v[2])
 }
 
-/// Compares two points in Morton order without building their codes (31 bits an axis, x before y before z).
+/// Compares two points in Morton order without building their codes (31 bits per axis, x before y before z).
 #[inline]
 pub(crate) fn compare(a: [u32; 3], b: [u32; 3]) -> std::cmp::Ordering {
     let d = [a[0] ^ b[0], a[1] ^ b[1], a[2] ^ b[2]];

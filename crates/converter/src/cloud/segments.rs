@@ -9,6 +9,12 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
+    /// The same records in segments of at most `count`.
+    pub(crate) fn split(self, count: u32) -> impl Iterator<Item = Self> {
+        let part = move |at: u32| Self { start: self.start + at, count: count.min(self.count - at), ..self };
+        (0..self.count).step_by(count.max(1) as usize).map(part)
+    }
+
     /// True if `next` begins where this ends.
     fn is_followed_by(&self, next: &Self) -> bool {
         next.block == self.block && next.start == self.start + self.count
@@ -80,6 +86,13 @@ mod tests {
 
     fn segment(block: u32, start: u32, count: u32) -> Segment {
         Segment { block, start, count }
+    }
+
+    #[test]
+    fn a_segment_is_split_without_a_gap() {
+        let parts: Vec<Segment> = segment(3, 10, 7).split(3).collect();
+        assert_eq!(parts, [segment(3, 10, 3), segment(3, 13, 3), segment(3, 16, 1)]);
+        assert_eq!(segment(3, 10, 0).split(3).count(), 0);
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use pointmill_format::{Aabb, Lattice, Resolution, ScanInfo};
 
-use crate::cloud::{Basis, JobLattice, LatticeReason, Stats, Steps};
+use crate::cloud::{JobLattice, Stats, Steps};
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{Plan, ScaleChoice};
+use crate::reason::{LatticeBasis, LatticeReason};
 use crate::sources::{Extent, Sources, intersection};
 
 /// Bits that the extent of a cloud may take up on a lattice that is chosen here: one less than the integers have, since
@@ -55,14 +56,14 @@ fn choose(choice: ScaleChoice, infos: &[&ScanInfo], extents: &[Option<Extent>], 
     let chosen = |lattice, basis| made(lattice, basis, Steps::Doubled);
     if let ScaleChoice::Fixed(s) = choice {
         let offset = std::array::from_fn(|a| fixed_offset(&lattices, a, s));
-        return chosen(Lattice { scale: [s; 3], offset }, Basis::Requested);
+        return chosen(Lattice { scale: [s; 3], offset }, LatticeBasis::Requested);
     }
     let all_have_one = lattices.len() == infos.len();
     match lattices.first() {
-        Some(first) if all_have_one && lattices.iter().all(|l| l == first) => chosen(*first, Basis::Sources),
+        Some(first) if all_have_one && lattices.iter().all(|l| l == first) => chosen(*first, LatticeBasis::Sources),
         Some(first) if all_have_one => {
             // What headers declare never makes the lattice coarser: they may lie. Points that were read may.
-            chosen(finest(first, &lattices), Basis::FinestOfSources)
+            chosen(finest(first, &lattices), LatticeBasis::FinestOfSources)
         }
         first => {
             let need = Need::of(infos, extents, cut);
@@ -145,19 +146,19 @@ impl Need {
         if self.is_single && self.resolution > 0.0 {
             let step = self.resolution.max(power_above(2.0, self.room));
             let basis = if step > self.resolution {
-                Basis::PowerOfTwo
+                LatticeBasis::PowerOfTwo
             } else {
-                Basis::SinglePrecision { farthest: self.farthest }
+                LatticeBasis::SinglePrecision { farthest: self.farthest }
             };
             return made(cube(step), basis, Steps::Doubled);
         }
         if self.resolution >= self.room && self.resolution > 0.0 {
-            return made(cube(self.resolution), Basis::StoredStep, Steps::Decimal);
+            return made(cube(self.resolution), LatticeBasis::StoredStep, Steps::Decimal);
         }
         if self.room == 0.0 {
-            return made(cube(USUAL_STEP), Basis::Usual, Steps::Decimal);
+            return made(cube(USUAL_STEP), LatticeBasis::Usual, Steps::Decimal);
         }
-        made(cube(power_above(10.0, self.room)), Basis::PowerOfTen, Steps::Decimal)
+        made(cube(power_above(10.0, self.room)), LatticeBasis::PowerOfTen, Steps::Decimal)
     }
 
     /// A lattice that holds every point of `own`, and is as fine as the other sources need.
@@ -171,12 +172,12 @@ impl Need {
             }
             *scale /= parts;
         }
-        let basis = if lattice == own { Basis::FinestOfSome } else { Basis::PartOfFinest };
+        let basis = if lattice == own { LatticeBasis::FinestOfSome } else { LatticeBasis::PartOfFinest };
         made(lattice, basis, Steps::Decimal)
     }
 }
 
-fn made(lattice: Lattice, basis: Basis, steps: Steps) -> JobLattice {
+fn made(lattice: Lattice, basis: LatticeBasis, steps: Steps) -> JobLattice {
     JobLattice { lattice, reason: LatticeReason { basis, coarser: None }, steps }
 }
 

@@ -65,7 +65,10 @@ pub(crate) fn gather<'a>(
                     if let Some(outliers) = outliers::find(&gathered) {
                         warn(outliers.warning(gathered.lattice.is_held_back()));
                     }
-                    return Cloud::new(plan, sources, intake, *gathered, warnings);
+                    let known = warnings.len() + gathered.stats.warnings.len();
+                    let cloud = Cloud::new(plan, sources, intake, *gathered, warnings)?;
+                    cloud.warnings[known..].iter().for_each(|w| rt.warn(w));
+                    return Ok(cloud);
                 }
             },
             PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
@@ -74,7 +77,7 @@ pub(crate) fn gather<'a>(
                 hint = Some(bounds);
                 if let Err(too_fine) = Cube::around(&bounds, &lattice.lattice) {
                     let coarser = lattice.coarsened(2f64.powi(too_fine.coarser_by as i32));
-                    let (scale, reason) = (coarser.lattice.scale, coarser.reason.to_string());
+                    let (scale, reason) = (coarser.lattice.scale, coarser.reason);
                     warn(Warning::CoarserStep { scale, reason });
                     hint = Some(moved(&bounds, &lattice.lattice, &coarser.lattice));
                     lattice = coarser;

@@ -48,7 +48,7 @@ pub(super) fn find(gathered: &Gathered) -> Option<Outliers> {
     }
     let bounds = &gathered.stats.bounds;
     let longest = |extent: [f64; 3]| extent.into_iter().fold(0.0, f64::max);
-    let whole = longest([0, 1, 2].map(|a| bounds.max[a].abs_diff(bounds.min[a]) as f64 * lattice.scale[a]));
+    let whole = longest([0, 1, 2].map(|a| bounds.extent(a) as f64 * lattice.scale[a]));
     let factor = whole / longest(others.extent());
     (left_out > 0 && factor >= WORTH).then_some(Outliers { points: left_out, others, factor })
 }

@@ -13,7 +13,7 @@ use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
 use crate::runtime::Runtime;
 use crate::sources::{Source, Sources};
-use crate::warning::Warning;
+use crate::warning::{Warning, reason_of};
 
 /// How a pass over the inputs ended.
 pub(super) enum PassEnd {
@@ -146,7 +146,7 @@ impl<'a> Pass<'a> {
             ))),
             Err(error) if self.context.plan.unreadable == OnFault::Skip => {
                 let path = scan.info().path.clone();
-                let warning = Warning::PointsSkipped { points: lost, path, error: error.what_and_where() };
+                let warning = Warning::PointsSkipped { points: lost, path, error: reason_of(&error) };
                 self.rt.warn(&warning);
                 worker.stats.unreadable += lost;
                 worker.stats.warnings.push(warning);

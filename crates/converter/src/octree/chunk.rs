@@ -27,7 +27,7 @@ pub(super) struct BuiltChunk {
     pub(super) payloads: Vec<u8>,
     /// Byte offsets are relative to `payloads`.
     pub(super) nodes: Vec<FinishedNode>,
-    /// Points are indices into `pending_points`.
+    /// Points are indices into `pending_trees`.
     pub(super) root: Pending<u32>,
     /// Tree coordinates and records (as stored) of the pending points.
     pub(super) pending_trees: Vec<TreePoint>,

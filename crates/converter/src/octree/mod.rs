@@ -19,10 +19,8 @@ mod sink;
 pub(crate) use commit::Octree;
 #[cfg(feature = "bench")]
 pub(crate) use order::{OrderScratch, Point, order};
-pub(crate) use sample::SPACING_BITS;
-#[cfg(feature = "bench")]
-pub(crate) use sample::Sampler;
 pub use sample::Sampling;
+pub(crate) use sample::{SPACING_BITS, Sampler};
 pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
 
 use crate::cloud::Cloud;
@@ -30,8 +28,6 @@ use crate::error::ConvertError;
 use crate::runtime::Runtime;
 use chunk::{ChunkBuilder, ChunkPlan};
 use commit::Committer;
-#[cfg(not(feature = "bench"))]
-use sample::Sampler;
 
 /// How a tree is built.
 #[derive(Debug, Clone, Copy)]
@@ -64,6 +60,7 @@ pub(crate) fn build<S: NodeSink>(
         || ChunkBuilder::new(&plan, Sampler::new(settings.sampling), sink.encoder()),
         |builder, index| {
             let Some(buffer) = committer.admit(index) else { return Ok(()) };
+            rt.check_stop()?; // it may have waited long
             let built = builder.build(&chunks[index], buffer)?;
             committer.submit(index, built)?;
             rt.advance(chunks[index].points);

@@ -20,7 +20,7 @@ pub(super) fn own_key(cloud: &Cloud<'_>, dropped: &[DroppedAttribute]) -> Map<St
     if let Some(wkt) = &cloud.facts.crs.wkt {
         own.insert("wkt".into(), wkt.clone().into());
     }
-    // Those that were not requested are no matter of the dataset: which there were depends on the kind of the scans.
+    // Those that were not requested are not recorded: which there were depends on the kind of the scans.
     let constant = |d: &DroppedAttribute| match &d.why {
         DropReason::Constant(values) => Some((d.name.clone(), json!(values))),
         _ => None,

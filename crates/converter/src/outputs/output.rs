@@ -25,7 +25,7 @@ pub(crate) trait Output: Debug + Send + Sync {
     /// What it needs of the cloud; `all`: the attributes of the inputs.
     fn wants(&self, plan: &Plan, all: &Schema) -> Wants;
 
-    /// Points that it must have in memory together, at the least.
+    /// The minimum of points that it must have in memory together.
     fn least_points(&self) -> u64 {
         0
     }

@@ -8,6 +8,7 @@ use crate::cloud::{Cloud, Cube, JobLattice};
 use crate::error::ConvertError;
 use crate::memory;
 use crate::plan::{AttributeChoice, Filter, Plan};
+use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
 use crate::sources::{Sources, resolve_scan};
 
@@ -99,10 +100,7 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
 
 /// The lattice and the root cube.
 pub(crate) fn grid_report(lattice: &JobLattice, is_lossless: bool, cube: &Cube) -> GridReport {
-    let mut why = lattice.reason.to_string();
-    if !is_lossless {
-        why.push_str("; coordinates that are not on it are rounded");
-    }
+    let why = GridReason { lattice: lattice.reason, rounds: !is_lossless };
     let offset = cube.offset(&lattice.lattice);
     GridReport { scale: lattice.lattice.scale, offset, cube_side: cube.side, why }
 }

@@ -6,6 +6,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use crate::reason::GridReason;
 use crate::warning::Warning;
 
 /// What a run did.
@@ -113,7 +114,7 @@ pub struct GridReport {
     /// Side of the root cube, world units.
     pub cube_side: f64,
     /// Why this lattice.
-    pub why: String,
+    pub why: GridReason,
 }
 
 /// Every point accounted for: `read = kept + outside_bounds + other_class + thinned + invalid`, and for every output

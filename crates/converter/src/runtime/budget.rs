@@ -16,7 +16,7 @@ pub(crate) const MAX_CHUNK_POINTS: u64 = 400_000;
 /// Chunks that may be finished before the oldest unfinished one, per thread.
 const AHEAD_PER_THREAD: usize = 2;
 
-/// What the outputs need at the least.
+/// The minimum that the outputs need.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Least {
     /// Points that must be in memory together.
@@ -63,7 +63,7 @@ impl Budget {
             return Err(ConvertError::Memory {
                 ceiling,
                 needed: least_bytes + least_bytes / 9 + 1,
-                why: MemoryNeed::Threads { threads, leaf_capacity: least.points },
+                why: MemoryNeed::Threads { threads, points: least_chunk },
             });
         }
         let free = usable - fixed_bytes;

@@ -1,4 +1,5 @@
-//! Files of a run: every write, sync and rename passes through here, so that a test can make any of them fail.
+//! Files of a run: what makes, writes, syncs and renames the files of datasets and temporary files passes through here, so
+//! that a test can make any of it fail. Undoing what failed does not.
 
 use std::fmt::Debug;
 use std::fs::{self, File};

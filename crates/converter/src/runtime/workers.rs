@@ -1,5 +1,6 @@
 //! Numbered units of work for all threads: the one loop that hands them out.
 
+use std::any::Any;
 use std::panic::AssertUnwindSafe;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,7 +13,8 @@ impl Runtime<'_> {
     /// states.
     ///
     /// # Errors
-    /// That of the lowest unit that failed, whatever the timing; a panic is an error and frees the other threads.
+    /// That of the lowest unit that failed, whatever the timing; a panic in `work` is an error and frees the other
+    /// threads.
     pub(crate) fn in_parallel<S, T: Send>(
         &self,
         count: usize,
@@ -44,7 +46,7 @@ impl Runtime<'_> {
                 }
                 let result = self.check_stop().and_then(|()| {
                     std::panic::catch_unwind(AssertUnwindSafe(|| work(&mut state, unit)))
-                        .unwrap_or_else(|_| Err(ConvertError::Internal(format!("unit {unit} of {count} panicked"))))
+                        .unwrap_or_else(|panic| Err(panicked(unit, count, &*panic)))
                 });
                 if let Err(error) = result {
                     failed(unit);
@@ -63,6 +65,13 @@ impl Runtime<'_> {
             _ => Ok(done),
         }
     }
+}
+
+/// The error for a panic, with its message.
+fn panicked(unit: usize, count: usize, panic: &(dyn Any + Send)) -> ConvertError {
+    let message = panic.downcast_ref::<&str>().copied();
+    let message = message.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
+    ConvertError::Internal(format!("unit {unit} of {count} panicked: {message}"))
 }
 
 #[cfg(test)]
@@ -110,7 +119,8 @@ mod tests {
             let error = runtime(4).in_parallel(100, || (), work, |()| ()).unwrap_err();
             assert!(error.to_string().contains("three"), "{error}");
         }
-        let error = runtime(2).in_parallel(9, || (), |(), unit| if unit == 5 { panic!() } else { Ok(()) }, |()| ());
-        assert!(error.unwrap_err().to_string().contains("unit 5 of 9"));
+        let error =
+            runtime(2).in_parallel(9, || (), |(), unit| if unit == 5 { panic!("five") } else { Ok(()) }, |()| ());
+        assert!(error.unwrap_err().to_string().contains("unit 5 of 9 panicked: five"));
     }
 }

@@ -13,7 +13,7 @@ pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{OnFault, Plan};
 use crate::runtime::Events;
-use crate::warning::Warning;
+use crate::warning::{Warning, reason_of};
 
 /// A scan, and where its columns are among all attributes.
 pub(crate) struct Source {
@@ -56,7 +56,7 @@ impl Sources {
                     scans.push(scan);
                 }
                 Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind(), ErrorKind::Unsupported) => {
-                    warnings.push(Warning::InputSkipped { path: path.clone(), error: error.what_and_where() });
+                    warnings.push(Warning::InputSkipped { path: path.clone(), error: reason_of(&error) });
                 }
                 Err(error) => return Err(error.into()),
             }

@@ -3,7 +3,7 @@
 use pointmill_format::AttributeType;
 use pointmill_format::scan::las;
 use pointmill_testkit::reader::{Cloud, columns_are_independent, integers};
-use pointmill_testkit::{golden, scans};
+use pointmill_testkit::{files, golden, scans};
 
 use crate::common::{self, LAS, read};
 

@@ -2,7 +2,7 @@
 //!
 //! `POINTMILL_MUTATIONS` sets the number of damaged files per fixture (default 10).
 
-use pointmill_testkit::{Random, damage, scans};
+use pointmill_testkit::{Random, damage, files, scans};
 
 use crate::common::{self, LAS};
 

@@ -31,12 +31,12 @@ pub(super) struct Task {
     pub(super) segments: Segments,
 }
 
-/// An aligned cube of the grid, by the Morton code of its first corner (21 bits an axis) and its level (0: all).
+/// An aligned cube of the grid, by the Morton code of its first corner (21 bits per axis) and its level (0: all).
 type Bucket = (u64, u32);
 type Buckets = HashMap<Bucket, Segments>;
 
 /// All points as tasks in Morton order, none larger than `max_points` unless its points share one Morton code of 21
-/// bits an axis.
+/// bits per axis.
 pub(super) fn tasks(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,

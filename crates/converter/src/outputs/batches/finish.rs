@@ -12,7 +12,7 @@ use serde_json::json;
 use super::content::Content;
 use super::frame::{Frame, refused};
 use super::lod::{LEVELS, join, shown_word};
-use super::output::{ORIGINAL_BYTES, Output, State};
+use super::output::{BatchFile, ORIGINAL_BYTES, State};
 use super::settings::BatchesSettings;
 use super::task::TaskResults;
 use crate::cloud::Cloud;
@@ -52,7 +52,7 @@ pub(super) fn finish(
     settings: &BatchesSettings,
     frame: &Frame,
     content: &Content,
-    output: &Output<'_>,
+    output: &BatchFile<'_>,
     results: &TaskResults,
 ) -> Result<Finished, ConvertError> {
     let state = output.take_state()?;
@@ -121,7 +121,7 @@ fn record_bytes(records: &[BatchRecord]) -> Vec<u8> {
 
 /// Writes the originals in storage order and returns their number.
 fn put_originals(
-    output: &Output<'_>,
+    output: &BatchFile<'_>,
     layout: &Layout,
     state: &State,
     patches: &BTreeMap<u32, Patch>,
@@ -162,7 +162,7 @@ fn put_originals(
 
 /// Entries of the originals, one behind the other.
 struct Sequence<'a> {
-    output: &'a Output<'a>,
+    output: &'a BatchFile<'a>,
     at: u64,
     bytes: Vec<u8>,
     count: u64,

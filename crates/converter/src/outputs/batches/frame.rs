@@ -8,7 +8,7 @@ use crate::cloud::{Cloud, JobBounds, JobPoint, StoredOrigin, StoredPoint};
 use crate::error::{ConvertError, Unsupported};
 use crate::plan::{PlanError, PlanFault, Setting};
 
-/// Levels of buckets: what is called a start is a Morton code of that many bits an axis.
+/// Levels of buckets: what is called a start is a Morton code of that many bits per axis.
 pub(super) const BUCKET_LEVELS: u32 = 21;
 
 /// Points of a surface that a cell of level 0 should hold where the plan does not state its size.

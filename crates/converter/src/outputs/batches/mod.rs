@@ -21,7 +21,7 @@ use serde_json::{Map, Value};
 
 pub use settings::BatchesSettings;
 
-use super::output::{DiskSize, Output as Format, Target, Wants};
+use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
@@ -33,7 +33,7 @@ use buckets::Task;
 use content::Content;
 use finish::finish;
 use frame::{Frame, refused};
-use output::{ORIGINAL_BYTES, Output};
+use output::{BatchFile, ORIGINAL_BYTES};
 use settings::colour_of;
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
 
@@ -52,7 +52,7 @@ impl From<BatchesSettings> for Target {
     }
 }
 
-impl Format for BatchesSettings {
+impl Output for BatchesSettings {
     fn kind(&self) -> DatasetKind {
         DatasetKind::Batches
     }
@@ -66,7 +66,7 @@ impl Format for BatchesSettings {
             return refuse(Setting::LodCell, PlanFault::NotPositive);
         }
         if self.planes.is_some_and(|p| !(1..=3).contains(&p)) {
-            return refuse(Setting::Planes, PlanFault::NotOneOf("10, 20, 30 or auto"));
+            return refuse(Setting::Planes, PlanFault::NotOneOf("1 to 3"));
         }
         Ok(())
     }
@@ -112,8 +112,17 @@ impl Format for BatchesSettings {
         // what is compressed is written raw first, elsewhere
         let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
         let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, cloud.store.unused_bytes());
-        let output = Output::new(raw.as_ref().unwrap_or(&file), &layout, originals);
-        let results = encode(cloud, rt, &frame, &content, &output, self.originals, &tasks, task_points)?;
+        let output = BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals);
+        let shop = Workshop {
+            frame: &frame,
+            content: &content,
+            store: &cloud.store,
+            stride: cloud.frame.stride,
+            output: &output,
+            keeps_originals: self.originals,
+            usual_points: task_points.min(points),
+        };
+        let results = encode(rt, &shop, &tasks)?;
         results.ledger.check(&cloud.stats.checksum)?;
         let mut finished = finish(cloud, self, &frame, &content, &output, &results)?;
         if let (Some(raw), Some(level)) = (&raw, self.zstd_level) {
@@ -146,29 +155,10 @@ fn planes_at_most(frame: &Frame, planes: Option<u8>) -> Precision {
 }
 
 /// Encodes all tasks; edges come back in the order of the tasks.
-#[allow(clippy::too_many_arguments)]
-fn encode(
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
-    frame: &Frame,
-    content: &Content,
-    output: &Output<'_>,
-    keeps_originals: bool,
-    tasks: &[Task],
-    task_points: u64,
-) -> Result<TaskResults, ConvertError> {
-    let shop = Workshop {
-        frame,
-        content,
-        store: &cloud.store,
-        stride: cloud.frame.stride,
-        output,
-        keeps_originals,
-        usual_points: task_points.min(cloud.points()),
-    };
+fn encode(rt: &Runtime<'_>, shop: &Workshop<'_>, tasks: &[Task]) -> Result<TaskResults, ConvertError> {
     let each = rt.in_parallel(
         tasks.len(),
-        || Worker::new(&shop),
+        || Worker::new(shop),
         |worker, index| {
             worker.run(index, &tasks[index])?;
             rt.advance(tasks[index].points);

@@ -16,7 +16,7 @@ use crate::runtime::DiskFile;
 pub(super) const ORIGINAL_BYTES: usize = 8;
 
 /// Where tasks put what they made, in any order, from any thread.
-pub(super) struct Output<'a> {
+pub(super) struct BatchFile<'a> {
     pub(super) file: &'a DiskFile,
     pub(super) layout: &'a Layout,
     state: Mutex<State>,
@@ -73,7 +73,7 @@ pub(super) struct Encoder {
     joined: [Vec<f64>; 3],
 }
 
-impl<'a> Output<'a> {
+impl<'a> BatchFile<'a> {
     pub(super) fn new(file: &'a DiskFile, layout: &'a Layout, originals: Store) -> Self {
         let batches = layout.batches as usize;
         let state =

@@ -7,7 +7,7 @@ use super::content::Content;
 use super::frame::Frame;
 use super::lod::{Edges, LEVELS, Levels, unselected};
 use super::order::{Loaded, Order};
-use super::output::{Encoder, ORIGINAL_BYTES, Output, Piece, pieces};
+use super::output::{BatchFile, Encoder, ORIGINAL_BYTES, Piece, pieces};
 use crate::cloud::{Ledger, Store, copy_record, position};
 use crate::error::ConvertError;
 use crate::runtime::os_hints;
@@ -22,7 +22,7 @@ pub(super) struct Workshop<'a> {
     pub(super) content: &'a Content,
     pub(super) store: &'a Store,
     pub(super) stride: usize,
-    pub(super) output: &'a Output<'a>,
+    pub(super) output: &'a BatchFile<'a>,
     pub(super) keeps_originals: bool,
     /// Buffers are made for tasks of this size at once; what is not touched costs nothing.
     pub(super) usual_points: u64,

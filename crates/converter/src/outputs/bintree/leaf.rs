@@ -20,7 +20,6 @@ pub(super) struct Columns {
     pub(super) dropped: Vec<DroppedAttribute>,
     class: Option<(usize, AttributeType)>,
     moves: Vec<Move>,
-    has_class: bool,
 }
 
 /// How an optional column comes from a stored record; `to` counts from the end of the core.
@@ -65,12 +64,12 @@ impl Columns {
             name_constants(schema, &cloud.facts.ranges, &mut dropped);
         }
         let class = class.map(|i| (schema.offsets[i], schema.attributes[i].ty));
-        Ok(Self { record, dropped, class, moves, has_class: class.is_some() })
+        Ok(Self { record, dropped, class, moves })
     }
 
     /// Names of what is kept, for the report.
     pub(super) fn names(&self) -> Vec<String> {
-        let class = self.has_class.then(|| "classification".to_owned());
+        let class = self.class.is_some().then(|| "classification".to_owned());
         let extras = self.record.extras().iter().map(|e| e.attribute.name.clone());
         std::iter::once("position".to_owned()).chain(class).chain(extras).collect()
     }

@@ -3,7 +3,7 @@
 //! 1. [`upper`] splits nodes that are too large for memory. A node is a list of cells whose sums and extremes are known
 //!    from the one pass over the inputs, so axis and plane are exact without reading a point; only cells that the plane
 //!    crosses are read, and divided.
-//! 2. [`subtree`] takes what is small enough into memory, and partitions it down to leaves, one subtree a thread.
+//! 2. [`subtree`] takes what is small enough into memory, and partitions it down to leaves, one subtree per thread.
 //! 3. [`leaf`] puts the points of a leaf in order and encodes them; [`files`] puts the bytes at their place, which is
 //!    known from the number of points before them.
 //!
@@ -50,7 +50,7 @@ const MAX_TASK_POINTS: u64 = 2_000_000;
 /// This many files are slow to write, to copy and to list.
 const MANY_FILES: usize = 20_000;
 
-/// Bytes of a node in the index.
+/// Bytes of a node in the index, at most: 194 to 208 were measured.
 const INDEX_NODE_BYTES: u64 = 220;
 
 impl From<BintreeSettings> for Target {

@@ -14,7 +14,7 @@ pub(super) fn rule_at(rule: SplitRule, depth: usize) -> SplitRule {
 
 /// The axis of the largest extent, ties to the lowest; `None` if all points share one place.
 pub(super) fn longest_axis(bounds: &JobBounds, scale: [f64; 3]) -> Option<usize> {
-    let steps = |a: usize| bounds.max[a].abs_diff(bounds.min[a]);
+    let steps = |a: usize| bounds.extent(a);
     let extent = |a: usize| steps(a) as f64 * scale[a];
     let longest = (1..3).fold(0, |best, a| if extent(a) > extent(best) { a } else { best });
     // Extents of different axes may underflow to the same double; one with points apart is there if any is.

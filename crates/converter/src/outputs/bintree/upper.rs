@@ -10,6 +10,9 @@ use crate::runtime::Runtime;
 /// Bytes of a side that are put into a block together.
 const SIDE_BYTES: usize = 4 << 20;
 
+/// Records that are read and divided together.
+const CUT_POINTS: u32 = 65_536;
+
 /// Bins of the histogram by which a median is narrowed down.
 const BINS: u64 = 4096;
 
@@ -136,9 +139,9 @@ impl Cut<'_> {
                 sides[1].parts.push(part);
             } else {
                 sides.iter_mut().for_each(Side::start_part);
-                for segment in &part.segments {
+                for segment in part.segments.iter().flat_map(|s| s.split(CUT_POINTS)) {
                     records.clear();
-                    let source = self.store.take(*segment, &mut records)?;
+                    let source = self.store.take(segment, &mut records)?;
                     for side in &mut sides {
                         side.reserve(self.store, source)?;
                     }
