@@ -153,6 +153,7 @@ impl Serialize for DatasetKind {
 
 /// A dataset that was found by the names of its files ([`locate`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Located {
     /// What its files are called like.
     pub kind: DatasetKind,

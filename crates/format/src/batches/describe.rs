@@ -12,6 +12,7 @@ use super::Precision;
 /// What is told of the cloud. Keys are written in this order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub struct Description {
     /// Version of the program that wrote the file.
     #[serde(default)]
@@ -64,6 +65,7 @@ impl From<LatticeEntry> for Lattice {
 /// One extra attribute and where its values are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub struct AttributeEntry {
     /// Unique in the file.
     pub name: String,
@@ -134,6 +136,7 @@ impl AttributeEntry {
 /// Where colours come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum ColourSource {
     /// From the colours of the source.
     Rgb,
@@ -162,6 +165,7 @@ named!(ColourSource, "source of colours");
 
 /// Errors of decoded positions over all points, world units: x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ErrorFigures {
     /// The largest.
     pub max: [f64; 3],
@@ -172,6 +176,7 @@ pub struct ErrorFigures {
 /// Errors by precision; `None` for planes that are not in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[allow(missing_docs)] // the names say it
+#[non_exhaustive]
 pub struct PlaneErrors {
     #[serde(rename = "10", default, skip_serializing_if = "Option::is_none")]
     pub ten: Option<ErrorFigures>,

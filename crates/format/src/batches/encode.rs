@@ -9,6 +9,7 @@ use crate::WriteError;
 
 /// A batch as it goes to the file. Reuse one: its vectors keep their memory.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct EncodedBatch {
     /// Box, first point, number of points.
     pub record: BatchRecord,
@@ -31,6 +32,7 @@ impl Default for EncodedBatch {
 
 /// Errors of decoded positions, summed up: by plane count (one, two, three), then by axis. World units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct ErrorSums {
     /// Points that were looked at.
     pub points: u64,

@@ -25,6 +25,7 @@ impl Section {
 
 /// A section with one entry per point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PointSection {
     /// What it holds.
     pub part: Part,
@@ -40,6 +41,7 @@ pub struct PointSection {
 /// takes [`Self::with_precision`], **cuts the file at [`Self::end_of_points`]** (what it wrote behind must not
 /// stay in the gaps), and goes on with the originals.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Layout {
     /// N.
     pub points: u64,

@@ -5,6 +5,7 @@ use super::Precision;
 /// A section with one entry per point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)] // the names say it
+#[non_exhaustive]
 pub enum Part {
     Hi10,
     Mid10,

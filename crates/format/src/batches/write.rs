@@ -13,6 +13,7 @@ use super::{
 
 /// Points in memory, in any order.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Cloud<'a> {
     /// world = X · scale + offset.
     pub lattice: Lattice,
@@ -24,8 +25,17 @@ pub struct Cloud<'a> {
     pub attributes: &'a [(Attribute, &'a [u8])],
 }
 
+impl<'a> Cloud<'a> {
+    /// A cloud without extra attributes; [`Self::attributes`] can be set. `colours` are as long as each of `positions`.
+    #[must_use]
+    pub const fn new(lattice: Lattice, positions: [&'a [i64]; 3], colours: &'a [u32]) -> Self {
+        Self { lattice, positions, colours, attributes: &[] }
+    }
+}
+
 /// What is asked of the file.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct WriteOptions {
     /// Side of the cells of level 0, world units, > 0.
     pub cell: f64,
@@ -41,10 +51,32 @@ impl WriteOptions {
         let description = Description { colour: ColourSource::Rgb, ..Description::new(lattice) };
         Self { cell: 1.0, precision: None, description }
     }
+
+    /// Sets [`Self::cell`].
+    #[must_use]
+    pub fn cell(mut self, cell: f64) -> Self {
+        self.cell = cell;
+        self
+    }
+
+    /// Sets [`Self::precision`].
+    #[must_use]
+    pub fn precision(mut self, precision: Precision) -> Self {
+        self.precision = Some(precision);
+        self
+    }
+
+    /// Sets [`Self::description`].
+    #[must_use]
+    pub fn description(mut self, description: Description) -> Self {
+        self.description = description;
+        self
+    }
 }
 
 /// What was written.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Written {
     /// The fields of the header.
     pub header: Header,
@@ -66,7 +98,7 @@ pub struct Written {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let lattice = Lattice { scale: [0.001; 3], offset: [500_000.0, 5_400_000.0, 0.0] };
 /// let (x, y, z) = ([0, 250, 1500], [0, 10, 20], [7, 7, 7]);
-/// let cloud = Cloud { lattice, positions: [&x, &y, &z], colours: &[0xff, 0xff00, 0xff_0000], attributes: &[] };
+/// let cloud = Cloud::new(lattice, [&x, &y, &z], &[0xff, 0xff00, 0xff_0000]);
 /// let mut file = std::io::Cursor::new(Vec::new());
 /// write(&mut file, &cloud, &WriteOptions::new(lattice))?;
 ///

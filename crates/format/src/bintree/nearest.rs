@@ -13,6 +13,7 @@ use super::{Bintree, NodeKind};
 
 /// A leaf in an R*-tree: its tight box and its index.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct LeafBox {
     /// World coordinates.
     pub bounds: Aabb,
@@ -36,6 +37,7 @@ impl PointDistance for LeafBox {
 
 /// A point near another one.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Neighbour {
     /// World coordinates, as [`Bintree::read_leaf`] gives them.
     pub position: [f64; 3],

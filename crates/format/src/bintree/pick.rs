@@ -95,6 +95,7 @@ impl Ray {
 
 /// A point that a ray met.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Hit {
     /// World coordinates, as [`Bintree::read_leaf`] gives them.
     pub position: [f64; 3],

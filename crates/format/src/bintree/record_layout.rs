@@ -12,6 +12,7 @@ const MAX_ELEMENTS: usize = 256;
 
 /// A column and its place in the record.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PlacedAttribute {
     /// Name, type, elements; scale and offset of its values. The index keeps neither descriptions nor no-data values.
     pub attribute: Attribute,

@@ -45,6 +45,7 @@ impl Positions {
 /// # Ok::<(), &str>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PointBatch {
     /// Index in the scan of the first point.
     pub first_point: u64,

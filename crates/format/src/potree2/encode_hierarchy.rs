@@ -10,6 +10,7 @@ use super::{Node, NodeRecord, NodeType};
 
 /// A node to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct NodeEntry {
     /// Its address.
     pub key: NodeKey,
@@ -21,6 +22,14 @@ pub struct NodeEntry {
     pub byte_size: u64,
 }
 
+impl NodeEntry {
+    /// The node `key` with `points` points, whose payload is `byte_size` bytes of `octree.bin`, from `byte_offset` on.
+    #[must_use]
+    pub const fn new(key: NodeKey, points: u32, byte_offset: u64, byte_size: u64) -> Self {
+        Self { key, points, byte_offset, byte_size }
+    }
+}
+
 impl From<&Node> for NodeEntry {
     fn from(node: &Node) -> Self {
         let NodeRecord { points, byte_offset, byte_size, .. } = node.record;
@@ -30,6 +39,7 @@ impl From<&Node> for NodeEntry {
 
 /// What [`encode_hierarchy`] made.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct HierarchyBytes {
     /// The contents of `hierarchy.bin`.
     pub bytes: Vec<u8>,

@@ -70,11 +70,20 @@ impl NodeRecord {
 
 /// A node of the octree and its record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Node {
     /// Its address.
     pub key: NodeKey,
     /// Its record, as stored where it was found.
     pub record: NodeRecord,
+}
+
+impl Node {
+    /// The node of that address and record.
+    #[must_use]
+    pub const fn new(key: NodeKey, record: NodeRecord) -> Self {
+        Self { key, record }
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! What is known of a scan before its points are decoded.
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -104,6 +105,7 @@ pub struct ScanPart {
 
 /// A part of a scan that decodes without any other part.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Piece {
     /// Index in the scan of the first point.
     pub first_point: u64,
@@ -113,4 +115,17 @@ pub struct Piece {
     pub byte_offset: u64,
     /// How many there are.
     pub byte_len: u64,
+}
+
+impl Piece {
+    /// The piece of the points `points` (indices in the scan), stored in the bytes `bytes` (places in the file).
+    #[must_use]
+    pub const fn new(points: Range<u64>, bytes: Range<u64>) -> Self {
+        Self {
+            first_point: points.start,
+            points: points.end.saturating_sub(points.start),
+            byte_offset: bytes.start,
+            byte_len: bytes.end.saturating_sub(bytes.start),
+        }
+    }
 }

@@ -3,8 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use pointmill_format::batches::{
-    AlignedBytes, BATCH_POINTS, BatchRecord, BatchScratch, Batches, Grid, LOD_LEVELS, Precision, WriteOptions, lod_of,
-    rgb_of,
+    AlignedBytes, BATCH_POINTS, BatchRecord, BatchScratch, Batches, Grid, LOD_LEVELS, Precision, lod_of, rgb_of,
 };
 use pointmill_format::{Lattice, NodePoints};
 
@@ -19,7 +18,7 @@ fn bound(record: &BatchRecord, precision: Precision) -> [f64; 3] {
 /// Writes with three planes, reads, and checks all promises that the source's integers can be held against.
 #[track_caller]
 fn assert_promises(cloud: &Points, cell: f64) -> Batches<AlignedBytes> {
-    let options = WriteOptions { precision: Some(Precision::Thirty), ..cloud.options(cell) };
+    let options = cloud.options(cell).precision(Precision::Thirty);
     let (bytes, written) = cloud.write(&options);
     let batches = open(&bytes).unwrap();
     assert_eq!(batches.header(), &written.header);
@@ -279,7 +278,7 @@ fn buffers_that_are_not_aligned_are_refused_with_advice() {
 #[test]
 fn iterating_undoes_the_swap_and_storage_order_does_not() {
     let cloud = Points::random(18, 6 * 10_240 + 1, [9_000; 3], false, MILLIMETRES);
-    let (bytes, _) = cloud.write(&WriteOptions { precision: Some(Precision::Thirty), ..cloud.options(1.0) });
+    let (bytes, _) = cloud.write(&cloud.options(1.0).precision(Precision::Thirty));
     let batches = open(&bytes).unwrap();
     let grid = batches.header().grid;
     let mut points: Vec<_> = batches.points_in_morton_order(Precision::Thirty).map(Result::unwrap).collect();
