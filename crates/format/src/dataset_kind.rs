@@ -122,6 +122,7 @@ impl DatasetKind {
     }
 
     /// True if a file of that name belongs to a dataset of this kind. `name`: without a folder.
+    #[must_use]
     pub fn owns(self, name: &str) -> bool {
         let row = self.row();
         name == row.marker || row.required.contains(&name) || row.optional.contains(&name) || (row.owns)(name)
@@ -137,6 +138,7 @@ impl DatasetKind {
     /// assert_eq!(DatasetKind::detect(format!("{fixtures}/las")), None);
     /// assert_eq!(DatasetKind::detect(format!("{fixtures}/bintree/files")), Some(DatasetKind::Bintree));
     /// ```
+    #[must_use]
     pub fn detect(path: impl AsRef<Path>) -> Option<Self> {
         let located = find(path.as_ref())?;
         starts_with_mark(&located.marker_path(), located.kind.mark()).then_some(located.kind)

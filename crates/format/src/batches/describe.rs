@@ -100,6 +100,7 @@ impl AttributeEntry {
     pub(crate) const MAX_ATTRIBUTES: usize = 256;
 
     /// The entry of an attribute whose values will be at `offset`; `min` and `max` are left empty.
+    #[must_use]
     pub fn new(attribute: &Attribute, offset: u64, bytes: u64) -> Self {
         let unless = |values: &[f64], usual: f64| match values.iter().all(|v| *v == usual) {
             true => Vec::new(),
@@ -119,6 +120,7 @@ impl AttributeEntry {
     }
 
     /// Name, type and scaling; `None` if the type is unknown or elements are not 1 … 256.
+    #[must_use]
     pub fn attribute(&self) -> Option<Attribute> {
         let ty = AttributeType::from_potree_name(&self.type_name)?;
         let elements =
@@ -209,6 +211,7 @@ impl PlaneErrors {
 
 impl Description {
     /// A description with nothing but a lattice, whose scale is the source step, and this version of pointmill.
+    #[must_use]
     pub fn new(lattice: Lattice) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -225,6 +228,7 @@ impl Description {
 
     /// The text: one line, keys in order. JSON has neither NaN nor infinities: they become `null`, which
     /// [`Self::from_json`] refuses.
+    #[must_use]
     pub fn to_json(&self) -> String {
         // strings, numbers and string keys: there is nothing in it that could fail
         serde_json::to_string(self).unwrap_or_default()

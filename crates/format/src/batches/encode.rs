@@ -55,6 +55,7 @@ impl ErrorSums {
     }
 
     /// Largest and RMS errors of 10, 20 and 30 bits; 0 without points.
+    #[must_use]
     pub fn figures(&self) -> PlaneErrors {
         let points = self.points.max(1) as f64;
         let of = |plane: usize| {
@@ -125,6 +126,7 @@ fn encode_axis(axis: usize, coordinates: &[f64], out: &mut EncodedBatch) {
 }
 
 /// Words as they are in the file: without a copy on a little-endian host.
+#[must_use]
 pub fn le_bytes(words: &[u32]) -> Cow<'_, [u8]> {
     if cfg!(target_endian = "little") {
         Cow::Borrowed(bytemuck::cast_slice(words))

@@ -74,6 +74,7 @@ impl Header {
     }
 
     /// The 256 bytes.
+    #[must_use]
     pub fn encode(&self) -> [u8; HEADER_BYTES as usize] {
         let mut bytes = [0; HEADER_BYTES as usize];
         let mut at = 0;

@@ -190,6 +190,7 @@ impl Layout {
     }
 
     /// The first byte behind the last section that has one entry a point.
+    #[must_use]
     pub fn end_of_points(&self) -> u64 {
         self.sections().last().map_or(self.records, |last| last.section).end()
     }

@@ -38,6 +38,7 @@ impl Precision {
     /// The published choice, from the projected diagonal of a batch's box ([`projected_diagonal`]), in pixels.
     ///
     /// Source: `m-schuetz/compute_rasterizer`: below 500 pixels 10 bits, below 10,000 pixels 20.
+    #[must_use]
     pub fn for_diagonal(pixels: f64) -> Self {
         if pixels < 500.0 {
             Self::Ten
@@ -52,6 +53,7 @@ impl Precision {
     ///
     /// `longest_side` of the box and `distance` to it ([`distance_to_box`], 0 inside) in world units, `near` > 0: the
     /// distance of the near plane; `focal`: [`focal_pixels`].
+    #[must_use]
     pub fn for_error(longest_side: f64, distance: f64, near: f64, focal: f64) -> Self {
         let error = |p: Self| longest_side / f64::from(2u32 << p.bits()) * focal / distance.max(near);
         Self::ALL.into_iter().find(|p| error(*p) <= 0.5).unwrap_or(Self::Thirty)

@@ -47,6 +47,7 @@ pub struct WriteOptions {
 
 impl WriteOptions {
     /// Cells of 1 unit, as many planes as the lattice needs, colours from the source.
+    #[must_use]
     pub fn new(lattice: Lattice) -> Self {
         let description = Description { colour: ColourSource::Rgb, ..Description::new(lattice) };
         Self { cell: 1.0, precision: None, description }

@@ -79,6 +79,7 @@ pub struct NearestPoints {
 impl NearestPoints {
     /// Loads the boxes of all leaves. Leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes a
     /// point and a little.
+    #[must_use]
     pub fn new(tree: Arc<Bintree>, cache_bytes: usize) -> Self {
         let leaf_box = |leaf| Some(LeafBox { bounds: tree.node(leaf)?.bounds, leaf });
         let boxes = RTree::bulk_load(tree.leaves().filter_map(leaf_box).collect());

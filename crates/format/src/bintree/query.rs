@@ -8,6 +8,7 @@ use super::{Bintree, Node};
 
 impl Bintree {
     /// The leaves of which something may be in sight, in preorder.
+    #[must_use]
     pub fn leaves_in_frustum(&self, frustum: &Frustum) -> Vec<u32> {
         let mut leaves = Vec::new();
         self.descend(Frustum::ALL, |index, node, planes| {
@@ -21,6 +22,7 @@ impl Bintree {
     }
 
     /// The leaves whose boxes touch `bounds` (closed), in preorder.
+    #[must_use]
     pub fn leaves_in_box(&self, bounds: &Aabb) -> Vec<u32> {
         let mut leaves = Vec::new();
         self.descend((), |index, node, ()| {
@@ -56,6 +58,7 @@ impl Bintree {
     ///
     /// `switch_distance`: see [`super::switch_distance`]. One pass over the part of the tree that is in sight; below a
     /// node that is far or near as a whole nothing is measured.
+    #[must_use]
     pub fn draw_list(&self, camera: [f64; 3], switch_distance: f64, frustum: Option<&Frustum>) -> Vec<(u32, Material)> {
         let mut list = Vec::new();
         self.descend((Frustum::ALL, Material::Both), |index, node, (planes, material)| {

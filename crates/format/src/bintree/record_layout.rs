@@ -29,6 +29,7 @@ pub struct RecordLayout {
 
 impl RecordLayout {
     /// The core alone: 16 bytes.
+    #[must_use]
     pub const fn core() -> Self {
         Self { extras: Vec::new(), stride: CORE_BYTES }
     }

@@ -91,6 +91,7 @@ impl Bintree {
     /// # Ok(())
     /// # }
     /// ```
+    #[must_use]
     pub fn path(&self, index: u32) -> NodePath {
         let (mut path, mut at) = (Vec::new(), 0);
         while at < index

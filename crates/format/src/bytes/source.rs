@@ -96,6 +96,7 @@ pub struct Folder {
 
 impl Folder {
     /// The dataset in the folder `path`; nothing is opened yet.
+    #[must_use]
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), kept: [const { OnceLock::new() }; KEPT_FILES] }
     }

@@ -117,6 +117,7 @@ pub struct Attribute {
 
 impl Attribute {
     /// An attribute whose raw values are the meant ones.
+    #[must_use]
     pub fn new(name: impl Into<String>, ty: AttributeType, elements: usize) -> Self {
         Self {
             name: name.into(),

@@ -59,6 +59,7 @@ pub struct PointBatch {
 
 impl PointBatch {
     /// A batch with an empty column per attribute.
+    #[must_use]
     pub fn new(first_point: u64, positions: Positions, attributes: impl Into<Arc<[Attribute]>>) -> Self {
         let attributes = attributes.into();
         let columns = attributes.iter().map(|a| Column::new(a.ty)).collect();

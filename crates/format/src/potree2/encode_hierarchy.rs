@@ -55,6 +55,7 @@ pub struct HierarchyBytes {
 /// `nodes`: each key once, in any order; they are sorted by level and name. Child masks and types come from the keys:
 /// type 0 with children, 1 without. A node at the border of a chunk becomes a proxy only if it has children. Ancestors
 /// that are missing are added as nodes without points, so the result is a valid hierarchy whatever is passed.
+#[must_use]
 pub fn encode_hierarchy(nodes: &mut [NodeEntry], step_size: u32) -> HierarchyBytes {
     nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
     if let Some(tree) = Tree::link(nodes) {

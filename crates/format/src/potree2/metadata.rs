@@ -134,6 +134,7 @@ impl Metadata {
     }
 
     /// The box of a node: the cube halved [`NodeKey::level`] times, as viewers do it.
+    #[must_use]
     pub fn node_cube(&self, key: NodeKey) -> Aabb {
         let mut cube = self.cube;
         for level in (0..key.level).rev() {
@@ -150,6 +151,7 @@ impl Metadata {
     }
 
     /// Spacing of the nodes of `level`, world units: halves with every level.
+    #[must_use]
     pub fn spacing_at(&self, level: u8) -> f64 {
         self.spacing * (-f64::from(level)).exp2()
     }

@@ -34,6 +34,7 @@ impl NodeRecord {
     pub const LEN: usize = 22;
 
     /// Reads a record.
+    #[must_use]
     pub fn from_bytes(bytes: &[u8; Self::LEN]) -> Self {
         let [node_type, child_mask, p0, p1, p2, p3, o0, o1, o2, o3, o4, o5, o6, o7, s0, s1, s2, s3, s4, s5, s6, s7] =
             *bytes;
@@ -47,6 +48,7 @@ impl NodeRecord {
     }
 
     /// The bytes of a record.
+    #[must_use]
     pub fn to_bytes(&self) -> [u8; Self::LEN] {
         let mut bytes = [0; Self::LEN];
         bytes[0] = self.node_type;

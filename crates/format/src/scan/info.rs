@@ -20,6 +20,7 @@ pub struct Crs {
 
 impl Crs {
     /// What is known: WKT text, code of the (projected) system, code of the vertical one.
+    #[must_use]
     pub fn new(wkt: Option<String>, epsg: Option<u32>, vertical_epsg: Option<u32>) -> Self {
         Self { wkt, epsg, vertical_epsg }
     }
@@ -55,6 +56,7 @@ pub struct ScanInfo {
 
 impl ScanInfo {
     /// A scan of which nothing else is known: world coordinates in double precision, without attributes.
+    #[must_use]
     pub fn new(path: impl Into<PathBuf>, format: impl Into<String>, points_declared: u64) -> Self {
         Self {
             path: path.into(),

@@ -97,6 +97,7 @@ impl ScanKind {
 
     /// The kind of a file that starts with these bytes (give some kB, or the whole file if it is shorter).
     #[allow(unused_variables)] // a build without readers asks nothing
+    #[must_use]
     pub fn of(first_bytes: &[u8]) -> Option<Self> {
         #[cfg(feature = "las")]
         if crate::scan::las::is_las(first_bytes) {
@@ -172,6 +173,7 @@ impl FromStr for ScanKind {
 }
 
 /// What this build reads, for people: "LAS, LAZ, E57, …".
+#[must_use]
 pub fn supported_scans() -> String {
     let kinds = [
         (cfg!(feature = "las"), "LAS, LAZ"),

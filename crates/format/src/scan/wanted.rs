@@ -25,11 +25,13 @@ pub struct Wanted {
 
 impl Wanted {
     /// Everything.
+    #[must_use]
     pub fn all(info: &ScanInfo) -> Self {
         Self { columns: vec![true; info.attributes.len()] }
     }
 
     /// Positions alone.
+    #[must_use]
     pub fn positions(info: &ScanInfo) -> Self {
         Self { columns: vec![false; info.attributes.len()] }
     }
