@@ -173,11 +173,11 @@ impl Located {
 /// Finds the dataset at `path`, a folder or its marker file, by the names of files alone: a damaged one is found too.
 ///
 /// # Errors
-/// `path` leads to nothing, or to nothing that is called like a dataset.
+/// `path` leads to nothing, or to nothing that is named like a dataset.
 pub fn locate(path: impl AsRef<Path>) -> Result<Located, ReadError> {
     let path = path.as_ref();
     fs::metadata(path).map_err(|e| ReadError::io(path, "opening", e))?;
-    find(path).ok_or_else(|| ReadError::unsupported(path, "this is no dataset that can be validated").advise(advice()))
+    find(path).ok_or_else(|| ReadError::unsupported(path, "not a dataset of any known kind").advise(advice()))
 }
 
 fn find(path: &Path) -> Option<Located> {

@@ -9,7 +9,7 @@ use crate::{Attribute, AttributeType, Lattice, ReadError};
 
 use super::Precision;
 
-/// What is told of the cloud. Keys are written in this order.
+/// The description of the cloud. Keys are written in this order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 #[non_exhaustive]
@@ -72,28 +72,28 @@ pub struct AttributeEntry {
     /// Element type, by its Potree name ([`AttributeType::potree_name`]).
     #[serde(rename = "type")]
     pub type_name: String,
-    /// Elements a point, 1 … 256.
+    /// Elements per point, 1 … 256.
     pub elements: u64,
     /// Where the section begins, in bytes from the start of the file.
     pub offset: u64,
     /// Bytes of the section.
     pub bytes: u64,
-    /// Factor from raw to meant values, one an element, if it is not 1.
+    /// Factor from raw to meant values, one per element, if it is not 1.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub value_scale: Vec<f64>,
-    /// Summand from raw to meant values, one an element, if it is not 0.
+    /// Summand from raw to meant values, one per element, if it is not 0.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub value_offset: Vec<f64>,
-    /// Least raw value of each element, if told.
+    /// Least raw value of each element, if known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub min: Vec<f64>,
-    /// Greatest raw value of each element, if told.
+    /// Greatest raw value of each element, if known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub max: Vec<f64>,
 }
 
 impl AttributeEntry {
-    /// More elements a point than any attribute has.
+    /// More elements per point than any attribute has.
     pub(crate) const MAX_ELEMENTS: u64 = 256;
 
     /// More attributes than any file has.
@@ -126,9 +126,9 @@ impl AttributeEntry {
         let elements =
             usize::try_from(self.elements).ok().filter(|_| (1..=Self::MAX_ELEMENTS).contains(&self.elements))?;
         let mut attribute = Attribute::new(self.name.as_str(), ty, elements);
-        for (told, usual) in [(&self.value_scale, &mut attribute.scale), (&self.value_offset, &mut attribute.offset)] {
-            if told.len() == elements {
-                usual.clone_from(told);
+        for (given, usual) in [(&self.value_scale, &mut attribute.scale), (&self.value_offset, &mut attribute.offset)] {
+            if given.len() == elements {
+                usual.clone_from(given);
             }
         }
         Some(attribute)
@@ -198,7 +198,7 @@ impl PlaneErrors {
         }
     }
 
-    /// Leaves those out that need more planes than `precision` has.
+    /// Without those that need more planes than `precision` has.
     #[must_use]
     pub fn up_to(self, precision: Precision) -> Self {
         Self {

@@ -2,10 +2,9 @@
 
 use super::Precision;
 
-/// A section with one entry per point.
+/// A section with one entry per point. Version 1 of the format has these five.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)] // the names say it
-#[non_exhaustive]
 pub enum Part {
     Hi10,
     Mid10,

@@ -25,7 +25,7 @@ impl Precision {
         self as u32 + 1
     }
 
-    /// The precision with so many bits, if there is one.
+    /// The precision with that number of bits, if there is one.
     pub const fn from_bits(bits: u32) -> Option<Self> {
         match bits {
             10 => Some(Self::Ten),
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn planes_are_left_out_when_every_box_is_below_the_step() {
+    fn planes_are_omitted_when_every_box_is_below_the_step() {
         let record = |side: f32| BatchRecord { min: [0.0; 3], first_point: 0, max: [1.0, side, 1.0], points: 1 };
         let step = [0.125; 3];
         assert_eq!(Precision::for_steps(&[], step), Precision::Ten);

@@ -20,7 +20,7 @@ pub struct BatchRecord {
 
 impl Precision {
     /// The least precision whose cells are smaller than `step` (world units, per axis) in every batch, so that
-    /// rounding to the lattice gives every integer back: what `--planes auto` writes.
+    /// rounding to the lattice gives every integer back.
     pub fn for_steps<'a>(records: impl IntoIterator<Item = &'a BatchRecord>, step: [f64; 3]) -> Self {
         let enough = |record: &BatchRecord, precision: Self| {
             let cells = f64::from(1u32 << precision.bits());

@@ -19,9 +19,9 @@ pub struct Cloud<'a> {
     pub lattice: Lattice,
     /// Integers on the lattice: x, y, z, equally long.
     pub positions: [&'a [i64]; 3],
-    /// `r | g<<8 | b<<16`, one a point; the top byte is ignored ([`super::colour_word`], [`super::eight_bit`]).
+    /// `r | g<<8 | b<<16`, one per point; the top byte is ignored ([`super::colour_word`], [`super::eight_bit`]).
     pub colours: &'a [u32],
-    /// Extra attributes with their raw values, little-endian, [`Attribute::size`] bytes a point.
+    /// Extra attributes with their raw values, little-endian, [`Attribute::size`] bytes per point.
     pub attributes: &'a [(Attribute, &'a [u8])],
 }
 
@@ -33,7 +33,7 @@ impl<'a> Cloud<'a> {
     }
 }
 
-/// What is asked of the file.
+/// How a file is written.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct WriteOptions {
@@ -41,7 +41,7 @@ pub struct WriteOptions {
     pub cell: f64,
     /// The planes to write; `None`: those that the lattice needs ([`Precision::for_steps`]).
     pub precision: Option<Precision>,
-    /// What is told of the cloud; [`write()`] fills in attributes and errors.
+    /// The description of the cloud; [`write()`] fills in attributes and errors.
     pub description: Description,
 }
 

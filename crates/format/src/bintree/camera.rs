@@ -21,7 +21,7 @@ pub fn distance_range(bounds: &Aabb, camera: [f64; 3]) -> [f64; 2] {
 /// How the points of a node are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Material {
-    /// One pixel a point.
+    /// One pixel per point.
     Far,
     /// A disc of the point's radius.
     Near,

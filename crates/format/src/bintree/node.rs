@@ -1,4 +1,4 @@
-//! A node as the index tells it.
+//! A node as the index describes it.
 
 use std::fmt::{self, Write as _};
 
@@ -62,7 +62,7 @@ impl Node {
         Self { bounds, count, kind }
     }
 
-    /// True if the node has points of its own.
+    /// True if the node has points itself.
     pub const fn is_leaf(&self) -> bool {
         matches!(self.kind, NodeKind::Leaf { .. })
     }

@@ -139,8 +139,8 @@ pub struct Picker {
 }
 
 impl Picker {
-    /// A picker whose leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes a point and a
-    /// little.
+    /// A picker whose leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes per point and
+    /// a little.
     #[must_use]
     pub fn new(tree: Arc<Bintree>, cache_bytes: usize) -> Self {
         Self { tree, cache: LeafCache::new(cache_bytes) }

@@ -35,21 +35,21 @@ impl Bintree {
         leaves
     }
 
-    /// Reads the leaves that touch `bounds` and tells every point in it (closed): leaf, the leaf's points, index among
-    /// them. Leaves come in preorder, points as they are stored.
+    /// Reads the leaves that touch `bounds` and reports every point in it (closed): leaf, the leaf's points, index
+    /// among them. Leaves come in preorder, points as they are stored.
     ///
     /// # Errors
-    /// As [`Self::read_leaf`]; points of leaves before were told by then.
+    /// As [`Self::read_leaf`]; points of earlier leaves were reported by then.
     pub fn points_in_box(
         &self,
         bounds: &Aabb,
         scratch: &mut NodePoints,
-        mut tell: impl FnMut(u32, &NodePoints, usize),
+        mut report: impl FnMut(u32, &NodePoints, usize),
     ) -> Result<(), ReadError> {
         for leaf in self.leaves_in_box(bounds) {
             self.read_leaf(leaf, scratch)?;
             let inside = |i: &usize| scratch.world(*i).is_some_and(|p| bounds.contains(p));
-            (0..scratch.len()).filter(inside).for_each(|i| tell(leaf, scratch, i));
+            (0..scratch.len()).filter(inside).for_each(|i| report(leaf, scratch, i));
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use crate::{Aabb, Attribute, Lattice, NodeKey};
 pub enum Encoding {
     /// `DEFAULT`: interleaved records of [`Metadata::record_len`] bytes.
     Default,
-    /// `BROTLI`: one Brotli stream a node, planar, in Morton order, positions and colours as Morton codes.
+    /// `BROTLI`: one Brotli stream per node, planar, in Morton order, positions and colours as Morton codes.
     Brotli,
 }
 
@@ -81,9 +81,9 @@ pub struct Metadata {
     pub projection: String,
     /// Bytes of the chunk at the start of `hierarchy.bin`.
     pub first_chunk_size: u64,
-    /// Levels a hierarchy chunk.
+    /// Levels per hierarchy chunk.
     pub step_size: u32,
-    /// The deepest level that has a node (root = 0); PotreeConverter 2 often tells less.
+    /// The deepest level that has a node (root = 0); PotreeConverter 2 often writes less.
     pub depth: u32,
     /// `world = stored · scale + offset`.
     pub lattice: Lattice,
@@ -123,12 +123,12 @@ impl Metadata {
         }
     }
 
-    /// Bytes a point in DEFAULT encoding.
+    /// Bytes per point in DEFAULT encoding.
     pub fn record_len(&self) -> usize {
         self.attributes.iter().map(|a| a.attribute.size()).sum()
     }
 
-    /// Bytes a point in a decompressed BROTLI payload: 16 for `position`, 8 for `rgb`, else as in DEFAULT.
+    /// Bytes per point in a decompressed BROTLI payload: 16 for `position`, 8 for `rgb`, else as in DEFAULT.
     pub fn planar_len(&self) -> usize {
         self.attributes.iter().map(|a| planar_size(&a.attribute)).sum()
     }
@@ -171,7 +171,7 @@ impl Metadata {
     }
 }
 
-/// Bytes a point of one attribute in a decompressed BROTLI payload.
+/// Bytes per point of one attribute in a decompressed BROTLI payload.
 pub(super) fn planar_size(attribute: &Attribute) -> usize {
     match attribute.name.as_str() {
         "position" => 16,

@@ -2,15 +2,15 @@
 
 use crate::NodeKey;
 
-/// What the first byte of a record says. Do not tell inner nodes from leaves by it: PotreeConverter 2 marks most inner
-/// nodes as leaves; [`NodeRecord::child_mask`] is right.
+/// What the first byte of a record says; the format has these three. Do not distinguish inner nodes from leaves by it:
+/// PotreeConverter 2 marks most inner nodes as leaves; [`NodeRecord::child_mask`] is right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NodeType {
     /// An inner node.
     Normal = 0,
     /// A node without children.
     Leaf = 1,
-    /// A stand-in: the node and its descendants are in a chunk of their own.
+    /// A stand-in: the node and its descendants are in a separate chunk.
     Proxy = 2,
 }
 
@@ -59,7 +59,7 @@ impl NodeRecord {
         bytes
     }
 
-    /// True if the node stands in a chunk of its own.
+    /// True if the node is in a separate chunk.
     pub const fn is_proxy(&self) -> bool {
         self.node_type == NodeType::Proxy as u8
     }

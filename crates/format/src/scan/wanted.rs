@@ -87,7 +87,7 @@ pub struct UnknownAttribute {
 }
 
 impl UnknownAttribute {
-    /// The name that was asked for.
+    /// The name requested.
     pub fn name(&self) -> &str {
         &self.name
     }

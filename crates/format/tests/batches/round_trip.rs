@@ -68,9 +68,9 @@ fn assert_promises(cloud: &Points, cell: f64) -> Batches<AlignedBytes> {
     assert!(left.values().all(Vec::is_empty), "every point once");
     assert_eq!(lods, written.lod_points);
     for precision in Precision::ALL {
-        let told = batches.description().errors.get(precision).unwrap();
-        assert_eq!(told.max, largest.get(&precision.bits()).copied().unwrap_or_default());
-        assert!((0..3).all(|a| told.rms[a] <= told.max[a]));
+        let stored = batches.description().errors.get(precision).unwrap();
+        assert_eq!(stored.max, largest.get(&precision.bits()).copied().unwrap_or_default());
+        assert!((0..3).all(|a| stored.rms[a] <= stored.max[a]));
     }
     assert_levels(cloud, &batches, cell);
     batches
@@ -157,9 +157,9 @@ fn points_on_the_borders_of_cells_and_boxes_keep_the_promises_and_attain_the_bou
     assert_eq!(batches.header().points, 33 * 33 * 9);
     let sides = batches.records()[0].sides();
     for precision in Precision::ALL {
-        let told = batches.description().errors.get(precision).unwrap().max;
+        let stored = batches.description().errors.get(precision).unwrap().max;
         assert_eq!(
-            told,
+            stored,
             sides.map(|s| s / f64::from(2u32 << precision.bits())),
             "a corner of the box errs by half a cell"
         );
@@ -204,7 +204,7 @@ fn planes_that_say_nothing_are_left_out_and_the_integers_still_come_back() {
 
 #[test]
 fn attributes_follow_their_points() {
-    // the intensity tells which point it is, the class is x
+    // the intensity identifies the point, the class is x
     let mut cloud = Points::empty(MILLIMETRES, true);
     for i in 0..30_000u32 {
         let x = i64::from(i.wrapping_mul(2_654_435_761) >> 24);

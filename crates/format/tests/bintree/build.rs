@@ -8,7 +8,7 @@ use pointmill_format::bintree::{
 use pointmill_format::bytes::Memory;
 use pointmill_format::{Aabb, Lattice};
 
-/// A lattice point; `id` tells everything else of it.
+/// A lattice point; `id` gives everything else of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point {
     pub(crate) q: [i32; 3],

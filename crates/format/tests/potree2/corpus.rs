@@ -10,7 +10,7 @@ use pointmill_testkit::files::corpus;
 
 use crate::util::memory;
 
-/// What tells points of a scan apart, nearly: bits of the GPS time, intensity, return number.
+/// What distinguishes points of a scan, nearly: bits of the GPS time, intensity, return number.
 type Label = (u64, u16, u8);
 
 /// Points as X, Y, Z in units of the LAS file.
@@ -86,7 +86,7 @@ fn a_default_dataset_holds_every_point_of_its_scan() {
     compare("color_1065_DEFAULT", "1.2-with-color.las", 1065, -1..=0);
 }
 
-/// In BROTLI, PotreeConverter adds a unit to every coordinate. That is in the bytes; the reader tells them as they are.
+/// In BROTLI, PotreeConverter adds a unit to every coordinate. That is in the bytes; the reader gives them as they are.
 #[test]
 fn a_brotli_dataset_holds_every_point_of_its_scan_one_unit_further_up() {
     compare("color_1065_BROTLI", "1.2-with-color.las", 1065, 0..=1);

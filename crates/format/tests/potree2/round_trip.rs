@@ -9,7 +9,7 @@ use pointmill_testkit::Random;
 
 use crate::util::{attributes, memory, metadata, one_node, open};
 
-/// Entries for `leaves` and all their ancestors, with numbers of their own, shuffled.
+/// Entries for `leaves` and all their ancestors, with different numbers, shuffled.
 fn entries(leaves: impl IntoIterator<Item = NodeKey>, random: &mut Random) -> Vec<NodeEntry> {
     let ancestors = |leaf: NodeKey| std::iter::successors(Some(leaf), |key| key.parent());
     let keys: BTreeSet<NodeKey> = leaves.into_iter().flat_map(ancestors).chain([NodeKey::ROOT]).collect();

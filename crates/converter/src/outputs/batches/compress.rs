@@ -25,7 +25,7 @@ pub(super) fn compress(
     let mut copy = Copy { rt, raw, to, level, at: pointmill_format::batches::HEADER_BYTES };
     let mut sections = end.header.sections;
     sections.batches = copy.plain(layout.records)?.offset;
-    for PointSection { part, section, bytes_per_point } in layout.sections() {
+    for PointSection { part, section, bytes_per_point, .. } in layout.sections() {
         let Section { offset, bytes } = copy.blocks(section, bytes_per_point)?;
         match part {
             Part::Hi10 => sections.hi10 = offset,
