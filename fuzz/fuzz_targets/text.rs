@@ -1,4 +1,4 @@
-//! XYZ, PTS, PTX and OFF, which the content tells apart. The first byte says what the user says of the columns.
+//! XYZ, PTS, PTX and OFF, detected by content. The first byte chooses the options for the columns.
 
 #![no_main]
 

@@ -57,13 +57,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let columns = [(intensity, &intensities), (class, &classes)];
     let attributes: Vec<(Attribute, &[u8])> =
         columns.iter().filter_map(|(i, values)| i.map(|i| (info.attributes[i].clone(), values.as_slice()))).collect();
-    let cloud = Cloud {
-        lattice,
-        positions: [&positions[0], &positions[1], &positions[2]],
-        colours: &colours,
-        attributes: &attributes,
-    };
-    let options = WriteOptions { cell, ..WriteOptions::new(lattice) };
+    let mut cloud = Cloud::new(lattice, [&positions[0], &positions[1], &positions[2]], &colours);
+    cloud.attributes = &attributes;
+    let options = WriteOptions::new(lattice).cell(cell);
     let written = write(&mut BufWriter::new(File::create(output)?), &cloud, &options)?;
     let (header, bits) = (&written.header, written.header.precision().bits());
     println!("{} points in {} batches, {bits} bits, {} bytes", header.points, header.batches, written.bytes);

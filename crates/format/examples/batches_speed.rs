@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         })?;
         let bytes = file.get_ref().len() as f64 / header.points as f64;
         print!(
-            "zstd {level}: {bytes:.2} bytes a point, pack {packing:.1}, unpack {:.0} M points/s;",
+            "zstd {level}: {bytes:.2} bytes per point, pack {packing:.1}, unpack {:.0} M points/s;",
             millions / seconds
         );
         for (name, part) in &parts {

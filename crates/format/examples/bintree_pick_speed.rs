@@ -2,8 +2,8 @@
 //!
 //!     cargo run --release -p pointmill-format --example bintree_pick_speed -- [MILLIONS | FOLDER] [RAYS]
 //!
-//! Told are the median and the 99th percentile of rays whose leaves are in memory ("warm": every ray is shot twice, the
-//! second time is measured) and of the first time. Not told: what a slow disk adds to the first time.
+//! Printed are the median and the 99th percentile of rays whose leaves are in memory ("warm": every ray is shot twice,
+//! the second time is measured) and of the first time. Not measured: what a slow disk adds to the first time.
 
 #[path = "../tests/bintree/build.rs"]
 #[allow(dead_code, unreachable_pub)] // it serves the tests too
@@ -42,7 +42,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             hits += usize::from(hit);
             warm.push(timed(&mut picker, ray)?.0);
         }
-        println!("{name}: {hits} of {} rays hit; warm {}; first time {}", shots.len(), told(warm), told(cold));
+        println!(
+            "{name}: {hits} of {} rays hit; warm {}; first time {}",
+            shots.len(),
+            percentiles(warm),
+            percentiles(cold)
+        );
     }
     println!("{} MB of leaves in memory", picker.cached_bytes() / 1_000_000);
     Ok(())
@@ -54,7 +59,7 @@ fn timed(picker: &mut Picker, ray: &Ray) -> Result<(Duration, bool), Box<dyn Err
     Ok((start.elapsed(), hit.is_some()))
 }
 
-fn told(mut times: Vec<Duration>) -> String {
+fn percentiles(mut times: Vec<Duration>) -> String {
     times.sort();
     let at = |part: f64| times.get((times.len() as f64 * part) as usize).copied().unwrap_or_default();
     format!("{:.1?} median, {:.1?} at 99 %", at(0.5), at(0.99))

@@ -1,4 +1,4 @@
-//! Decodes E57 files and prints a line each: points, sums that depend on every point, million points a second of one
+//! Decodes E57 files and prints a line per file: points, sums of all values, million points per second of one
 //! thread. `cargo run --release --features e57 --example e57_speed -- FILE... [--positions]`
 
 use std::ops::ControlFlow;

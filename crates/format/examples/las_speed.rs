@@ -1,4 +1,4 @@
-//! Decodes LAS and LAZ files and prints a line each: points, sums that depend on every point, million points a second
+//! Decodes LAS and LAZ files and prints a line per file: points, sums of all values, million points per second
 //! of one thread. `cargo run --release --features las --example las_speed -- FILE... [--positions]`
 
 use std::ops::ControlFlow;

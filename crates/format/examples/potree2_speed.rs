@@ -3,8 +3,8 @@
 //!     cargo run --release -p pointmill-format --example potree2_speed -- FOLDER
 //!
 //! One thread; the best of five rounds, so the files are in the page cache. Seconds on the processor where the system
-//! tells them (Linux), else on the clock. Encoding is timed on the DEFAULT records of all nodes of the dataset, whatever
-//! its own encoding.
+//! reports them (Linux), else on the clock. Encoding is timed on the DEFAULT records of all nodes of the dataset,
+//! whatever its encoding.
 
 use std::time::Instant;
 
@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             records.iter().try_for_each(|r| encode_brotli(&attributes, r, quality, &mut scratch, &mut out))
         })?;
         let (rate, each) = (count as f64 / seconds / 1e6, out.len() as f64 / count as f64);
-        println!("encode, quality {quality}: {rate:.2} M points/s, {each:.2} bytes a point");
+        println!("encode, quality {quality}: {rate:.2} M points/s, {each:.2} bytes per point");
     }
     Ok(())
 }

@@ -122,6 +122,7 @@ impl DatasetKind {
     }
 
     /// True if a file of that name belongs to a dataset of this kind. `name`: without a folder.
+    #[must_use]
     pub fn owns(self, name: &str) -> bool {
         let row = self.row();
         name == row.marker || row.required.contains(&name) || row.optional.contains(&name) || (row.owns)(name)
@@ -137,6 +138,7 @@ impl DatasetKind {
     /// assert_eq!(DatasetKind::detect(format!("{fixtures}/las")), None);
     /// assert_eq!(DatasetKind::detect(format!("{fixtures}/bintree/files")), Some(DatasetKind::Bintree));
     /// ```
+    #[must_use]
     pub fn detect(path: impl AsRef<Path>) -> Option<Self> {
         let located = find(path.as_ref())?;
         starts_with_mark(&located.marker_path(), located.kind.mark()).then_some(located.kind)
@@ -153,6 +155,7 @@ impl Serialize for DatasetKind {
 
 /// A dataset that was found by the names of its files ([`locate`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Located {
     /// What its files are called like.
     pub kind: DatasetKind,
@@ -170,11 +173,11 @@ impl Located {
 /// Finds the dataset at `path`, a folder or its marker file, by the names of files alone: a damaged one is found too.
 ///
 /// # Errors
-/// `path` leads to nothing, or to nothing that is called like a dataset.
+/// `path` leads to nothing, or to nothing that is named like a dataset.
 pub fn locate(path: impl AsRef<Path>) -> Result<Located, ReadError> {
     let path = path.as_ref();
     fs::metadata(path).map_err(|e| ReadError::io(path, "opening", e))?;
-    find(path).ok_or_else(|| ReadError::unsupported(path, "this is no dataset that can be validated").advise(advice()))
+    find(path).ok_or_else(|| ReadError::unsupported(path, "not a dataset of any known kind").advise(advice()))
 }
 
 fn find(path: &Path) -> Option<Located> {

@@ -1,4 +1,4 @@
-//! Why a dataset cannot be written as it was asked for.
+//! Why a dataset cannot be written as requested.
 
 use std::io;
 

@@ -58,7 +58,7 @@ fn fake(fault: Fault) -> Fake {
         Attribute::new("intensity", AttributeType::UInt16, 1),
         Attribute::new("time", AttributeType::Float64, 1),
     ];
-    let piece = |i: u64| Piece { first_point: i * PIECE, points: PIECE, byte_offset: i * 1000, byte_len: 1000 };
+    let piece = |i: u64| Piece::new(i * PIECE..(i + 1) * PIECE, i * 1000..(i + 1) * 1000);
     let mut pieces: Vec<Piece> = (0..3).map(piece).collect();
     let mut warnings = vec![ScanWarning::Other("the header is odd".to_owned())];
     match fault {

@@ -48,7 +48,7 @@ pub use pointmill_format::{DatasetKind, Located, locate};
 /// There is no dataset, the operating system cannot read it, or a source to compare with cannot be opened or decoded
 /// to its end.
 pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
-    let Located { kind, path } = locate(dataset)?;
+    let Located { kind, path, .. } = locate(dataset)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(options.threads)
         .thread_name(|i| format!("validate-{i}"))

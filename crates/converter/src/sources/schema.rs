@@ -123,7 +123,8 @@ pub(crate) fn as_doubles(column: &Column) -> Option<(Column, u64)> {
 
 /// Index in `all` of the attribute with the same meaning, added if there is none.
 fn place(all: &mut Vec<Attribute>, attribute: &Attribute) -> usize {
-    let attribute = &Attribute { ty: stored_type(attribute.ty), ..attribute.clone() };
+    let mut attribute = attribute.clone();
+    attribute.ty = stored_type(attribute.ty);
     let same = |a: &Attribute| {
         a.ty == attribute.ty
             && a.elements == attribute.elements
@@ -142,7 +143,8 @@ fn place(all: &mut Vec<Attribute>, attribute: &Attribute) -> usize {
             None => break,
         }
     }
-    all.push(Attribute { name, ..attribute.clone() });
+    attribute.name = name;
+    all.push(attribute);
     all.len() - 1
 }
 

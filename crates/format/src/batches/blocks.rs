@@ -58,15 +58,15 @@ mod zstd_blocks {
     use super::super::{BATCH_POINTS, Part};
     use super::{BlockScratch, entry, head};
 
-    /// Batches of a block unless another number is asked for: 640 KiB of words.
+    /// Batches of a block unless another number is given: 640 KiB of words.
     pub const DEFAULT_BATCHES_PER_BLOCK: u32 = 16;
 
-    /// No zstd frame gives more bytes than this for each of its own: a block of 128 KiB takes 4 bytes at least
+    /// No zstd frame gives more bytes than this per compressed byte: a block of 128 KiB takes 4 bytes at least
     /// (RFC 8878, section 3.1.1.2).
     const MAX_RATIO: u64 = 32_768;
 
     impl BlockScratch {
-        /// The raw bytes of `slot`, out of a checked compressed `section` with `size` bytes a point.
+        /// The raw bytes of `slot`, out of a checked compressed `section` with `size` bytes per point.
         ///
         /// On failure: where in the section, and what.
         pub(in super::super) fn batch(
@@ -98,10 +98,10 @@ mod zstd_blocks {
             let (start, end) = ends.ok_or((0, "has no block table".to_owned()))?;
             let broken = |what: String| (start, format!("block {block} {what}"));
             let frame = section.get(start as usize..end as usize).unwrap_or(&[]);
-            let told = zstd::zstd_safe::get_frame_content_size(frame).ok().flatten();
-            if told != Some(raw) {
-                let told = told.map_or("nothing".to_owned(), |t| t.to_string());
-                return Err(broken(format!("is no zstd frame of {raw} bytes: its header tells {told}")));
+            let declared = zstd::zstd_safe::get_frame_content_size(frame).ok().flatten();
+            if declared != Some(raw) {
+                let declared = declared.map_or("nothing".to_owned(), |t| t.to_string());
+                return Err(broken(format!("is no zstd frame of {raw} bytes: its header declares {declared}")));
             }
             if raw > (frame.len() as u64).saturating_mul(MAX_RATIO) {
                 return Err(broken(format!("claims {raw} bytes, more than {} compressed bytes can hold", frame.len())));

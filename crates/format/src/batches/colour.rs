@@ -62,6 +62,7 @@ impl ColourSum {
     }
 
     /// The mean of each channel, halves rounded up; 0 without points.
+    #[must_use]
     pub fn mean(&self) -> [u8; 3] {
         let points = self.points.max(1);
         self.channels.map(|sum| ((sum + points / 2) / points) as u8)

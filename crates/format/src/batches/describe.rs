@@ -9,9 +9,10 @@ use crate::{Attribute, AttributeType, Lattice, ReadError};
 
 use super::Precision;
 
-/// What is told of the cloud. Keys are written in this order.
+/// The description of the cloud. Keys are written in this order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub struct Description {
     /// Version of the program that wrote the file.
     #[serde(default)]
@@ -64,40 +65,42 @@ impl From<LatticeEntry> for Lattice {
 /// One extra attribute and where its values are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub struct AttributeEntry {
     /// Unique in the file.
     pub name: String,
     /// Element type, by its Potree name ([`AttributeType::potree_name`]).
     #[serde(rename = "type")]
     pub type_name: String,
-    /// Elements a point, 1 … 256.
+    /// Elements per point, 1 … 256.
     pub elements: u64,
     /// Where the section begins, in bytes from the start of the file.
     pub offset: u64,
     /// Bytes of the section.
     pub bytes: u64,
-    /// Factor from raw to meant values, one an element, if it is not 1.
+    /// Factor from raw to meant values, one per element, if it is not 1.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub value_scale: Vec<f64>,
-    /// Summand from raw to meant values, one an element, if it is not 0.
+    /// Summand from raw to meant values, one per element, if it is not 0.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub value_offset: Vec<f64>,
-    /// Least raw value of each element, if told.
+    /// Least raw value of each element, if known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub min: Vec<f64>,
-    /// Greatest raw value of each element, if told.
+    /// Greatest raw value of each element, if known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub max: Vec<f64>,
 }
 
 impl AttributeEntry {
-    /// More elements a point than any attribute has.
+    /// More elements per point than any attribute has.
     pub(crate) const MAX_ELEMENTS: u64 = 256;
 
     /// More attributes than any file has.
     pub(crate) const MAX_ATTRIBUTES: usize = 256;
 
     /// The entry of an attribute whose values will be at `offset`; `min` and `max` are left empty.
+    #[must_use]
     pub fn new(attribute: &Attribute, offset: u64, bytes: u64) -> Self {
         let unless = |values: &[f64], usual: f64| match values.iter().all(|v| *v == usual) {
             true => Vec::new(),
@@ -117,14 +120,15 @@ impl AttributeEntry {
     }
 
     /// Name, type and scaling; `None` if the type is unknown or elements are not 1 … 256.
+    #[must_use]
     pub fn attribute(&self) -> Option<Attribute> {
         let ty = AttributeType::from_potree_name(&self.type_name)?;
         let elements =
             usize::try_from(self.elements).ok().filter(|_| (1..=Self::MAX_ELEMENTS).contains(&self.elements))?;
         let mut attribute = Attribute::new(self.name.as_str(), ty, elements);
-        for (told, usual) in [(&self.value_scale, &mut attribute.scale), (&self.value_offset, &mut attribute.offset)] {
-            if told.len() == elements {
-                usual.clone_from(told);
+        for (given, usual) in [(&self.value_scale, &mut attribute.scale), (&self.value_offset, &mut attribute.offset)] {
+            if given.len() == elements {
+                usual.clone_from(given);
             }
         }
         Some(attribute)
@@ -134,6 +138,7 @@ impl AttributeEntry {
 /// Where colours come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum ColourSource {
     /// From the colours of the source.
     Rgb,
@@ -162,6 +167,7 @@ named!(ColourSource, "source of colours");
 
 /// Errors of decoded positions over all points, world units: x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ErrorFigures {
     /// The largest.
     pub max: [f64; 3],
@@ -172,6 +178,7 @@ pub struct ErrorFigures {
 /// Errors by precision; `None` for planes that are not in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[allow(missing_docs)] // the names say it
+#[non_exhaustive]
 pub struct PlaneErrors {
     #[serde(rename = "10", default, skip_serializing_if = "Option::is_none")]
     pub ten: Option<ErrorFigures>,
@@ -191,7 +198,7 @@ impl PlaneErrors {
         }
     }
 
-    /// Leaves those out that need more planes than `precision` has.
+    /// Without those that need more planes than `precision` has.
     #[must_use]
     pub fn up_to(self, precision: Precision) -> Self {
         Self {
@@ -204,6 +211,7 @@ impl PlaneErrors {
 
 impl Description {
     /// A description with nothing but a lattice, whose scale is the source step, and this version of pointmill.
+    #[must_use]
     pub fn new(lattice: Lattice) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -220,6 +228,7 @@ impl Description {
 
     /// The text: one line, keys in order. JSON has neither NaN nor infinities: they become `null`, which
     /// [`Self::from_json`] refuses.
+    #[must_use]
     pub fn to_json(&self) -> String {
         // strings, numbers and string keys: there is nothing in it that could fail
         serde_json::to_string(self).unwrap_or_default()

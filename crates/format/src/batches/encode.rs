@@ -9,6 +9,7 @@ use crate::WriteError;
 
 /// A batch as it goes to the file. Reuse one: its vectors keep their memory.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct EncodedBatch {
     /// Box, first point, number of points.
     pub record: BatchRecord,
@@ -31,6 +32,7 @@ impl Default for EncodedBatch {
 
 /// Errors of decoded positions, summed up: by plane count (one, two, three), then by axis. World units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct ErrorSums {
     /// Points that were looked at.
     pub points: u64,
@@ -53,6 +55,7 @@ impl ErrorSums {
     }
 
     /// Largest and RMS errors of 10, 20 and 30 bits; 0 without points.
+    #[must_use]
     pub fn figures(&self) -> PlaneErrors {
         let points = self.points.max(1) as f64;
         let of = |plane: usize| {
@@ -123,6 +126,7 @@ fn encode_axis(axis: usize, coordinates: &[f64], out: &mut EncodedBatch) {
 }
 
 /// Words as they are in the file: without a copy on a little-endian host.
+#[must_use]
 pub fn le_bytes(words: &[u32]) -> Cow<'_, [u8]> {
     if cfg!(target_endian = "little") {
         Cow::Borrowed(bytemuck::cast_slice(words))

@@ -68,22 +68,26 @@ impl Grid {
     }
 
     /// r = p − origin, for a point inside the box that the grid was made for: ≥ 0.
+    #[must_use]
     pub fn relative(&self, world: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|a| world[a] - self.origin[a])
     }
 
     /// u = r / cell: the position in cells, < 2^exponent.
+    #[must_use]
     pub fn cells(&self, relative: [f64; 3]) -> [f64; 3] {
         relative.map(|r| r / self.cell)
     }
 
     /// Morton coordinates of a position in cells, each below 2^[`Self::morton_bits`].
+    #[must_use]
     pub fn morton_coordinates(&self, cells: [f64; 3]) -> [u32; 3] {
         let scale = power_of_two(self.morton_bits - self.exponent);
         cells.map(|u| (u * scale) as u32)
     }
 
     /// Morton code of a position in cells: 63 or 96 bits.
+    #[must_use]
     pub fn morton_code(&self, cells: [f64; 3]) -> u128 {
         let coordinates = self.morton_coordinates(cells);
         if self.morton_bits == 21 { u128::from(morton21(coordinates)) } else { morton32(coordinates) }

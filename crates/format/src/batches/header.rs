@@ -32,6 +32,7 @@ impl Flags {
 /// Where sections begin, in bytes from the start of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the names say it
+#[non_exhaustive]
 pub struct Sections {
     pub batches: u64,
     pub hi10: u64,
@@ -44,6 +45,7 @@ pub struct Sections {
 
 /// The contents of the header.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Header {
     /// N, at most [`MAX_POINTS`].
     pub points: u64,
@@ -72,6 +74,7 @@ impl Header {
     }
 
     /// The 256 bytes.
+    #[must_use]
     pub fn encode(&self) -> [u8; HEADER_BYTES as usize] {
         let mut bytes = [0; HEADER_BYTES as usize];
         let mut at = 0;

@@ -25,6 +25,7 @@ impl Section {
 
 /// A section with one entry per point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PointSection {
     /// What it holds.
     pub part: Part,
@@ -36,18 +37,19 @@ pub struct PointSection {
 
 /// Places of all sections of a file that is not compressed.
 ///
-/// Planes lie behind colours and attributes: a writer that finds out at the end that it does not need lo10 (or mid10)
+/// Planes lie behind colours and attributes: a writer that needs no lo10 (or mid10) in the end
 /// takes [`Self::with_precision`], **cuts the file at [`Self::end_of_points`]** (what it wrote behind must not
 /// stay in the gaps), and goes on with the originals.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Layout {
     /// N.
     pub points: u64,
     /// B.
     pub batches: u32,
-    /// Records, 32 bytes a slot.
+    /// Records, 32 bytes per slot.
     pub records: Section,
-    /// 4 bytes a point, as mid10, lo10 and colour.
+    /// 4 bytes per point, as mid10, lo10 and colour.
     pub hi10: Section,
     /// Colour words.
     pub colour: Section,
@@ -187,7 +189,8 @@ impl Layout {
         }
     }
 
-    /// The first byte behind the last section that has one entry a point.
+    /// The first byte behind the last section that has one entry per point.
+    #[must_use]
     pub fn end_of_points(&self) -> u64 {
         self.sections().last().map_or(self.records, |last| last.section).end()
     }
@@ -204,12 +207,12 @@ impl Layout {
         self.records.offset + 32 * u64::from(slot)
     }
 
-    /// Where the entry of storage index `first_point` belongs, in a section with `size` bytes a point.
+    /// Where the entry of storage index `first_point` belongs, in a section with `size` bytes per point.
     pub fn point_offset(section: Section, size: u64, first_point: u32) -> u64 {
         section.offset + size * u64::from(first_point)
     }
 
-    /// Bytes of an originals section with so many entries.
+    /// Bytes of an originals section with `count` entries.
     pub const fn originals_bytes(count: u64) -> u64 {
         8 + 8 * count
     }
@@ -229,8 +232,8 @@ impl Layout {
         originals: u64,
         mut description: Description,
     ) -> Result<Finish, WriteError> {
-        let told = std::mem::take(&mut description.attributes);
-        description.attributes = self.entries(&told);
+        let given = std::mem::take(&mut description.attributes);
+        description.attributes = self.entries(&given);
         description.errors = description.errors.up_to(self.precision());
         let text = description.to_json();
         if let Err(e) = Description::from_json(text.as_bytes(), "description".as_ref(), 0) {
@@ -258,14 +261,14 @@ impl Layout {
         Ok(Finish { header, header_bytes, description, description_bytes: text.into_bytes(), description_offset })
     }
 
-    fn entries(&self, told: &[AttributeEntry]) -> Vec<AttributeEntry> {
+    fn entries(&self, given: &[AttributeEntry]) -> Vec<AttributeEntry> {
         let placed = self.described.iter().zip(&self.attributes);
         placed
             .map(|(attribute, section)| {
                 let mut entry = AttributeEntry::new(attribute, section.offset, section.bytes);
-                if let Some(told) = told.iter().find(|t| t.name == entry.name) {
-                    entry.min.clone_from(&told.min);
-                    entry.max.clone_from(&told.max);
+                if let Some(given) = given.iter().find(|t| t.name == entry.name) {
+                    entry.min.clone_from(&given.min);
+                    entry.max.clone_from(&given.max);
                 }
                 entry
             })

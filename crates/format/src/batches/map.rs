@@ -36,7 +36,7 @@ impl Batches<MappedFile> {
         // SAFETY: the map is only read, and only as integers and floats, of which every bit pattern is one. What the
         // type system cannot exclude is another process that changes the file meanwhile; lengths and offsets were
         // checked at the start and are kept outside the map, so that changed bytes give wrong points, not wrong
-        // addresses. A file cut short is the signal told above.
+        // addresses. A file cut short is the signal described above.
         let map = unsafe { Mmap::map(&file) }.map_err(|e| ReadError::io(path, "mapping", e))?;
         Self::from_bytes(MappedFile(map), path)
     }

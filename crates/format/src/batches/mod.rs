@@ -1,7 +1,7 @@
 //! Quantised batches: one `.qbatch` file that a renderer maps and hands to the GPU (`docs/formats/batches.md`).
 //!
 //! Points stand in Morton order in batches of 10,240, every second batch swapped with its mirror; positions are three
-//! planes of 10 bits an axis inside the batch's box; colours carry a level of detail.
+//! planes of 10 bits per axis inside the batch's box; colours carry a level of detail.
 //!
 //! ```
 //! use pointmill_format::batches::{Batches, Precision};

@@ -2,7 +2,7 @@
 
 use super::BATCH_POINTS;
 
-/// Batches of so many points: rounded up, none without points.
+/// Batches that hold `points` points: rounded up, 0 without points.
 ///
 /// Saturates at `u32::MAX`, far above what [`super::MAX_POINTS`] points need.
 pub fn batch_count(points: u64) -> u32 {

@@ -2,7 +2,7 @@
 
 use super::Precision;
 
-/// A section with one entry per point.
+/// A section with one entry per point. Version 1 of the format has these five.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)] // the names say it
 pub enum Part {

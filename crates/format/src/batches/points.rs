@@ -7,6 +7,7 @@ use super::{BATCH_POINTS, Batches, BlockScratch, Part, Precision, lod_of, rgb_of
 
 /// One point.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Point {
     /// Storage index.
     pub index: u32,

@@ -25,7 +25,7 @@ impl Precision {
         self as u32 + 1
     }
 
-    /// The precision with so many bits, if there is one.
+    /// The precision with that number of bits, if there is one.
     pub const fn from_bits(bits: u32) -> Option<Self> {
         match bits {
             10 => Some(Self::Ten),
@@ -38,6 +38,7 @@ impl Precision {
     /// The published choice, from the projected diagonal of a batch's box ([`projected_diagonal`]), in pixels.
     ///
     /// Source: `m-schuetz/compute_rasterizer`: below 500 pixels 10 bits, below 10,000 pixels 20.
+    #[must_use]
     pub fn for_diagonal(pixels: f64) -> Self {
         if pixels < 500.0 {
             Self::Ten
@@ -52,6 +53,7 @@ impl Precision {
     ///
     /// `longest_side` of the box and `distance` to it ([`distance_to_box`], 0 inside) in world units, `near` > 0: the
     /// distance of the near plane; `focal`: [`focal_pixels`].
+    #[must_use]
     pub fn for_error(longest_side: f64, distance: f64, near: f64, focal: f64) -> Self {
         let error = |p: Self| longest_side / f64::from(2u32 << p.bits()) * focal / distance.max(near);
         Self::ALL.into_iter().find(|p| error(*p) <= 0.5).unwrap_or(Self::Thirty)
@@ -102,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn planes_are_left_out_when_every_box_is_below_the_step() {
+    fn planes_are_omitted_when_every_box_is_below_the_step() {
         let record = |side: f32| BatchRecord { min: [0.0; 3], first_point: 0, max: [1.0, side, 1.0], points: 1 };
         let step = [0.125; 3];
         assert_eq!(Precision::for_steps(&[], step), Precision::Ten);

@@ -109,7 +109,7 @@ impl<B: AsRef<[u8]>> Batches<B> {
         &self.header
     }
 
-    /// What is told of the cloud.
+    /// The description of the cloud.
     pub fn description(&self) -> &Description {
         &self.description
     }
@@ -124,7 +124,7 @@ impl<B: AsRef<[u8]>> Batches<B> {
         self.places.attributes.iter().map(|(attribute, _)| attribute)
     }
 
-    /// One record a slot.
+    /// One record per slot.
     pub fn records(&self) -> &[BatchRecord] {
         cast(self.range(self.places.records))
     }
@@ -183,12 +183,12 @@ impl<B: AsRef<[u8]>> Batches<B> {
     pub fn batch<'a>(&'a self, part: Part, slot: u32, scratch: &'a mut BlockScratch) -> Result<&'a [u8], ReadError> {
         let (section, size) = self.place(part).ok_or_else(|| self.absent(part))?;
         let Some(record) = self.records().get(slot as usize) else {
-            let what = format!("slot {slot} was asked for, the file has {}", self.header.batches);
+            let what = format!("slot {slot} was requested, the file has {}", self.header.batches);
             return Err(ReadError::unsupported(&self.path, what));
         };
         let bytes = self.range(section);
         if !self.is_compressed() {
-            // the record was checked: 10240 · slot and so many points lie in the section
+            // the record was checked: 10240 · slot and its points lie in the section
             let start = slot as usize * BATCH_POINTS as usize * size;
             return Ok(bytes.get(start..start + record.points as usize * size).unwrap_or(&[]));
         }
@@ -264,7 +264,7 @@ impl<B: AsRef<[u8]>> Batches<B> {
         self.places.originals.map(|section| self.range(section))
     }
 
-    /// The section, and bytes a point.
+    /// The section, and bytes per point.
     fn place(&self, part: Part) -> Option<(Section, usize)> {
         let p = &self.places;
         match part {

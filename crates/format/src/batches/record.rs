@@ -20,7 +20,7 @@ pub struct BatchRecord {
 
 impl Precision {
     /// The least precision whose cells are smaller than `step` (world units, per axis) in every batch, so that
-    /// rounding to the lattice gives every integer back: what the converter writes where it may choose.
+    /// rounding to the lattice gives every integer back.
     pub fn for_steps<'a>(records: impl IntoIterator<Item = &'a BatchRecord>, step: [f64; 3]) -> Self {
         let enough = |record: &BatchRecord, precision: Self| {
             let cells = f64::from(1u32 << precision.bits());
@@ -45,12 +45,14 @@ impl BatchRecord {
     }
 
     /// q: 30-bit integers of a position relative to the origin that lies in the box.
+    #[must_use]
     pub fn quantize(&self, relative: [f64; 3]) -> [u32; 3] {
         let (corner, sides) = (self.corner(), self.sides());
         std::array::from_fn(|a| quantize(relative[a], corner[a], sides[a]))
     }
 
     /// What turns the words of this batch into positions relative to the origin.
+    #[must_use]
     pub fn decoder(&self, precision: Precision) -> Decoder {
         let cells = f64::from(1u32 << precision.bits());
         // a division by a power of two is exact: whether it comes before or after the product with t + 0.5 is all one
@@ -58,6 +60,7 @@ impl BatchRecord {
     }
 
     /// The position of 30-bit integers, relative to the origin: the middle of the cell that the top bits name.
+    #[must_use]
     pub fn decode(&self, quantized: [u32; 3], precision: Precision) -> [f64; 3] {
         self.decoder(precision).position(quantized)
     }
@@ -86,6 +89,7 @@ pub struct Decoder {
 impl Decoder {
     /// The position of 30-bit integers, relative to the origin.
     #[inline]
+    #[must_use]
     pub fn position(&self, quantized: [u32; 3]) -> [f64; 3] {
         let shift = 30 - self.precision.bits();
         std::array::from_fn(|a| self.axis(a, quantized[a] >> shift))

@@ -13,38 +13,71 @@ use super::{
 
 /// Points in memory, in any order.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Cloud<'a> {
     /// world = X · scale + offset.
     pub lattice: Lattice,
     /// Integers on the lattice: x, y, z, equally long.
     pub positions: [&'a [i64]; 3],
-    /// `r | g<<8 | b<<16`, one a point; the top byte is ignored ([`super::colour_word`], [`super::eight_bit`]).
+    /// `r | g<<8 | b<<16`, one per point; the top byte is ignored ([`super::colour_word`], [`super::eight_bit`]).
     pub colours: &'a [u32],
-    /// Extra attributes with their raw values, little-endian, [`Attribute::size`] bytes a point.
+    /// Extra attributes with their raw values, little-endian, [`Attribute::size`] bytes per point.
     pub attributes: &'a [(Attribute, &'a [u8])],
 }
 
-/// What is asked of the file.
+impl<'a> Cloud<'a> {
+    /// A cloud without extra attributes; [`Self::attributes`] can be set. `colours` are as long as each of `positions`.
+    #[must_use]
+    pub const fn new(lattice: Lattice, positions: [&'a [i64]; 3], colours: &'a [u32]) -> Self {
+        Self { lattice, positions, colours, attributes: &[] }
+    }
+}
+
+/// How a file is written.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct WriteOptions {
     /// Side of the cells of level 0, world units, > 0.
     pub cell: f64,
     /// The planes to write; `None`: those that the lattice needs ([`Precision::for_steps`]).
     pub precision: Option<Precision>,
-    /// What is told of the cloud; [`write()`] fills in attributes and errors.
+    /// The description of the cloud; [`write()`] fills in attributes and errors.
     pub description: Description,
 }
 
 impl WriteOptions {
     /// Cells of 1 unit, as many planes as the lattice needs, colours from the source.
+    #[must_use]
     pub fn new(lattice: Lattice) -> Self {
         let description = Description { colour: ColourSource::Rgb, ..Description::new(lattice) };
         Self { cell: 1.0, precision: None, description }
+    }
+
+    /// Sets [`Self::cell`].
+    #[must_use]
+    pub fn cell(mut self, cell: f64) -> Self {
+        self.cell = cell;
+        self
+    }
+
+    /// Sets [`Self::precision`].
+    #[must_use]
+    pub fn precision(mut self, precision: Precision) -> Self {
+        self.precision = Some(precision);
+        self
+    }
+
+    /// Sets [`Self::description`].
+    #[must_use]
+    pub fn description(mut self, description: Description) -> Self {
+        self.description = description;
+        self
     }
 }
 
 /// What was written.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Written {
     /// The fields of the header.
     pub header: Header,
@@ -66,7 +99,7 @@ pub struct Written {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let lattice = Lattice { scale: [0.001; 3], offset: [500_000.0, 5_400_000.0, 0.0] };
 /// let (x, y, z) = ([0, 250, 1500], [0, 10, 20], [7, 7, 7]);
-/// let cloud = Cloud { lattice, positions: [&x, &y, &z], colours: &[0xff, 0xff00, 0xff_0000], attributes: &[] };
+/// let cloud = Cloud::new(lattice, [&x, &y, &z], &[0xff, 0xff00, 0xff_0000]);
 /// let mut file = std::io::Cursor::new(Vec::new());
 /// write(&mut file, &cloud, &WriteOptions::new(lattice))?;
 ///

@@ -21,7 +21,7 @@ pub fn distance_range(bounds: &Aabb, camera: [f64; 3]) -> [f64; 2] {
 /// How the points of a node are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Material {
-    /// One pixel a point.
+    /// One pixel per point.
     Far,
     /// A disc of the point's radius.
     Near,
@@ -32,6 +32,7 @@ pub enum Material {
 impl Material {
     /// The choice for a box that lies between `d_min` and `d_max` from the camera ([`distance_range`]), if points change
     /// at `switch_distance`.
+    #[must_use]
     pub fn choose([d_min, d_max]: [f64; 2], switch_distance: f64) -> Self {
         if d_min > switch_distance {
             Self::Far
@@ -68,6 +69,7 @@ impl Frustum {
     ///
     /// `forward` and `up`: any length, not parallel. `fov_v`: vertical field of view, radians, below π. `aspect`: width
     /// over height. `near`, `far`: distances along `forward`, world units.
+    #[must_use]
     pub fn perspective(
         position: [f64; 3],
         forward: [f64; 3],
@@ -100,11 +102,13 @@ impl Frustum {
     }
 
     /// True if the point is inside or on the border.
+    #[must_use]
     pub fn contains(&self, p: [f64; 3]) -> bool {
         self.planes.iter().all(|plane| side_of(plane, p) >= 0.0)
     }
 
     /// False if some plane has the whole box outside. As usual a box near an edge may pass though it is out of sight.
+    #[must_use]
     pub fn may_see(&self, bounds: &Aabb) -> bool {
         self.cut(bounds, Self::ALL).is_some()
     }

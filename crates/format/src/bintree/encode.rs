@@ -6,12 +6,14 @@ use super::{CORE_BYTES, RecordLayout};
 
 /// The center of a leaf whose points span `min` to `max`, world coordinates of its least and greatest lattice integers:
 /// (min + max) / 2 per axis, in double.
+#[must_use]
 pub fn leaf_center(min: [f64; 3], max: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|a| (min[a] + max[a]) / 2.0)
 }
 
 /// A class as it is stored: rounded to a whole number; 0 ("never classified") if it is not finite, or beyond ±2^24,
 /// where single precision loses whole numbers.
+#[must_use]
 pub fn class_value(class: f64) -> f32 {
     let rounded = class.round();
     // + 0.0 turns -0 into 0
@@ -67,6 +69,7 @@ impl<'a> LeafEncoder<'a> {
     }
 
     /// The tight box of the decoded points, as the index wants it.
+    #[must_use]
     pub fn finish(self) -> Aabb {
         self.bounds
     }

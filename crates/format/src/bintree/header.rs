@@ -13,10 +13,10 @@ pub(super) const FORMAT: &str = "pointmill-bintree";
 /// What the key `version` says.
 pub(super) const VERSION: u64 = 1;
 
-/// Where the leaves are.
+/// Where the leaves are. Version 1 of the format has these two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
-    /// One file a leaf, named by its path.
+    /// One file per leaf, named by its path.
     Files,
     /// All in `leaves.bin`.
     Packed,
@@ -37,7 +37,7 @@ impl Layout {
 
 named!(Layout, "layout");
 
-/// How splitting planes are found (`docs/formats/bintree.md`, section 6.2).
+/// How splitting planes are found (`docs/formats/bintree.md`, section 6.2). Version 1 of the format has these three.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SplitRule {
     /// At the exact mean, rounded down: the meaning of the format.
@@ -67,6 +67,7 @@ named!(SplitRule, "split rule");
 
 /// Everything in `index.json` but the nodes.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Header {
     /// Program and version that wrote the dataset.
     pub generator: String,
@@ -90,4 +91,25 @@ pub struct Header {
     pub pointmill: Map<String, Value>,
     /// The columns of a leaf record.
     pub record: RecordLayout,
+}
+
+impl Header {
+    /// The header of an unnamed dataset without points: split at the mean, records of the core alone. Set the other
+    /// fields.
+    #[must_use]
+    pub fn new(lattice: Lattice, capacity: u64, layout: Layout) -> Self {
+        Self {
+            generator: String::new(),
+            name: String::new(),
+            points: 0,
+            capacity,
+            layout,
+            split: SplitRule::Mean,
+            origin: [0.0; 3],
+            projection: String::new(),
+            lattice,
+            pointmill: Map::new(),
+            record: RecordLayout::core(),
+        }
+    }
 }

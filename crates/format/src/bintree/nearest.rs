@@ -13,6 +13,7 @@ use super::{Bintree, NodeKind};
 
 /// A leaf in an R*-tree: its tight box and its index.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct LeafBox {
     /// World coordinates.
     pub bounds: Aabb,
@@ -36,6 +37,7 @@ impl PointDistance for LeafBox {
 
 /// A point near another one.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Neighbour {
     /// World coordinates, as [`Bintree::read_leaf`] gives them.
     pub position: [f64; 3],
@@ -66,7 +68,7 @@ impl PartialOrd for Neighbour {
 
 /// Finds the nearest points to any place, whatever leaves they are in, and keeps leaves in memory.
 ///
-/// The leaves' boxes are in an R*-tree, which can also be asked by itself: [`Self::leaf_boxes`].
+/// The leaves' boxes are in an R*-tree, which can also be queried directly: [`Self::leaf_boxes`].
 #[derive(Debug)]
 pub struct NearestPoints {
     tree: Arc<Bintree>,
@@ -75,21 +77,22 @@ pub struct NearestPoints {
 }
 
 impl NearestPoints {
-    /// Loads the boxes of all leaves. Leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes a
-    /// point and a little.
+    /// Loads the boxes of all leaves. Leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes
+    /// per point and a little.
+    #[must_use]
     pub fn new(tree: Arc<Bintree>, cache_bytes: usize) -> Self {
         let leaf_box = |leaf| Some(LeafBox { bounds: tree.node(leaf)?.bounds, leaf });
         let boxes = RTree::bulk_load(tree.leaves().filter_map(leaf_box).collect());
         Self { boxes, tree, cache: LeafCache::new(cache_bytes) }
     }
 
-    /// The boxes of all leaves, for queries of the caller's own.
+    /// The boxes of all leaves, for other queries.
     pub fn leaf_boxes(&self) -> &RTree<LeafBox> {
         &self.boxes
     }
 
     /// The `count` points nearest to `place` (world coordinates), nearest first; of equally far ones those of the lowest
-    /// leaf and index. Fewer if there are not so many within `max_distance` (world units, may be infinite).
+    /// leaf and index. Fewer if there are not enough within `max_distance` (world units, may be infinite).
     ///
     /// # Errors
     /// A leaf that cannot be read ([`Bintree::read_leaf`]).

@@ -1,4 +1,4 @@
-//! A node as the index tells it.
+//! A node as the index describes it.
 
 use std::fmt::{self, Write as _};
 
@@ -19,6 +19,7 @@ pub(super) const MAX_NAMED_DEPTH: usize = 250;
 
 /// A node. Its index in preorder is not part of it: the low child of node `i` is `i + 1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Node {
     /// The tight box, world coordinates: of a leaf that of its decoded points, else the union of its children's.
     pub bounds: Aabb,
@@ -28,7 +29,7 @@ pub struct Node {
     pub kind: NodeKind,
 }
 
-/// What a node is.
+/// What a node is. Version 1 of the format has these three.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NodeKind {
     /// Split by a plane.
@@ -55,7 +56,13 @@ pub enum NodeKind {
 }
 
 impl Node {
-    /// True if the node has points of its own.
+    /// A node. `bounds`: world coordinates; `count`: points at and below it.
+    #[must_use]
+    pub const fn new(bounds: Aabb, count: u64, kind: NodeKind) -> Self {
+        Self { bounds, count, kind }
+    }
+
+    /// True if the node has points itself.
     pub const fn is_leaf(&self) -> bool {
         matches!(self.kind, NodeKind::Leaf { .. })
     }

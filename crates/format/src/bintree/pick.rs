@@ -33,6 +33,7 @@ pub struct Ray {
 impl Ray {
     /// `origin` in world coordinates, `direction` of any length, `radius` ≥ 0 in world units. Nothing if a number is
     /// not finite or the direction has no length.
+    #[must_use]
     pub fn new(origin: [f64; 3], direction: [f64; 3], radius: f64) -> Option<Self> {
         // Scaled first, so that no square overflows or vanishes.
         let largest = direction.iter().fold(0.0, |l: f64, v| l.max(v.abs()));
@@ -95,6 +96,7 @@ impl Ray {
 
 /// A point that a ray met.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Hit {
     /// World coordinates, as [`Bintree::read_leaf`] gives them.
     pub position: [f64; 3],
@@ -137,8 +139,9 @@ pub struct Picker {
 }
 
 impl Picker {
-    /// A picker whose leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes a point and a
-    /// little.
+    /// A picker whose leaves take at most `cache_bytes` of memory (but at least one leaf): 16 bytes per point and
+    /// a little.
+    #[must_use]
     pub fn new(tree: Arc<Bintree>, cache_bytes: usize) -> Self {
         Self { tree, cache: LeafCache::new(cache_bytes) }
     }

@@ -8,6 +8,7 @@ use super::{Bintree, Node};
 
 impl Bintree {
     /// The leaves of which something may be in sight, in preorder.
+    #[must_use]
     pub fn leaves_in_frustum(&self, frustum: &Frustum) -> Vec<u32> {
         let mut leaves = Vec::new();
         self.descend(Frustum::ALL, |index, node, planes| {
@@ -21,6 +22,7 @@ impl Bintree {
     }
 
     /// The leaves whose boxes touch `bounds` (closed), in preorder.
+    #[must_use]
     pub fn leaves_in_box(&self, bounds: &Aabb) -> Vec<u32> {
         let mut leaves = Vec::new();
         self.descend((), |index, node, ()| {
@@ -33,21 +35,21 @@ impl Bintree {
         leaves
     }
 
-    /// Reads the leaves that touch `bounds` and tells every point in it (closed): leaf, the leaf's points, index among
-    /// them. Leaves come in preorder, points as they are stored.
+    /// Reads the leaves that touch `bounds` and reports every point in it (closed): leaf, the leaf's points, index
+    /// among them. Leaves come in preorder, points as they are stored.
     ///
     /// # Errors
-    /// As [`Self::read_leaf`]; points of leaves before were told by then.
+    /// As [`Self::read_leaf`]; points of earlier leaves were reported by then.
     pub fn points_in_box(
         &self,
         bounds: &Aabb,
         scratch: &mut NodePoints,
-        mut tell: impl FnMut(u32, &NodePoints, usize),
+        mut report: impl FnMut(u32, &NodePoints, usize),
     ) -> Result<(), ReadError> {
         for leaf in self.leaves_in_box(bounds) {
             self.read_leaf(leaf, scratch)?;
             let inside = |i: &usize| scratch.world(*i).is_some_and(|p| bounds.contains(p));
-            (0..scratch.len()).filter(inside).for_each(|i| tell(leaf, scratch, i));
+            (0..scratch.len()).filter(inside).for_each(|i| report(leaf, scratch, i));
         }
         Ok(())
     }
@@ -56,6 +58,7 @@ impl Bintree {
     ///
     /// `switch_distance`: see [`super::switch_distance`]. One pass over the part of the tree that is in sight; below a
     /// node that is far or near as a whole nothing is measured.
+    #[must_use]
     pub fn draw_list(&self, camera: [f64; 3], switch_distance: f64, frustum: Option<&Frustum>) -> Vec<(u32, Material)> {
         let mut list = Vec::new();
         self.descend((Frustum::ALL, Material::Both), |index, node, (planes, material)| {

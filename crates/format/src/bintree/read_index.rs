@@ -17,7 +17,7 @@ pub(super) fn read_index(source: &dyn ByteSource) -> Result<(Header, Vec<Node>),
             Fault::Broken(at, what) => ReadError::broken(path, at, what).advise(advice),
             Fault::Unsupported(at, what) => ReadError::unsupported(path, what).at(at),
             Fault::Io(e) => ReadError::io(path, "reading", e)
-                .advise("a binary tree is a folder with index.json and leaves.bin or one file a leaf"),
+                .advise("a binary tree is a folder with index.json and leaves.bin or one file per leaf"),
         }
     })
 }

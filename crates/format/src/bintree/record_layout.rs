@@ -7,11 +7,12 @@ pub const CORE_BYTES: usize = 16;
 
 const CORE: [&str; 4] = ["x", "y", "z", "classification"];
 
-/// More elements a point than any attribute has; keeps a bad count from asking for memory.
+/// More elements per point than any attribute has; keeps a bad count from requesting memory.
 const MAX_ELEMENTS: usize = 256;
 
 /// A column and its place in the record.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PlacedAttribute {
     /// Name, type, elements; scale and offset of its values. The index keeps neither descriptions nor no-data values.
     pub attribute: Attribute,
@@ -28,6 +29,7 @@ pub struct RecordLayout {
 
 impl RecordLayout {
     /// The core alone: 16 bytes.
+    #[must_use]
     pub const fn core() -> Self {
         Self { extras: Vec::new(), stride: CORE_BYTES }
     }
@@ -52,7 +54,7 @@ impl RecordLayout {
         Self::from_places(placed, end.next_multiple_of(widest)).map_err(WriteError::Input)
     }
 
-    /// Columns behind the core at the places that an index tells.
+    /// Columns behind the core at the places that an index gives.
     pub(super) fn from_places(extras: Vec<PlacedAttribute>, stride: usize) -> Result<Self, String> {
         let mut end = CORE_BYTES;
         let mut names = std::collections::HashSet::from(CORE);

@@ -91,6 +91,7 @@ impl Bintree {
     /// # Ok(())
     /// # }
     /// ```
+    #[must_use]
     pub fn path(&self, index: u32) -> NodePath {
         let (mut path, mut at) = (Vec::new(), 0);
         while at < index
@@ -118,7 +119,7 @@ impl Bintree {
     /// An index that is no leaf's; a file that is missing, or not as long as the leaf's points.
     pub fn read_leaf_bytes(&self, index: u32, out: &mut Vec<u8>) -> Result<(), ReadError> {
         let Some(&Node { kind: NodeKind::Leaf { start, .. }, count, .. }) = self.node(index) else {
-            let what = format!("node {index} is no leaf: it has no points of its own");
+            let what = format!("node {index} is no leaf: only leaves have points");
             return Err(ReadError::unsupported(self.locate(INDEX_FILE), what));
         };
         out.clear();

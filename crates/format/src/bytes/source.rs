@@ -86,7 +86,7 @@ const KEPT_FILES: usize = 4;
 
 /// A dataset in a folder, read with positioned reads: threads share it without a lock.
 ///
-/// The first four files that are asked for stay open, others are open while they are read. Names with a path in them
+/// The first four files requested stay open, others are open while they are read. Names with a path in them
 /// are refused, so that a hostile index does not lead out of the folder.
 #[derive(Debug)]
 pub struct Folder {
@@ -96,6 +96,7 @@ pub struct Folder {
 
 impl Folder {
     /// The dataset in the folder `path`; nothing is opened yet.
+    #[must_use]
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), kept: [const { OnceLock::new() }; KEPT_FILES] }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What the user can do. A program with options of its own matches on it and names them; others print it.
+/// What the user can do. A program that has options matches on it and names them; others print it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Advice {

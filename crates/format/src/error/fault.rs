@@ -76,7 +76,7 @@ pub enum Fault {
     },
     /// A request for a piece that the scan does not have.
     NoSuchPiece {
-        /// The number that was asked for, from 0.
+        /// The number requested, from 0.
         piece: usize,
         /// Pieces of the scan.
         pieces: usize,

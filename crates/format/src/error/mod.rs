@@ -90,6 +90,7 @@ impl ReadError {
     }
 
     /// [`Self::kind`], by value: the error of the operating system can be taken out.
+    #[must_use]
     pub fn into_kind(self) -> ErrorKind {
         self.0.kind
     }

@@ -48,16 +48,19 @@ impl Aabb {
     }
 
     /// True if `p` lies inside or on the border.
+    #[must_use]
     pub fn contains(&self, p: [f64; 3]) -> bool {
         (0..3).all(|a| self.min[a] <= p[a] && p[a] <= self.max[a])
     }
 
     /// Side lengths: x, y, z.
+    #[must_use]
     pub fn extent(&self) -> [f64; 3] {
         std::array::from_fn(|a| self.max[a] - self.min[a])
     }
 
     /// The midpoint.
+    #[must_use]
     pub fn center(&self) -> [f64; 3] {
         std::array::from_fn(|a| self.min[a] + 0.5 * (self.max[a] - self.min[a]))
     }

@@ -20,11 +20,13 @@ pub struct Lattice {
 
 impl Lattice {
     /// The world coordinates of a lattice point.
+    #[must_use]
     pub fn world(&self, quantized: [i64; 3]) -> [f64; 3] {
         std::array::from_fn(|a| quantized[a] as f64 * self.scale[a] + self.offset[a])
     }
 
     /// The nearest lattice coordinate on `axis`; saturates at the ends of `i64`, NaN gives 0.
+    #[must_use]
     pub fn quantize(&self, axis: usize, world: f64) -> i64 {
         ((world - self.offset[axis]) / self.scale[axis]).round() as i64
     }

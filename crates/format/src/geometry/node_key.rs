@@ -39,6 +39,7 @@ impl NodeKey {
     pub const MAX_LEVEL: u8 = 31;
 
     /// The child with index `child` (0–7; x is bit 2, y bit 1, z bit 0), or `None` below [`Self::MAX_LEVEL`].
+    #[must_use]
     pub fn child(self, child: u8) -> Option<Self> {
         (self.level < Self::MAX_LEVEL && child < 8).then(|| Self {
             level: self.level + 1,
@@ -49,6 +50,7 @@ impl NodeKey {
     }
 
     /// The parent, or `None` for the root.
+    #[must_use]
     pub fn parent(self) -> Option<Self> {
         (self.level > 0).then(|| Self { level: self.level - 1, x: self.x >> 1, y: self.y >> 1, z: self.z >> 1 })
     }
@@ -59,12 +61,14 @@ impl NodeKey {
     }
 
     /// The ancestor at `level` (itself if `level` is its own), or `None` if `level` is deeper than this node.
+    #[must_use]
     pub fn ancestor(self, level: u8) -> Option<Self> {
         let up = self.level.checked_sub(level)?;
         Some(Self { level, x: self.x >> up, y: self.y >> up, z: self.z >> up })
     }
 
     /// Parses a Potree name: `r` and one digit 0–7 per level.
+    #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let digits = name.strip_prefix('r')?;
         digits.bytes().try_fold(Self::ROOT, |key, b| key.child(b.checked_sub(b'0').filter(|d| *d < 8)?))

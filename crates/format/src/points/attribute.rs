@@ -97,6 +97,7 @@ impl FromStr for AttributeType {
 /// Stored values are raw; the meant value of element `e` is `raw · scale[e] + offset[e]` (LAS extra bytes), 1 and 0
 /// for everything else.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Attribute {
     /// Unique in its cloud; the field's usual names ("intensity", "gps-time", "rgb"; `docs/formats/potree2.md`).
     pub name: String,
@@ -116,6 +117,7 @@ pub struct Attribute {
 
 impl Attribute {
     /// An attribute whose raw values are the meant ones.
+    #[must_use]
     pub fn new(name: impl Into<String>, ty: AttributeType, elements: usize) -> Self {
         Self {
             name: name.into(),

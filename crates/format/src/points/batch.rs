@@ -45,6 +45,7 @@ impl Positions {
 /// # Ok::<(), &str>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PointBatch {
     /// Index in the scan of the first point.
     pub first_point: u64,
@@ -58,6 +59,7 @@ pub struct PointBatch {
 
 impl PointBatch {
     /// A batch with an empty column per attribute.
+    #[must_use]
     pub fn new(first_point: u64, positions: Positions, attributes: impl Into<Arc<[Attribute]>>) -> Self {
         let attributes = attributes.into();
         let columns = attributes.iter().map(|a| Column::new(a.ty)).collect();

@@ -39,6 +39,7 @@ macro_rules! with_column {
 
 impl Column {
     /// An empty column of that type.
+    #[must_use]
     pub fn new(ty: AttributeType) -> Self {
         match ty {
             AttributeType::Int8 => Self::Int8(Vec::new()),

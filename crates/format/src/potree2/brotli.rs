@@ -29,7 +29,7 @@ pub(super) enum Fault {
     Corrupt,
     /// The stream ends early or gives less: this many bytes.
     Short(usize),
-    /// The stream would give more than was asked for, or more bytes follow its end.
+    /// The stream would give more than requested, or more bytes follow its end.
     Long,
 }
 

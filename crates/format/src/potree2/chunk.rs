@@ -56,7 +56,7 @@ pub(super) struct ChunkRanges {
 }
 
 impl ChunkRanges {
-    /// Adds the chunk of `root`, or tells which chunk lies there already.
+    /// Adds the chunk of `root`, or reports which chunk is there already.
     pub(super) fn claim(&mut self, root: NodeKey, start: u64, size: u64, path: &Path) -> Result<(), ReadError> {
         let end = start.saturating_add(size);
         if let Some((_, (other_end, other))) = self.by_start.range(..end).next_back()

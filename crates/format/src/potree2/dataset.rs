@@ -14,7 +14,7 @@ use super::{Encoding, HIERARCHY_FILE, METADATA_FILE, Metadata, Node, NodeRecord,
 /// More JSON than this is not metadata.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
 
-/// No Brotli stream gives more bytes than this for each of its own: a meta-block gives at most 16 MiB and has a header
+/// No Brotli stream gives more bytes than this per compressed byte: a meta-block gives at most 16 MiB and has a header
 /// of more than a byte (RFC 7932, section 9.2).
 const MAX_BROTLI_RATIO: u64 = 1 << 24;
 
@@ -161,7 +161,7 @@ impl Dataset {
         let Node { key, record } = *node;
         let path = self.locate(OCTREE_FILE);
         if record.is_proxy() {
-            let what = format!("node {key} is a proxy: its payload is told by its own hierarchy chunk");
+            let what = format!("node {key} is a proxy: its hierarchy chunk describes the payload");
             return Err(ReadError::unsupported(path, what));
         }
         out.clear();

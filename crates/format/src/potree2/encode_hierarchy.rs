@@ -10,6 +10,7 @@ use super::{Node, NodeRecord, NodeType};
 
 /// A node to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct NodeEntry {
     /// Its address.
     pub key: NodeKey,
@@ -21,6 +22,14 @@ pub struct NodeEntry {
     pub byte_size: u64,
 }
 
+impl NodeEntry {
+    /// The node `key` with `points` points, whose payload is `byte_size` bytes of `octree.bin`, from `byte_offset` on.
+    #[must_use]
+    pub const fn new(key: NodeKey, points: u32, byte_offset: u64, byte_size: u64) -> Self {
+        Self { key, points, byte_offset, byte_size }
+    }
+}
+
 impl From<&Node> for NodeEntry {
     fn from(node: &Node) -> Self {
         let NodeRecord { points, byte_offset, byte_size, .. } = node.record;
@@ -30,6 +39,7 @@ impl From<&Node> for NodeEntry {
 
 /// What [`encode_hierarchy`] made.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct HierarchyBytes {
     /// The contents of `hierarchy.bin`.
     pub bytes: Vec<u8>,
@@ -45,6 +55,7 @@ pub struct HierarchyBytes {
 /// `nodes`: each key once, in any order; they are sorted by level and name. Child masks and types come from the keys:
 /// type 0 with children, 1 without. A node at the border of a chunk becomes a proxy only if it has children. Ancestors
 /// that are missing are added as nodes without points, so the result is a valid hierarchy whatever is passed.
+#[must_use]
 pub fn encode_hierarchy(nodes: &mut [NodeEntry], step_size: u32) -> HierarchyBytes {
     nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
     if let Some(tree) = Tree::link(nodes) {

@@ -5,10 +5,11 @@ use crate::{Aabb, Attribute, Lattice, NodeKey};
 
 /// How the payloads in `octree.bin` are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Encoding {
     /// `DEFAULT`: interleaved records of [`Metadata::record_len`] bytes.
     Default,
-    /// `BROTLI`: one Brotli stream a node, planar, in Morton order, positions and colours as Morton codes.
+    /// `BROTLI`: one Brotli stream per node, planar, in Morton order, positions and colours as Morton codes.
     Brotli,
 }
 
@@ -29,6 +30,7 @@ named!(Encoding, "encoding");
 
 /// An attribute and what its values are like.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct AttributeStats {
     /// Name, type, scale and offset.
     pub attribute: Attribute,
@@ -38,6 +40,14 @@ pub struct AttributeStats {
     pub max: Vec<f64>,
     /// Number of points for each of the 256 values of a one-byte attribute.
     pub histogram: Option<Vec<u64>>,
+}
+
+impl AttributeStats {
+    /// An attribute of whose values nothing is known.
+    #[must_use]
+    pub const fn new(attribute: Attribute) -> Self {
+        Self { attribute, min: Vec::new(), max: Vec::new(), histogram: None }
+    }
 }
 
 /// The contents of `metadata.json`.
@@ -59,6 +69,7 @@ pub struct AttributeStats {
 /// # }
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Metadata {
     /// Name of the cloud.
     pub name: String,
@@ -70,9 +81,9 @@ pub struct Metadata {
     pub projection: String,
     /// Bytes of the chunk at the start of `hierarchy.bin`.
     pub first_chunk_size: u64,
-    /// Levels a hierarchy chunk.
+    /// Levels per hierarchy chunk.
     pub step_size: u32,
-    /// The deepest level that has a node (root = 0); PotreeConverter 2 often tells less.
+    /// The deepest level that has a node (root = 0); PotreeConverter 2 often writes less.
     pub depth: u32,
     /// `world = stored · scale + offset`.
     pub lattice: Lattice,
@@ -89,17 +100,41 @@ pub struct Metadata {
 }
 
 impl Metadata {
-    /// Bytes a point in DEFAULT encoding.
+    /// The metadata of an unnamed cloud without points: encoding DEFAULT, hierarchy chunks of 4 levels. Set the other
+    /// fields.
+    ///
+    /// `cube`, `spacing` of the root: world units. `attributes`: in the order of the bytes, `position` among them.
+    #[must_use]
+    pub fn new(lattice: Lattice, cube: Aabb, spacing: f64, attributes: Vec<AttributeStats>) -> Self {
+        Self {
+            name: String::new(),
+            description: String::new(),
+            points: 0,
+            projection: String::new(),
+            first_chunk_size: 0,
+            step_size: 4,
+            depth: 0,
+            lattice,
+            spacing,
+            cube,
+            encoding: Encoding::Default,
+            attributes,
+            extra: serde_json::Map::new(),
+        }
+    }
+
+    /// Bytes per point in DEFAULT encoding.
     pub fn record_len(&self) -> usize {
         self.attributes.iter().map(|a| a.attribute.size()).sum()
     }
 
-    /// Bytes a point in a decompressed BROTLI payload: 16 for `position`, 8 for `rgb`, else as in DEFAULT.
+    /// Bytes per point in a decompressed BROTLI payload: 16 for `position`, 8 for `rgb`, else as in DEFAULT.
     pub fn planar_len(&self) -> usize {
         self.attributes.iter().map(|a| planar_size(&a.attribute)).sum()
     }
 
     /// The box of a node: the cube halved [`NodeKey::level`] times, as viewers do it.
+    #[must_use]
     pub fn node_cube(&self, key: NodeKey) -> Aabb {
         let mut cube = self.cube;
         for level in (0..key.level).rev() {
@@ -116,6 +151,7 @@ impl Metadata {
     }
 
     /// Spacing of the nodes of `level`, world units: halves with every level.
+    #[must_use]
     pub fn spacing_at(&self, level: u8) -> f64 {
         self.spacing * (-f64::from(level)).exp2()
     }
@@ -135,7 +171,7 @@ impl Metadata {
     }
 }
 
-/// Bytes a point of one attribute in a decompressed BROTLI payload.
+/// Bytes per point of one attribute in a decompressed BROTLI payload.
 pub(super) fn planar_size(attribute: &Attribute) -> usize {
     match attribute.name.as_str() {
         "position" => 16,
@@ -149,21 +185,8 @@ mod tests {
     use super::*;
 
     fn unit_cube() -> Metadata {
-        Metadata {
-            name: String::new(),
-            description: String::new(),
-            points: 0,
-            projection: String::new(),
-            first_chunk_size: 22,
-            step_size: 4,
-            depth: 0,
-            lattice: Lattice { scale: [1.0; 3], offset: [0.0; 3] },
-            spacing: 8.0,
-            cube: Aabb { min: [0.0; 3], max: [16.0; 3] },
-            encoding: Encoding::Default,
-            attributes: Vec::new(),
-            extra: serde_json::Map::new(),
-        }
+        let lattice = Lattice { scale: [1.0; 3], offset: [0.0; 3] };
+        Metadata::new(lattice, Aabb { min: [0.0; 3], max: [16.0; 3] }, 8.0, Vec::new())
     }
 
     #[test]

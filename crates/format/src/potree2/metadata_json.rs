@@ -10,6 +10,7 @@ impl Metadata {
     /// The text of `metadata.json`, with all keys that PotreeConverter 2.1 writes and then [`Self::extra`].
     ///
     /// Doubles come back bit for bit. JSON has neither NaN nor infinities: they become 0 and ±[`f64::MAX`].
+    #[must_use]
     pub fn to_json(&self) -> String {
         to_json(self)
     }

@@ -8,7 +8,7 @@ use crate::{Aabb, Attribute, AttributeType, Lattice, ReadError};
 
 use super::{AttributeStats, Encoding, Metadata};
 
-/// More elements a point than any attribute has; keeps a bad count from asking for memory.
+/// More elements per point than any attribute has; keeps a bad count from requesting memory.
 const MAX_ELEMENTS: u64 = 256;
 
 impl Metadata {

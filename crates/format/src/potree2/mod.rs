@@ -22,7 +22,7 @@
 //! ```
 //!
 //! Nothing found in a file is trusted: ranges are checked against the file, the tree is free of cycles, and memory is
-//! asked for only where bytes are there to fill it. What PotreeConverter 2 wrote is read, its faults included.
+//! allocated only where bytes are there to fill it. What PotreeConverter 2 wrote is read, its faults included.
 //!
 //! For writing there are [`Metadata::to_json`], [`encode_hierarchy`] and [`encode_brotli`]; where the payloads lie in
 //! `octree.bin` is the writer's choice.

@@ -2,15 +2,15 @@
 
 use crate::NodeKey;
 
-/// What the first byte of a record says. Do not tell inner nodes from leaves by it: PotreeConverter 2 marks most inner
-/// nodes as leaves; [`NodeRecord::child_mask`] is right.
+/// What the first byte of a record says; the format has these three. Do not distinguish inner nodes from leaves by it:
+/// PotreeConverter 2 marks most inner nodes as leaves; [`NodeRecord::child_mask`] is right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NodeType {
     /// An inner node.
     Normal = 0,
     /// A node without children.
     Leaf = 1,
-    /// A stand-in: the node and its descendants are in a chunk of their own.
+    /// A stand-in: the node and its descendants are in a separate chunk.
     Proxy = 2,
 }
 
@@ -34,6 +34,7 @@ impl NodeRecord {
     pub const LEN: usize = 22;
 
     /// Reads a record.
+    #[must_use]
     pub fn from_bytes(bytes: &[u8; Self::LEN]) -> Self {
         let [node_type, child_mask, p0, p1, p2, p3, o0, o1, o2, o3, o4, o5, o6, o7, s0, s1, s2, s3, s4, s5, s6, s7] =
             *bytes;
@@ -47,6 +48,7 @@ impl NodeRecord {
     }
 
     /// The bytes of a record.
+    #[must_use]
     pub fn to_bytes(&self) -> [u8; Self::LEN] {
         let mut bytes = [0; Self::LEN];
         bytes[0] = self.node_type;
@@ -57,7 +59,7 @@ impl NodeRecord {
         bytes
     }
 
-    /// True if the node stands in a chunk of its own.
+    /// True if the node is in a separate chunk.
     pub const fn is_proxy(&self) -> bool {
         self.node_type == NodeType::Proxy as u8
     }
@@ -70,11 +72,20 @@ impl NodeRecord {
 
 /// A node of the octree and its record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Node {
     /// Its address.
     pub key: NodeKey,
     /// Its record, as stored where it was found.
     pub record: NodeRecord,
+}
+
+impl Node {
+    /// The node of that address and record.
+    #[must_use]
+    pub const fn new(key: NodeKey, record: NodeRecord) -> Self {
+        Self { key, record }
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! What is known of a scan before its points are decoded.
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -19,6 +20,7 @@ pub struct Crs {
 
 impl Crs {
     /// What is known: WKT text, code of the (projected) system, code of the vertical one.
+    #[must_use]
     pub fn new(wkt: Option<String>, epsg: Option<u32>, vertical_epsg: Option<u32>) -> Self {
         Self { wkt, epsg, vertical_epsg }
     }
@@ -54,6 +56,7 @@ pub struct ScanInfo {
 
 impl ScanInfo {
     /// A scan of which nothing else is known: world coordinates in double precision, without attributes.
+    #[must_use]
     pub fn new(path: impl Into<PathBuf>, format: impl Into<String>, points_declared: u64) -> Self {
         Self {
             path: path.into(),
@@ -104,6 +107,7 @@ pub struct ScanPart {
 
 /// A part of a scan that decodes without any other part.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Piece {
     /// Index in the scan of the first point.
     pub first_point: u64,
@@ -113,4 +117,17 @@ pub struct Piece {
     pub byte_offset: u64,
     /// How many there are.
     pub byte_len: u64,
+}
+
+impl Piece {
+    /// The piece of the points `points` (indices in the scan), stored in the bytes `bytes` (places in the file).
+    #[must_use]
+    pub const fn new(points: Range<u64>, bytes: Range<u64>) -> Self {
+        Self {
+            first_point: points.start,
+            points: points.end.saturating_sub(points.start),
+            byte_offset: bytes.start,
+            byte_len: bytes.end.saturating_sub(bytes.start),
+        }
+    }
 }

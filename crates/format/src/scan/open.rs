@@ -8,10 +8,10 @@ use std::str::FromStr;
 
 use crate::{Advice, Fault, ReadError, Scan, UnknownName};
 
-/// Bytes from the start of a file that tell its kind, at most; text needs some lines.
+/// Maximum bytes from the start of a file to detect its kind; text needs some lines.
 const SNIFF_BYTES: u64 = 4 << 10;
 
-/// The kinds of scans that are told apart by content.
+/// The kinds of scans, detected by content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ScanKind {
@@ -97,6 +97,7 @@ impl ScanKind {
 
     /// The kind of a file that starts with these bytes (give some kB, or the whole file if it is shorter).
     #[allow(unused_variables)] // a build without readers asks nothing
+    #[must_use]
     pub fn of(first_bytes: &[u8]) -> Option<Self> {
         #[cfg(feature = "las")]
         if crate::scan::las::is_las(first_bytes) {
@@ -172,6 +173,7 @@ impl FromStr for ScanKind {
 }
 
 /// What this build reads, for people: "LAS, LAZ, E57, …".
+#[must_use]
 pub fn supported_scans() -> String {
     let kinds = [
         (cfg!(feature = "las"), "LAS, LAZ"),
@@ -225,7 +227,7 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
     }
 }
 
-/// The endings of scans. They never tell what a file is, but that it was to be one.
+/// The extensions of scans. They never decide the kind, but show that a file was meant to be a scan.
 const ENDINGS: [&str; 11] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "off", "xyz", "asc", "csv"];
 
 /// Why a file of no kind is refused: as no scan at all, or as one of which too little is left.
@@ -269,7 +271,7 @@ mod tests {
     use crate::ErrorKind;
 
     #[test]
-    fn content_alone_tells_the_kind_of_every_fixture() {
+    fn the_kind_of_every_fixture_is_detected_by_content_alone() {
         for fixture in SCAN_FOLDERS.iter().flat_map(|folder| scan_fixtures(folder)) {
             let kind = ScanKind::of_file(&fixture.path).unwrap().map(|k| k.name());
             assert_eq!(kind, Some(fixture.kind), "{}", fixture.name);

@@ -25,11 +25,13 @@ pub struct Wanted {
 
 impl Wanted {
     /// Everything.
+    #[must_use]
     pub fn all(info: &ScanInfo) -> Self {
         Self { columns: vec![true; info.attributes.len()] }
     }
 
     /// Positions alone.
+    #[must_use]
     pub fn positions(info: &ScanInfo) -> Self {
         Self { columns: vec![false; info.attributes.len()] }
     }
@@ -85,7 +87,7 @@ pub struct UnknownAttribute {
 }
 
 impl UnknownAttribute {
-    /// The name that was asked for.
+    /// The name requested.
     pub fn name(&self) -> &str {
         &self.name
     }

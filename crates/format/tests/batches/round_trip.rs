@@ -3,8 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use pointmill_format::batches::{
-    AlignedBytes, BATCH_POINTS, BatchRecord, BatchScratch, Batches, Grid, LOD_LEVELS, Precision, WriteOptions, lod_of,
-    rgb_of,
+    AlignedBytes, BATCH_POINTS, BatchRecord, BatchScratch, Batches, Grid, LOD_LEVELS, Precision, lod_of, rgb_of,
 };
 use pointmill_format::{Lattice, NodePoints};
 
@@ -19,7 +18,7 @@ fn bound(record: &BatchRecord, precision: Precision) -> [f64; 3] {
 /// Writes with three planes, reads, and checks all promises that the source's integers can be held against.
 #[track_caller]
 fn assert_promises(cloud: &Points, cell: f64) -> Batches<AlignedBytes> {
-    let options = WriteOptions { precision: Some(Precision::Thirty), ..cloud.options(cell) };
+    let options = cloud.options(cell).precision(Precision::Thirty);
     let (bytes, written) = cloud.write(&options);
     let batches = open(&bytes).unwrap();
     assert_eq!(batches.header(), &written.header);
@@ -69,9 +68,9 @@ fn assert_promises(cloud: &Points, cell: f64) -> Batches<AlignedBytes> {
     assert!(left.values().all(Vec::is_empty), "every point once");
     assert_eq!(lods, written.lod_points);
     for precision in Precision::ALL {
-        let told = batches.description().errors.get(precision).unwrap();
-        assert_eq!(told.max, largest.get(&precision.bits()).copied().unwrap_or_default());
-        assert!((0..3).all(|a| told.rms[a] <= told.max[a]));
+        let stored = batches.description().errors.get(precision).unwrap();
+        assert_eq!(stored.max, largest.get(&precision.bits()).copied().unwrap_or_default());
+        assert!((0..3).all(|a| stored.rms[a] <= stored.max[a]));
     }
     assert_levels(cloud, &batches, cell);
     batches
@@ -158,9 +157,9 @@ fn points_on_the_borders_of_cells_and_boxes_keep_the_promises_and_attain_the_bou
     assert_eq!(batches.header().points, 33 * 33 * 9);
     let sides = batches.records()[0].sides();
     for precision in Precision::ALL {
-        let told = batches.description().errors.get(precision).unwrap().max;
+        let stored = batches.description().errors.get(precision).unwrap().max;
         assert_eq!(
-            told,
+            stored,
             sides.map(|s| s / f64::from(2u32 << precision.bits())),
             "a corner of the box errs by half a cell"
         );
@@ -205,7 +204,7 @@ fn planes_that_say_nothing_are_left_out_and_the_integers_still_come_back() {
 
 #[test]
 fn attributes_follow_their_points() {
-    // the intensity tells which point it is, the class is x
+    // the intensity identifies the point, the class is x
     let mut cloud = Points::empty(MILLIMETRES, true);
     for i in 0..30_000u32 {
         let x = i64::from(i.wrapping_mul(2_654_435_761) >> 24);
@@ -279,7 +278,7 @@ fn buffers_that_are_not_aligned_are_refused_with_advice() {
 #[test]
 fn iterating_undoes_the_swap_and_storage_order_does_not() {
     let cloud = Points::random(18, 6 * 10_240 + 1, [9_000; 3], false, MILLIMETRES);
-    let (bytes, _) = cloud.write(&WriteOptions { precision: Some(Precision::Thirty), ..cloud.options(1.0) });
+    let (bytes, _) = cloud.write(&cloud.options(1.0).precision(Precision::Thirty));
     let batches = open(&bytes).unwrap();
     let grid = batches.header().grid;
     let mut points: Vec<_> = batches.points_in_morton_order(Precision::Thirty).map(Result::unwrap).collect();

@@ -62,17 +62,14 @@ impl Points {
     }
 
     pub(crate) fn options(&self, cell: f64) -> WriteOptions {
-        WriteOptions { cell, ..WriteOptions::new(self.lattice) }
+        WriteOptions::new(self.lattice).cell(cell)
     }
 
     pub(crate) fn write(&self, options: &WriteOptions) -> (Vec<u8>, Written) {
         let attributes: Vec<_> = self.attributes.iter().map(|(a, v)| (a.clone(), v.as_slice())).collect();
-        let cloud = Cloud {
-            lattice: self.lattice,
-            positions: [&self.positions[0], &self.positions[1], &self.positions[2]],
-            colours: &self.colours,
-            attributes: &attributes,
-        };
+        let [x, y, z] = &self.positions;
+        let mut cloud = Cloud::new(self.lattice, [x, y, z], &self.colours);
+        cloud.attributes = &attributes;
         let mut file = Cursor::new(Vec::new());
         let written = write(&mut file, &cloud, options).unwrap();
         assert_eq!(written.bytes, file.get_ref().len() as u64);

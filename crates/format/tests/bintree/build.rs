@@ -3,13 +3,12 @@
 use std::cmp::Ordering;
 
 use pointmill_format::bintree::{
-    CORE_BYTES, Header, IndexWriter, Layout, LeafEncoder, Node, NodeKind, RecordLayout, SplitRule, leaf_center,
-    leaf_file_name,
+    CORE_BYTES, Header, IndexWriter, Layout, LeafEncoder, Node, NodeKind, SplitRule, leaf_center, leaf_file_name,
 };
 use pointmill_format::bytes::Memory;
 use pointmill_format::{Aabb, Lattice};
 
-/// A lattice point; `id` tells everything else of it.
+/// A lattice point; `id` gives everything else of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point {
     pub(crate) q: [i32; 3],
@@ -34,19 +33,9 @@ pub(crate) struct Built {
 
 /// A header for points on `lattice`, the core alone.
 pub(crate) fn header(points: u64, capacity: u64, layout: Layout, lattice: Lattice) -> Header {
-    Header {
-        generator: "a test".into(),
-        name: "made".into(),
-        points,
-        capacity,
-        layout,
-        split: SplitRule::Mean,
-        origin: [0.0; 3],
-        projection: String::new(),
-        lattice,
-        pointmill: serde_json::Map::new(),
-        record: RecordLayout::core(),
-    }
+    let mut header = Header::new(lattice, capacity, layout);
+    (header.generator, header.name, header.points) = ("a test".into(), "made".into(), points);
+    header
 }
 
 impl Builder<'_> {
@@ -149,12 +138,12 @@ impl Builder<'_> {
         high: impl FnOnce(&mut Built) -> Aabb,
     ) -> Aabb {
         let index = built.nodes.len();
-        built.nodes.push(Node { bounds: Aabb::EMPTY, count: 0, kind: kind(0) });
+        built.nodes.push(Node::new(Aabb::EMPTY, 0, kind(0)));
         let low = low(built);
         let high_index = built.nodes.len();
         let bounds = low.union(&high(built));
         let count = built.nodes[index + 1].count + built.nodes[high_index].count;
-        built.nodes[index] = Node { bounds, count, kind: kind(high_index as u32) };
+        built.nodes[index] = Node::new(bounds, count, kind(high_index as u32));
         bounds
     }
 
@@ -169,7 +158,7 @@ impl Builder<'_> {
             (self.extras)(p.id, leaf.push(world(p.q), (self.class)(p.id)));
         }
         let bounds = leaf.finish();
-        built.nodes.push(Node { bounds, count: points.len() as u64, kind: NodeKind::Leaf { center, start } });
+        built.nodes.push(Node::new(bounds, points.len() as u64, NodeKind::Leaf { center, start }));
         bounds
     }
 

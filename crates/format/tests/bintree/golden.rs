@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pointmill_format::bintree::{Bintree, Header, IndexWriter, Layout, NodeKind, RecordLayout, SplitRule};
+use pointmill_format::bintree::{Bintree, Header, IndexWriter, Layout, NodeKind, RecordLayout};
 use pointmill_format::{Attribute, AttributeType, Column, Lattice, NodePoints};
 
 use crate::build::{Builder, Point};
@@ -41,19 +41,15 @@ fn header(layout: Layout) -> Header {
         Attribute::new("gps-time", AttributeType::Float64, 1),
     ];
     let own = serde_json::json!({"duplicates": "keep", "rgbDepth": "auto"});
-    Header {
-        generator: "bintree.py".into(),
-        name: "tiny \"17\"".into(),
-        points: 17,
-        capacity: 3,
-        layout,
-        split: SplitRule::Mean,
-        origin: [997.0, 1999.0, -6.0],
-        projection: String::new(),
-        lattice: Lattice { scale: [0.001, 0.001, 0.01], offset: [1000.0, 2000.0, -5.0] },
-        pointmill: own.as_object().unwrap().clone(),
-        record: RecordLayout::new(columns).unwrap(),
-    }
+    let lattice = Lattice { scale: [0.001, 0.001, 0.01], offset: [1000.0, 2000.0, -5.0] };
+    let mut header = Header::new(lattice, 3, layout);
+    header.generator = "bintree.py".into();
+    header.name = "tiny \"17\"".into();
+    header.points = 17;
+    header.origin = [997.0, 1999.0, -6.0];
+    header.pointmill = own.as_object().unwrap().clone();
+    header.record = RecordLayout::new(columns).unwrap();
+    header
 }
 
 fn extras(id: u32, bytes: &mut [u8]) {

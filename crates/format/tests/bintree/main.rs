@@ -1,5 +1,5 @@
-//! Mean-split binary trees: what is written is what the page says, and reads back; queries tell what a search of all
-//! points tells; bytes that lie are refused.
+//! Mean-split binary trees: what is written is what the page says, and reads back; queries find what a search of all
+//! points finds; bytes that lie are refused.
 
 mod build;
 mod exercise;

@@ -8,7 +8,7 @@ use pointmill_format::bintree::{
 use pointmill_format::{Aabb, NodePoints};
 use pointmill_testkit::Random;
 
-use crate::util::{FAR, Told, corridor, files_of, open, read_all};
+use crate::util::{FAR, Found, corridor, files_of, open, read_all};
 
 fn cloud(n: usize, capacity: u64, seed: u64) -> Bintree {
     open(&files_of(&mut corridor(n, 400_000.0, seed), capacity, Layout::Packed, FAR)).unwrap()
@@ -40,14 +40,14 @@ fn boxes_tell_the_leaves_that_a_look_at_every_leaf_tells() {
         let touches = |b: &Aabb| (0..3).all(|a| b.min[a] <= wanted.max[a] && wanted.min[a] <= b.max[a]);
         let expected: Vec<u32> = tree.leaves().filter(|l| touches(&tree.nodes()[*l as usize].bounds)).collect();
         assert_eq!(tree.leaves_in_box(&wanted), expected);
-        let mut told = Vec::new();
+        let mut found = Vec::new();
         tree.points_in_box(&wanted, &mut scratch, |leaf, points, i| {
-            told.push((leaf, i, points.column::<f32>("classification").unwrap()[i]));
+            found.push((leaf, i, points.column::<f32>("classification").unwrap()[i]));
         })
         .unwrap();
         let inside = all.iter().filter(|p| wanted.contains(p.0)).map(|p| (p.2, p.3 as usize, p.1));
-        assert_eq!(told, inside.collect::<Vec<_>>());
-        some += usize::from(!told.is_empty());
+        assert_eq!(found, inside.collect::<Vec<_>>());
+        some += usize::from(!found.is_empty());
     }
     assert!(some > 50, "{some}");
     for leaf in tree.leaves() {
@@ -117,7 +117,7 @@ fn draw_lists_tell_what_every_leaf_by_itself_tells() {
 }
 
 /// The first point that the ray meets, found by a look at all: distance along the ray, leaf and index.
-fn first_met(points: &[Told], o: [f64; 3], d: [f64; 3], r: f64, spread: f64) -> Option<f64> {
+fn first_met(points: &[Found], o: [f64; 3], d: [f64; 3], r: f64, spread: f64) -> Option<f64> {
     let length = d.iter().map(|v| v * v).sum::<f64>().sqrt();
     let d = d.map(|v| v / length);
     let along = |p: &[f64; 3]| (0..3).map(|a| (p[a] - o[a]) * d[a]).sum::<f64>();
@@ -165,9 +165,9 @@ fn picking_finds_the_point_that_a_look_at_every_point_finds() {
     assert!(hits > 700 && misses > 300, "{hits} {misses}");
 }
 
-fn check_hit(points: &[Told], hit: &Hit) {
-    let told = points.iter().find(|p| (p.2, p.3) == (hit.leaf, hit.point)).unwrap();
-    assert_eq!((told.0, told.1), (hit.position, hit.class));
+fn check_hit(points: &[Found], hit: &Hit) {
+    let found = points.iter().find(|p| (p.2, p.3) == (hit.leaf, hit.point)).unwrap();
+    assert_eq!((found.0, found.1), (hit.position, hit.class));
 }
 
 #[test]

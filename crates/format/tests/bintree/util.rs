@@ -56,15 +56,15 @@ pub(crate) fn corridor(n: usize, length: f64, seed: u64) -> Vec<Point> {
 }
 
 /// A point as read: world position, class, leaf, index in the leaf.
-pub(crate) type Told = ([f64; 3], f32, u32, u32);
+pub(crate) type Found = ([f64; 3], f32, u32, u32);
 
 /// All points, in preorder of the leaves.
-pub(crate) fn read_all(tree: &Bintree) -> Result<Vec<Told>, ReadError> {
+pub(crate) fn read_all(tree: &Bintree) -> Result<Vec<Found>, ReadError> {
     let (mut all, mut points) = (Vec::new(), NodePoints::default());
     for leaf in tree.leaves() {
         tree.read_leaf(leaf, &mut points)?;
-        let told = |i| (points.world(i).unwrap(), points.column::<f32>("classification").unwrap()[i], leaf, i as u32);
-        all.extend((0..points.len()).map(told));
+        let found = |i| (points.world(i).unwrap(), points.column::<f32>("classification").unwrap()[i], leaf, i as u32);
+        all.extend((0..points.len()).map(found));
     }
     Ok(all)
 }

@@ -1,4 +1,4 @@
-//! Damage of one kind at a time: what is lost is told, what is not is read.
+//! Damage of one kind at a time: what is lost is reported, the rest is read.
 
 use crate::common::{fixture, read_bytes, repair, replace};
 

@@ -43,7 +43,7 @@ fn every_fixture_gives_the_positions_that_libe57format_reads() {
     }
 }
 
-/// The values of one scan, told apart by the scan index.
+/// The values of one scan, distinguished by the scan index.
 fn of_scan(cloud: &Cloud, name: &str, scan: f64) -> Vec<f64> {
     let (values, index) = (cloud.values(name), cloud.values("point source id"));
     values.iter().zip(index).filter(|(_, i)| *i == scan).map(|(v, _)| *v).collect()

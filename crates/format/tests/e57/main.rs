@@ -1,4 +1,4 @@
-//! E57 as its users meet it: files of libE57Format and others read right, damaged ones told and survived.
+//! E57 as its users meet it: files of libE57Format and others read right, damaged ones reported and survived.
 #![cfg(feature = "e57")]
 
 mod common;

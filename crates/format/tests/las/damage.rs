@@ -1,4 +1,4 @@
-//! Honest damage: cut files, wrong counts, lost chunk tables. What is there is read, what is not is told.
+//! Honest damage: cut files, wrong counts, lost chunk tables. What is there is read, what is missing is reported.
 
 use laz::{LasZipCompressor, LazVlrBuilder};
 use pointmill_testkit::damage::{put, u32_at};

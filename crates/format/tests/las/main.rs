@@ -1,4 +1,4 @@
-//! LAS and LAZ as their users meet them: files of other encoders read right, damaged ones told and survived.
+//! LAS and LAZ as their users meet them: files of other encoders read right, damaged ones reported and survived.
 #![cfg(feature = "las")]
 
 mod common;

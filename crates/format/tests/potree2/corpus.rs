@@ -4,15 +4,13 @@ use std::collections::HashMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use pointmill_format::potree2::{
-    BrotliScratch, Dataset, Encoding, Metadata, NodeEntry, encode_brotli, encode_hierarchy,
-};
+use pointmill_format::potree2::{BrotliScratch, Dataset, Encoding, NodeEntry, encode_brotli, encode_hierarchy};
 use pointmill_format::{Attribute, Column, NodeKey, NodePoints, with_column};
 use pointmill_testkit::files::corpus;
 
 use crate::util::memory;
 
-/// What tells points of a scan apart, nearly: bits of the GPS time, intensity, return number.
+/// What distinguishes points of a scan, nearly: bits of the GPS time, intensity, return number.
 type Label = (u64, u16, u8);
 
 /// Points as X, Y, Z in units of the LAS file.
@@ -88,7 +86,7 @@ fn a_default_dataset_holds_every_point_of_its_scan() {
     compare("color_1065_DEFAULT", "1.2-with-color.las", 1065, -1..=0);
 }
 
-/// In BROTLI, PotreeConverter adds a unit to every coordinate. That is in the bytes; the reader tells them as they are.
+/// In BROTLI, PotreeConverter adds a unit to every coordinate. That is in the bytes; the reader gives them as they are.
 #[test]
 fn a_brotli_dataset_holds_every_point_of_its_scan_one_unit_further_up() {
     compare("color_1065_BROTLI", "1.2-with-color.las", 1065, 0..=1);
@@ -186,10 +184,11 @@ fn nodes_of_the_reference_are_encoded_to_the_same_points_in_the_same_order() {
         let byte_offset = octree.len() as u64;
         encode_brotli(&attributes, &records(&points), 2, &mut scratch, &mut octree).unwrap();
         let byte_size = octree.len() as u64 - byte_offset;
-        entries.push(NodeEntry { byte_offset, byte_size, ..NodeEntry::from(node) });
+        entries.push(NodeEntry::new(node.key, node.record.points, byte_offset, byte_size));
     }
     let hierarchy = encode_hierarchy(&mut entries, 4);
-    let metadata = Metadata { first_chunk_size: hierarchy.first_chunk_size, ..dataset.metadata().clone() };
+    let mut metadata = dataset.metadata().clone();
+    metadata.first_chunk_size = hierarchy.first_chunk_size;
     let files = memory(metadata.to_json().into_bytes(), hierarchy.bytes, octree);
     let ours = Dataset::from_source(files).unwrap();
 

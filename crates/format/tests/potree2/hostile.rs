@@ -65,7 +65,7 @@ fn mutate(files: &mut Memory, random: &mut Random) {
     }
 }
 
-/// Highest resident set of this process, where the system tells it.
+/// Highest resident set of this process, where the system reports it.
 fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
@@ -235,7 +235,7 @@ fn what_json_cannot_say_is_never_written() {
     made.attributes[4].min = vec![f64::NEG_INFINITY];
     made.attributes[4].max = vec![f64::NAN];
     made.attributes[2].max = vec![-0.0];
-    (made.attributes[1].min, made.attributes[1].max) = (vec![], vec![]); // no range is told: found by fuzzing
+    (made.attributes[1].min, made.attributes[1].max) = (vec![], vec![]); // no range is given: found by fuzzing
     made.lattice.offset = [636_001.76, 0.1 + 0.2, 5e-324];
     made.name = "a \"quoted\" name\\\n\u{1}".into();
     made.projection = "+proj=utm +zone=10".into();

@@ -9,18 +9,13 @@ use pointmill_testkit::Random;
 
 use crate::util::{attributes, memory, metadata, one_node, open};
 
-/// Entries for `leaves` and all their ancestors, with numbers of their own, shuffled.
+/// Entries for `leaves` and all their ancestors, with different numbers, shuffled.
 fn entries(leaves: impl IntoIterator<Item = NodeKey>, random: &mut Random) -> Vec<NodeEntry> {
     let ancestors = |leaf: NodeKey| std::iter::successors(Some(leaf), |key| key.parent());
     let keys: BTreeSet<NodeKey> = leaves.into_iter().flat_map(ancestors).chain([NodeKey::ROOT]).collect();
     let mut entries: Vec<NodeEntry> = keys
         .into_iter()
-        .map(|key| NodeEntry {
-            key,
-            points: random.next_u64() as u32,
-            byte_offset: random.next_u64(),
-            byte_size: random.next_u64(),
-        })
+        .map(|key| NodeEntry::new(key, random.next_u64() as u32, random.next_u64(), random.next_u64()))
         .collect();
     shuffle(&mut entries, random);
     entries
@@ -51,7 +46,7 @@ fn round_trip(entries: &mut [NodeEntry], step: u32) -> (Vec<Node>, Vec<u8>) {
     let proxies = nodes.iter().filter(border).count();
     assert_eq!(encoded.bytes.len(), 22 * (nodes.len() + proxies), "step {step}: a chunk too many, or too few");
     let keys: HashSet<NodeKey> = nodes.iter().map(|n| n.key).collect();
-    for Node { key, record } in &nodes {
+    for Node { key, record, .. } in &nodes {
         let mask = (0..8).filter(|c| key.child(*c).is_some_and(|child| keys.contains(&child)));
         assert_eq!(record.child_mask, mask.fold(0, |m, c| m | 1 << c), "{key}");
         assert_eq!(record.node_type, u8::from(record.child_mask == 0), "{key}");
@@ -110,7 +105,7 @@ fn random_trees_come_back_and_their_bytes_do_not_depend_on_order() {
 
 #[test]
 fn ancestors_that_are_missing_are_added_without_points() {
-    let entry = |key| NodeEntry { key, points: 5, byte_offset: 7, byte_size: 9 };
+    let entry = |key| NodeEntry::new(key, 5, 7, 9);
     let encoded = encode_hierarchy(&mut [entry(name("r12")), entry(name("r7"))], 4);
     let points: Vec<(u8, u8)> = encoded.bytes.chunks_exact(22).map(|r| (r[1], r[2])).collect();
     assert_eq!(points, [(0b1000_0010, 0), (0b100, 0), (0, 5), (0, 5)]); // r, r1, r7, r12: mask, points

@@ -48,29 +48,22 @@ pub(crate) fn attributes() -> Vec<Attribute> {
 /// Metadata for files that a test makes: a cube of 2^31 units.
 pub(crate) fn metadata(encoding: Encoding, first_chunk_size: u64, attributes: Vec<Attribute>) -> Metadata {
     let stats = |attribute: Attribute| {
-        let range = vec![0.0; attribute.elements];
-        AttributeStats { attribute, min: range.clone(), max: range, histogram: None }
+        let mut stats = AttributeStats::new(attribute);
+        stats.min = vec![0.0; stats.attribute.elements];
+        stats.max = stats.min.clone();
+        stats
     };
-    Metadata {
-        name: "made".into(),
-        description: String::new(),
-        points: 0,
-        projection: String::new(),
-        first_chunk_size,
-        step_size: 4,
-        depth: 0,
-        lattice: Lattice { scale: [0.001; 3], offset: [0.0; 3] },
-        spacing: 1.0,
-        cube: Aabb { min: [0.0; 3], max: [2_147_483.648; 3] },
-        encoding,
-        attributes: attributes.into_iter().map(stats).collect(),
-        extra: serde_json::Map::new(),
-    }
+    let lattice = Lattice { scale: [0.001; 3], offset: [0.0; 3] };
+    let cube = Aabb { min: [0.0; 3], max: [2_147_483.648; 3] };
+    let mut metadata = Metadata::new(lattice, cube, 1.0, attributes.into_iter().map(stats).collect());
+    metadata.name = "made".into();
+    (metadata.first_chunk_size, metadata.encoding) = (first_chunk_size, encoding);
+    metadata
 }
 
 /// A dataset of a root alone with that payload.
 pub(crate) fn one_node(encoding: Encoding, attributes: Vec<Attribute>, points: u32, octree: Vec<u8>) -> Memory {
-    let root = NodeEntry { key: NodeKey::ROOT, points, byte_offset: 0, byte_size: octree.len() as u64 };
+    let root = NodeEntry::new(NodeKey::ROOT, points, 0, octree.len() as u64);
     let hierarchy = encode_hierarchy(&mut [root], 4).bytes;
     memory(metadata(encoding, 22, attributes).to_json().into_bytes(), hierarchy, octree)
 }

@@ -1,4 +1,4 @@
-//! PLY, PCD and text as their users meet them: files of other encoders read right, damaged ones told and survived.
+//! PLY, PCD and text as their users meet them: files of other encoders read right, damaged ones reported and survived.
 #![cfg(all(feature = "pcd", feature = "ply", feature = "text"))]
 
 mod common;

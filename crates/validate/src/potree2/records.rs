@@ -19,7 +19,7 @@ impl against::Records for Records<'_> {
     fn each_block(&self, rules: &Rules, work: &(dyn Fn(&mut Block, Place) + Sync)) -> Result<(), ReadError> {
         let readable = self.tree.nodes.par_iter().filter(|n| n.readable);
         readable.try_for_each_init(<(NodePoints, Block)>::default, |(points, block), node| {
-            match self.dataset.read_points(&Node { key: node.key, record: node.record }, points) {
+            match self.dataset.read_points(&Node::new(node.key, node.record), points) {
                 Err(error) if !error.is_io() => return Ok(()), // reported by the walk
                 other => other?,
             }

@@ -209,7 +209,7 @@ impl Walk<'_> {
         }
         let pop = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut points = pop.unwrap_or_default();
-        let read = self.task.dataset.read_points(&Node { key: node.key, record: node.record }, &mut points);
+        let read = self.task.dataset.read_points(&Node::new(node.key, node.record), &mut points);
         let result = read.map(|()| work(&points)).map_err(Some);
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(points);
         result

@@ -159,33 +159,26 @@ impl Cloud {
                     payload = self.payload.clone().unwrap().1;
                 }
                 Encoding::Default => payload = records,
-                Encoding::Brotli => encode_brotli(&attributes, &records, 4, &mut scratch, &mut payload).unwrap(),
+                _ => encode_brotli(&attributes, &records, 4, &mut scratch, &mut payload).unwrap(),
             }
             let (byte_offset, byte_size) = (octree.len() as u64, payload.len() as u64);
-            entries.push(NodeEntry { key: *key, points: points.len() as u32, byte_offset, byte_size });
+            entries.push(NodeEntry::new(*key, points.len() as u32, byte_offset, byte_size));
             octree.extend(payload);
         }
         let hierarchy = encode_hierarchy(&mut entries, 2);
         let side = f64::from(SIDE) * SCALE;
-        let metadata = Metadata {
-            name: "hill".into(),
-            description: String::new(),
-            points: self.points().count() as u64,
-            projection: String::new(),
-            first_chunk_size: hierarchy.first_chunk_size,
-            step_size: 2,
-            depth: hierarchy.depth,
-            lattice: Lattice { scale: [SCALE; 3], offset: OFFSET },
-            spacing: side / 128.0,
-            cube: Aabb { min: OFFSET, max: OFFSET.map(|v| v + side) },
-            encoding,
-            attributes: self.stats(),
-            extra: serde_json::from_value(serde_json::json!({ "pointmill": {
-                "version": "0.1.0", "latticeOffset": OFFSET, "rgbDepth": "auto", "duplicates": "keep",
-                "sampling": if self.sampler == Sampler::Poisson { "poisson" } else { "grid" },
-            }}))
-            .unwrap(),
-        };
+        let (lattice, cube) =
+            (Lattice { scale: [SCALE; 3], offset: OFFSET }, Aabb { min: OFFSET, max: OFFSET.map(|v| v + side) });
+        let mut metadata = Metadata::new(lattice, cube, side / 128.0, self.stats());
+        metadata.name = "hill".into();
+        metadata.points = self.points().count() as u64;
+        (metadata.first_chunk_size, metadata.depth) = (hierarchy.first_chunk_size, hierarchy.depth);
+        (metadata.step_size, metadata.encoding) = (2, encoding);
+        metadata.extra = serde_json::from_value(serde_json::json!({ "pointmill": {
+            "version": "0.1.0", "latticeOffset": OFFSET, "rgbDepth": "auto", "duplicates": "keep",
+            "sampling": if self.sampler == Sampler::Poisson { "poisson" } else { "grid" },
+        }}))
+        .unwrap();
         Files { metadata, text: None, hierarchy: hierarchy.bytes, octree, entries }
     }
 
@@ -211,7 +204,9 @@ impl Cloud {
             let mut bins = vec![0; 256];
             self.points().for_each(|p| bins[usize::from(p.classification)] += 1);
             let histogram = (attribute.name == "classification").then_some(bins);
-            stats.push(AttributeStats { attribute, min, max, histogram });
+            let mut described = AttributeStats::new(attribute);
+            (described.min, described.max, described.histogram) = (min, max, histogram);
+            stats.push(described);
         }
         stats
     }

@@ -1,6 +1,6 @@
 //! Compressed sections: a second pass over the finished file (`docs/formats/batches.md`, §8).
 
-use pointmill_format::batches::{BATCH_POINTS, Flags, Header, Part, PointSection, SECTION_ALIGNMENT, Section};
+use pointmill_format::batches::{BATCH_POINTS, Flags, Part, PointSection, SECTION_ALIGNMENT, Section};
 use zstd::bulk::Compressor;
 
 use super::finish::Finished;
@@ -25,7 +25,7 @@ pub(super) fn compress(
     let mut copy = Copy { rt, raw, to, level, at: pointmill_format::batches::HEADER_BYTES };
     let mut sections = end.header.sections;
     sections.batches = copy.plain(layout.records)?.offset;
-    for PointSection { part, section, bytes_per_point } in layout.sections() {
+    for PointSection { part, section, bytes_per_point, .. } in layout.sections() {
         let Section { offset, bytes } = copy.blocks(section, bytes_per_point)?;
         match part {
             Part::Hi10 => sections.hi10 = offset,
@@ -49,7 +49,8 @@ pub(super) fn compress(
     sections.description = copy.at;
     finished.bytes = copy.at + text.len() as u64;
     let flags = Flags(end.header.flags.0 | Flags::COMPRESSED);
-    end.header = Header { flags, sections, description_bytes: text.len() as u64, ..end.header.clone() };
+    (end.header.flags, end.header.sections) = (flags, sections);
+    end.header.description_bytes = text.len() as u64;
     copy.write(&end.header.encode(), 0)
 }
 

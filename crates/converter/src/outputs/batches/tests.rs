@@ -77,7 +77,8 @@ impl Scan {
         let text = &like[at..at + header.description_bytes as usize];
         let description = Description::from_json(text, Path::new("ours"), 0).unwrap();
         assert_eq!(Lattice::from(description.lattice), self.lattice());
-        let options = WriteOptions { cell: header.grid.cell, precision: Some(header.precision()), description };
+        let options = WriteOptions::new(self.lattice()).cell(header.grid.cell).precision(header.precision());
+        let options = options.description(description);
         let axis = |a: usize| -> Vec<i64> { self.positions.iter().map(|p| i64::from(p[a])).collect() };
         let (x, y, z) = (axis(0), axis(1), axis(2));
         let is_eight_bit = self.values.iter().all(|v| v[..3].iter().all(|c| *c < 256));
@@ -91,7 +92,8 @@ impl Scan {
             (Attribute::new("classification", AttributeType::UInt8, 1), &class[..]),
         ];
         let attributes = if with_extras { &extras[..] } else { &[] };
-        let cloud = Cloud { lattice: self.lattice(), positions: [&x, &y, &z], colours: &colours, attributes };
+        let mut cloud = Cloud::new(self.lattice(), [&x, &y, &z], &colours);
+        cloud.attributes = attributes;
         let mut file = Cursor::new(Vec::new());
         let written = write(&mut file, &cloud, &options).unwrap();
         (file.into_inner(), written)

@@ -23,7 +23,7 @@ pub(super) fn assemble(upper: &Upper, built: Vec<Built>) -> Vec<Node> {
         if let Some(split) = entry {
             open.push(Open { node: nodes.len(), waits_for_high: false });
             let kind = NodeKind::Inner { axis: split.axis, split: split.plane, high: 0 };
-            nodes.push(Node { bounds: Aabb::EMPTY, count: split.points, kind });
+            nodes.push(Node::new(Aabb::EMPTY, split.points, kind));
             continue;
         }
         let first = nodes.len();

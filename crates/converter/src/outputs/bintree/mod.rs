@@ -168,19 +168,15 @@ fn write_index(
     nodes: &[Node],
     staged: &StagedDataset,
 ) -> Result<u64, ConvertError> {
-    let header = Header {
-        generator: format!("pointmill {}", env!("CARGO_PKG_VERSION")),
-        name: cloud.plan.cloud_name(),
-        points: nodes.first().map_or(0, |root| root.count),
-        capacity: u64::from(settings.capacity),
-        layout: settings.layout,
-        split: settings.split,
-        origin: nodes.first().map_or([0.0; 3], |root| root.bounds.min.map(f64::floor)),
-        projection: cloud.facts.crs.projection.clone(),
-        lattice: cloud.lattice.lattice,
-        pointmill: own_key(cloud, &columns.dropped),
-        record: columns.record.clone(),
-    };
+    let mut header = Header::new(cloud.lattice.lattice, u64::from(settings.capacity), settings.layout);
+    header.generator = format!("pointmill {}", env!("CARGO_PKG_VERSION"));
+    header.name = cloud.plan.cloud_name();
+    header.points = nodes.first().map_or(0, |root| root.count);
+    header.split = settings.split;
+    header.origin = nodes.first().map_or([0.0; 3], |root| root.bounds.min.map(f64::floor));
+    header.projection.clone_from(&cloud.facts.crs.projection);
+    header.pointmill = own_key(cloud, &columns.dropped);
+    header.record = columns.record.clone();
     let file = staged.create(INDEX_FILE)?;
     let fail = |e| file.failed("writing the index", e);
     let mut index = IndexWriter::new(BufWriter::with_capacity(1 << 20, Sequential::new(&file)), &header)

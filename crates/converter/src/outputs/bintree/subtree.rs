@@ -144,7 +144,7 @@ impl<'a> Builder<'a> {
         }
         let child = |range: Range<usize>, high: bool, what| Todo { range, path: [&path[..], &[high]].concat(), what };
         let capacity = self.settings.capacity as usize;
-        let inner = |kind| Some(Node { bounds: Aabb::EMPTY, count: count as u64, kind });
+        let inner = |kind| Some(Node::new(Aabb::EMPTY, count as u64, kind));
         let leaves = match what {
             What::Split => {
                 let extent = extent(&self.items[range.clone()]);
@@ -260,7 +260,7 @@ impl<'a> Builder<'a> {
         }
         let bounds = leaf.finish();
         let start = self.leaves.put(path, start + range.start as u64, &self.bytes)?;
-        Ok(Node { bounds, count: items.len() as u64, kind: NodeKind::Leaf { center, start } })
+        Ok(Node::new(bounds, items.len() as u64, NodeKind::Leaf { center, start }))
     }
 }
 

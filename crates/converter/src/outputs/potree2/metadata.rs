@@ -26,47 +26,41 @@ pub(super) fn metadata(
     let offset = cube.offset(&cloud.lattice.lattice);
     let lattice = Lattice { scale: cloud.lattice.lattice.scale, offset };
     let stored = |q: JobPoint| std::array::from_fn(|a| q[a] - cube.min[a]);
-    let mut position = AttributeStats {
-        attribute: Attribute::new("position", AttributeType::Int32, 3),
-        min: lattice.world(stored(stats.bounds.min)).to_vec(),
-        max: lattice.world(stored(stats.bounds.max)).to_vec(),
-        histogram: None,
-    };
-    position.attribute.description = String::new();
+    let mut position = AttributeStats::new(Attribute::new("position", AttributeType::Int32, 3));
+    position.min = lattice.world(stored(stats.bounds.min)).to_vec();
+    position.max = lattice.world(stored(stats.bounds.max)).to_vec();
     let mut attributes = vec![position];
     attributes.extend(choice.kept.iter().map(|&i| {
-        let attribute = cloud.schema().attributes[i].clone();
+        let attribute = &cloud.schema().attributes[i];
         let range = &facts.ranges[i];
         // A range must be there and finite; a column of NaN has none.
         let finite = |v: &[f64]| v.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect::<Vec<_>>();
-        let histogram = (attribute.name == "classification" && attribute.ty == AttributeType::UInt8).then(|| {
+        let mut described = AttributeStats::new(attribute.clone());
+        (described.min, described.max) = (finite(&range.min), finite(&range.max));
+        described.histogram = (attribute.name == "classification" && attribute.ty == AttributeType::UInt8).then(|| {
             let mut left = stats.classes.clone();
             left.iter_mut().zip(&ledger.classes_dropped).for_each(|(all, dropped)| *all -= dropped);
             left
         });
-        AttributeStats { attribute, min: finite(&range.min), max: finite(&range.max), histogram }
+        described
     }));
     let mut own = own_key(cloud, &choice.dropped);
     own.insert("sampling".into(), settings.sampling.name().into());
     own.insert("leafCapacity".into(), settings.leaf_capacity.into());
-    Metadata {
-        name: cloud.plan.cloud_name(),
-        description: String::new(),
-        points: ledger.points(),
-        projection: facts.crs.projection.clone(),
-        first_chunk_size: hierarchy.first_chunk_size,
-        step_size: HIERARCHY_STEP,
-        depth: hierarchy.depth,
-        lattice,
-        spacing: side / f64::from(1 << SPACING_BITS),
-        cube: Aabb { min: offset, max: offset.map(|v| v + side) },
-        encoding: match settings.encoding {
-            Encoding::Default => StoredEncoding::Default,
-            Encoding::Brotli { .. } => StoredEncoding::Brotli,
-        },
-        attributes,
-        extra: Map::from_iter([("pointmill".to_owned(), own.into())]),
-    }
+    let box_of_root = Aabb { min: offset, max: offset.map(|v| v + side) };
+    let mut metadata = Metadata::new(lattice, box_of_root, side / f64::from(1 << SPACING_BITS), attributes);
+    metadata.name = cloud.plan.cloud_name();
+    metadata.points = ledger.points();
+    metadata.projection.clone_from(&facts.crs.projection);
+    metadata.first_chunk_size = hierarchy.first_chunk_size;
+    metadata.step_size = HIERARCHY_STEP;
+    metadata.depth = hierarchy.depth;
+    metadata.encoding = match settings.encoding {
+        Encoding::Default => StoredEncoding::Default,
+        Encoding::Brotli { .. } => StoredEncoding::Brotli,
+    };
+    metadata.extra = Map::from_iter([("pointmill".to_owned(), own.into())]);
+    metadata
 }
 
 pub(super) fn tree_report(tree: &Octree) -> TreeReport {

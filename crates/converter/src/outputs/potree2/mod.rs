@@ -118,7 +118,7 @@ impl Output for Potree2Settings {
 
 fn entry(node: &FinishedNode) -> NodeEntry {
     let FinishedNode { key, points, byte_offset, byte_size } = *node;
-    NodeEntry { key, points, byte_offset, byte_size }
+    NodeEntry::new(key, points, byte_offset, byte_size)
 }
 
 /// `octree.bin` while it is written.

@@ -1,7 +1,7 @@
 //! Cutting a scan into pieces that decode alone.
 //!
 //! The values of a field are one stream of bits, strewn over the packets; streams of different fields need not keep
-//! step. Record r of a field of b bits starts at bit r·b of its stream, so a pass over the heads of the packets tells
+//! step. Record r of a field of b bits starts at bit r·b of its stream, so a pass over the heads of the packets finds
 //! where a range of records begins in each of them.
 
 use std::collections::VecDeque;

@@ -12,10 +12,10 @@
 //!   Colours and intensities that are marked as invalid are 0.
 //! * `point source id` is the number of the scan in the file, from 0; beyond 65,535 it stays there.
 //! * `NormalX`, `NormalY`, `NormalZ` (of the extension for surface normals) turn with the scan.
-//! * All other fields keep their names, and their integers as they are stored ([`Attribute::scale`] and `offset` tell
+//! * All other fields keep their names, and their integers as they are stored ([`Attribute::scale`] and `offset` give
 //!   what scaled ones mean). A scan that lacks a field has zeros. Times marked as invalid are NaN, or 0 as integers.
 //! * `rowIndex` and `columnIndex` come only if [`E57Options::keep_row_column`] asks for them.
-//! * Images and text fields are not read, which [`ScanInfo::warnings`] tells; other extensions are passed over.
+//! * Images and text fields are not read, as [`ScanInfo::warnings`] reports; other extensions are passed over.
 //!
 //! ```no_run
 //! use pointmill_format::scan::e57;
@@ -68,7 +68,7 @@ pub fn is_e57(first_bytes: &[u8]) -> bool {
 }
 
 /// Opens an E57 file: reads its XML and the heads of its packets. Points are decoded only to find the range of
-/// colours or intensities that the file does not tell, a sample of them.
+/// colours or intensities that the file does not declare, from a sample.
 ///
 /// # Errors
 /// Not E57, cut short before the XML, XML that is damaged or not understood, a scan without positions.

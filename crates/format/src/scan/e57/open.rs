@@ -21,7 +21,7 @@ use super::{header, xml};
 use crate::scan::source::Source;
 use crate::{Aabb, Advice, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning};
 
-/// Records of a piece: a batch of its own; a multiple of 8, so that packed values start at a byte border.
+/// Records of a piece: one batch; a multiple of 8, so that packed values start at a byte border.
 const PIECE_RECORDS: u64 = 50_000;
 /// With more columns than this a piece has fewer records, so that it needs no more memory.
 const USUAL_COLUMNS: u64 = 64;
@@ -178,7 +178,7 @@ fn sample(source: &Source, draft: &Draft<'_>, ids: &[usize]) -> (f64, f64) {
     places.dedup();
     let (mut raw, mut bytes) = (Vec::new(), Vec::new());
     for cut in places.into_iter().filter_map(|i| draft.cuts.get(i)).filter(|cut| cut.lost.is_none()) {
-        // a damaged piece tells of itself when it is decoded
+        // a damaged piece is reported when it is decoded
         let Ok(streams) = Streams::gather(source, cut, &draft.fields, &needed, &mut raw, &mut bytes) else { continue };
         let values = Values { fields: &draft.fields, streams, n: cut.records as usize };
         for i in ids {
@@ -218,7 +218,7 @@ fn resolution(source: &Source, drafts: &[Draft<'_>]) -> Resolution {
     }
 }
 
-/// What is told of a scan.
+/// The description of a scan.
 fn part(cloud: &PointCloud) -> ScanPart {
     let (rotation, translation) = Pose::new(cloud).0.parts();
     ScanPart { name: cloud.name.clone().unwrap_or_default(), points: cloud.records, rotation, translation }

@@ -69,7 +69,7 @@ impl<'a> Pages<'a> {
     }
 
     /// Reads the window that starts with page `index`. It ends before the next bad page, which is an error only when
-    /// it is asked for.
+    /// it is requested.
     fn load(&mut self, index: u64) -> Result<(), ReadError> {
         let pages = self.ahead.min((self.source.len() / PAGE).saturating_sub(index));
         if pages == 0 {

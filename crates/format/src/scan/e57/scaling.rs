@@ -5,7 +5,7 @@
 //! 2. the range of the field in the prototype, for colours that of all three together, so that no channel is
 //!    stretched more than another;
 //! 3. the usual range ([0, 1], [0, 255] or [0, 65535]) that holds a sample of the values, else what the sample spans;
-//!    then a warning tells so.
+//!    then with a warning.
 
 use ::e57::{ColorLimits, IntensityLimits, RecordValue};
 

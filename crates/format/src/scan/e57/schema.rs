@@ -141,7 +141,7 @@ impl Roles {
 }
 
 impl PositionFields {
-    /// The step of the coordinates as they are stored, before the pose; `None` if it is finer than can be told.
+    /// The step of the coordinates as they are stored, before the pose; `None` if it is too fine to determine.
     /// `farthest`: the largest value of a field, of a sample: what the file declares may be wrong by orders of magnitude.
     pub(super) fn step(&self, fields: &[Field], farthest: impl Fn(usize) -> f64) -> Option<f64> {
         let step = |i: usize| match fields[i].encoding {

@@ -1,4 +1,4 @@
-//! The packed values of a piece, gathered from its packets: one run of bytes a field.
+//! The packed values of a piece, gathered from its packets: one run of bytes per field.
 
 use super::cuts::Cut;
 use super::fields::Field;

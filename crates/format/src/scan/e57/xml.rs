@@ -1,6 +1,6 @@
 //! The XML section, as the `e57` crate understands it.
 //!
-//! The crate reads a file of its own in memory, header and XML alone: what it need not or cannot read is taken out
+//! The crate `e57` reads a separate file in memory, header and XML alone: what it need not or cannot read is taken out
 //! first. Text fields (which it refuses) become constants of a value that marks them; images are left out if they are
 //! what it stumbles over.
 

@@ -10,7 +10,7 @@ use crate::ReadError;
 use crate::scan::catch_panic::catch_panic;
 use crate::scan::source::Source;
 
-/// So many chunks may be empty (some writers close a chunk that they never fill).
+/// Maximum number of empty chunks (some writers close a chunk that they never fill).
 const EMPTY_CHUNKS: u64 = 16;
 
 /// One chunk, in file order.
@@ -42,7 +42,7 @@ impl Layout {
     ///
     /// The first record is stored as it is. Each further point costs several symbols of adaptive models, whose
     /// likeliest symbol never reaches a probability of 1 (the counts of a model of n symbols sum to 32,768 and none is
-    /// 0): more than 0.007 bits a point in every format, which is 1,100 points a byte.
+    /// 0): more than 0.007 bits per point in every format, which is 1,100 points per byte.
     pub(super) fn max_points(&self, bytes: u64) -> u64 {
         let rest = bytes.saturating_sub(self.record_len as u64);
         if bytes < self.record_len as u64 { 0 } else { rest.saturating_mul(2048).saturating_add(1) }
@@ -141,7 +141,7 @@ impl Layout {
         Ok(chunks)
     }
 
-    /// The layered chunk at `at`, as its own head tells it: one record, the count, the layers' sizes.
+    /// The layered chunk at `at`, as its head describes it: one record, the count, the layers' sizes.
     pub(super) fn layered_chunk(&self, source: &Source, at: u64, end: u64) -> Result<Option<Chunk>, ReadError> {
         let head_len = self.layered_head_len() as u64;
         if at.checked_add(head_len).is_none_or(|e| e > end.min(source.len())) {

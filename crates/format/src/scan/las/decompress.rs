@@ -64,7 +64,7 @@ impl<'a, R> Decompressor<'a, R> {
         // a decompressor that writes more than a record panics; `LaszipRecord` has seen to this already
         match inner.record_size() {
             size if size == record_len => Ok(Self { inner, record_len }),
-            size => Err(Stop::Corrupt(format!("its items make {size} bytes a record, not {record_len}"))),
+            size => Err(Stop::Corrupt(format!("its items make {size} bytes per record, not {record_len}"))),
         }
     }
 

@@ -1,4 +1,4 @@
-//! The Extra Bytes record: LASF_Spec 4, one descriptor of 192 bytes an attribute (LAS 1.4 R15 §2.6, table 24).
+//! The Extra Bytes record: LASF_Spec 4, one descriptor of 192 bytes per attribute (LAS 1.4 R15 §2.6, table 24).
 
 use super::bytes::{f64_at, i64_at, text, u64_at};
 use super::header::Header;

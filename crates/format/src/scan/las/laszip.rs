@@ -10,7 +10,7 @@ use super::records::Record;
 const FIXED: usize = 34;
 const ITEM: usize = 6;
 
-/// More extra bytes a record than this are refused: the decompressor's models take 16 kB for each.
+/// More extra bytes per record than this are refused: the decompressor's models take 16 kB for each.
 const MAX_EXTRA_BYTES: usize = 2048;
 
 /// How the compressed points are arranged.
@@ -68,12 +68,12 @@ impl LaszipRecord {
     }
 }
 
-/// The items must be those of the point format, in order, each of its own size and a version that is decoded.
+/// The items must be those of the point format, in order, each of its usual size and a version that is decoded.
 fn check_items(items: &[LazItem], header: &Header, arrangement: Arrangement) -> Result<(), String> {
     use LazItemType as I;
     let extra = header.record_len - header.format_len();
     if extra > MAX_EXTRA_BYTES {
-        return Err(format!("{extra} compressed extra bytes a point are more than the {MAX_EXTRA_BYTES} supported"));
+        return Err(format!("{extra} compressed extra bytes per point are more than the {MAX_EXTRA_BYTES} supported"));
     }
     let n = extra as u16;
     let mut expected = match header.point_format {

@@ -2,7 +2,7 @@
 //!
 //! [`open`] reads what stands around the points and cuts them into pieces; [`Scan::decode`] turns a piece into columns.
 //! Nothing that the file says is believed where the bytes can be asked: counts, lengths and offsets are clamped to the
-//! file, disagreements are told in [`ScanInfo::warnings`], and a decompressor's panic comes out as an error.
+//! file, disagreements are reported in [`ScanInfo::warnings`], and a decompressor's panic comes out as an error.
 //!
 //! * The header's point count is obeyed where it is smaller than what is there (0 means no points), with a warning;
 //!   where it is larger, the points that are there are read.

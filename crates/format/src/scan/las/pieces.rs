@@ -8,7 +8,7 @@ use super::records::Records;
 use crate::scan::source::Source;
 use crate::{Counted, Piece, ReadError, ScanWarning};
 
-/// Records of a LAS piece: 1.7 MB of format 3, a batch of its own.
+/// Records of a LAS piece: 1.7 MB of format 3, one batch.
 const LAS_PIECE_POINTS: u64 = 50_000;
 
 /// Chunks whose heads are compared with the table when a file is opened; the others are checked when decoded.

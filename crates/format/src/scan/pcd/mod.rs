@@ -2,8 +2,8 @@
 //!
 //! Fields `x`, `y`, `z` (case does not count) of any type are positions in double precision; `rgb` and `rgba` packed in
 //! a 32-bit number become "rgb" of 0–255 (and "alpha"). Other names mean what they mean in PLY; `_` is padding. A field
-//! with a COUNT above 1 becomes an attribute of so many elements. The sensor's VIEWPOINT is not applied, as in PCL; one
-//! that is not the identity is told in [`ScanInfo::warnings`](crate::ScanInfo::warnings).
+//! with a COUNT above 1 becomes an attribute of that many elements. The sensor's VIEWPOINT is not applied, as in PCL;
+//! one that is not the identity is reported in [`ScanInfo::warnings`](crate::ScanInfo::warnings).
 //!
 //! A compressed file holds each field of all points together: it is one piece, and decoding it takes memory for its
 //! compressed and decompressed bytes (each at most 4 GiB, and the latter at most 88 times the former).

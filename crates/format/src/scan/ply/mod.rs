@@ -8,7 +8,7 @@
 //!   0–1 as 0–65535. Floats above 1 in a sample of the file mean that all are integers.
 //! * `nx`, `ny`, `nz` become "NormalX", "NormalY", "NormalZ" in single precision; `intensity` stays `uint16` or becomes a
 //!   float; `classification` becomes `uint8`. What else there is keeps name and type (also CloudCompare's `scalar_*`).
-//! * Fewer vertices than declared are told in [`ScanInfo::warnings`](crate::ScanInfo::warnings), and read.
+//! * Fewer vertices than declared are reported in [`ScanInfo::warnings`](crate::ScanInfo::warnings), and read.
 //!
 //! ```no_run
 //! use pointmill_format::scan::ply;

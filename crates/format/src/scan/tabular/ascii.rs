@@ -13,7 +13,7 @@ pub(crate) struct RowParser<'a> {
     pub(crate) fields: &'a [Field],
     pub(crate) wanted: &'a Wanted,
     pub(crate) separator: Separator,
-    /// A line may end after so many fields; the others are 0 then.
+    /// Least fields per line; missing ones are 0.
     pub(crate) least: usize,
     /// Elements of each column.
     pub(crate) elements: &'a [usize],

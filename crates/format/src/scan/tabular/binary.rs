@@ -4,7 +4,7 @@ use super::number::{Endian, Number, unit_to_u16};
 use super::schema::{Field, Rule, Target};
 use crate::{AttributeType, Column, Element, Piece, PointBatch, Positions, Wanted};
 
-/// Points of a piece of binary rows: a batch of its own, some MB.
+/// Points of a piece of binary rows: one batch, some MB.
 pub(crate) const PIECE_POINTS: u64 = 50_000;
 
 /// Pieces over `points` rows of `stride` bytes from byte `start` on.

@@ -23,7 +23,7 @@ pub(crate) struct Index {
 
 /// True if the line holds more than blanks.
 pub(crate) fn is_filled(line: &[u8]) -> bool {
-    // mostly the first byte tells
+    // mostly the first byte decides
     line.first().is_some_and(|b| *b > b' ') || line.iter().any(|b| *b > b' ')
 }
 

@@ -55,7 +55,7 @@ pub(crate) fn role(name: &str) -> Role {
     }
 }
 
-/// The name of an attribute that has no role of its own.
+/// The name of an attribute without a role.
 pub(crate) fn other_name(name: &str, ty: AttributeType) -> &str {
     let lower = name.to_ascii_lowercase();
     LAS_NAMES.iter().find(|(theirs, _, t)| *theirs == lower && *t == ty).map_or(name, |(_, ours, _)| ours)

@@ -1,4 +1,4 @@
-//! A look at some rows, where names and types do not tell what a column means.
+//! A look at some rows, where names and types do not show what a column means.
 
 use std::ops::ControlFlow;
 
@@ -46,7 +46,7 @@ impl ColumnRange {
 }
 
 /// The ranges of the fields `picks` (indices) in a sample of the rows. Rows that cannot be read are passed over here;
-/// the decode tells of them.
+/// the decode reports them.
 fn probe_fields(scan: &RowScan, picks: &[usize]) -> Vec<ColumnRange> {
     let mut ranges = vec![ColumnRange::EMPTY; picks.len()];
     probe_rows(scan, picks, |row| {
@@ -79,7 +79,7 @@ pub(crate) fn probe_rows(scan: &RowScan, picks: &[usize], mut visit: impl FnMut(
         } else {
             Piece { points: piece.points.min(ROWS), ..*piece }
         };
-        // an error here is one in the decode, too, which tells of it
+        // an error here is one in the decode, too, which reports it
         let _ = decoder.piece(&part, &mut scratch, &mut |batch| {
             if let [Column::Float64(values)] = batch.columns.as_slice() {
                 values.chunks_exact(picks.len()).for_each(&mut visit);
@@ -106,7 +106,7 @@ fn probe_schema(schema: &Schema, picks: &[usize]) -> Schema {
     }
 }
 
-/// The first lines of a piece of text, so many that they certainly lie inside the bytes.
+/// The first lines of a piece of text, few enough to lie inside the bytes for certain.
 fn shortened(piece: &Piece) -> Piece {
     if piece.byte_len <= BYTES {
         return Piece { points: piece.points.min(ROWS), ..*piece };

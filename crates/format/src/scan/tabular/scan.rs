@@ -37,9 +37,9 @@ pub(crate) enum Storage {
 /// A run of bytes of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// So many bytes that stay.
+    /// This number of bytes, kept.
     Plain(usize),
-    /// A count and so many items: passed over.
+    /// A count, and that many items: skipped.
     List { count: crate::AttributeType, item_bytes: u64 },
 }
 
@@ -55,7 +55,7 @@ pub(crate) struct Planes {
     pub(crate) decompress: Decompress,
 }
 
-/// Replaces the last argument by so many decompressed bytes; `Err` says why the first is damaged.
+/// Replaces the last argument by the given number of decompressed bytes; `Err` says why the first is damaged.
 pub(crate) type Decompress = fn(&[u8], usize, &mut Vec<u8>) -> Result<(), String>;
 
 /// Which lines are rows, and what happens to their points.
@@ -63,11 +63,11 @@ pub(crate) type Decompress = fn(&[u8], usize, &mut Vec<u8>) -> Result<(), String
 pub(crate) struct LineRule {
     pub(crate) separator: Separator,
     pub(crate) is_row: fn(&[u8]) -> bool,
-    /// Lines may end after so many numbers; the others are 0 then.
+    /// Least numbers per line; missing ones are 0.
     pub(crate) least: usize,
     /// By first point; empty if the file has none.
     pub(crate) poses: Vec<Pose>,
-    /// The column that tells the scans apart: the index of the point's pose.
+    /// The column that distinguishes the scans: the index of the point's pose.
     pub(crate) scan_column: Option<usize>,
 }
 

@@ -15,7 +15,7 @@ const TYPES: &str = "types are int8, uint8, int16, uint16, int32, uint32, int64,
 pub(super) struct Column {
     pub(super) role: Role,
     pub(super) name: String,
-    /// If it is asked for.
+    /// If it is requested.
     pub(super) ty: Option<AttributeType>,
 }
 
@@ -80,7 +80,7 @@ fn text_role(name: &str) -> Role {
     }
 }
 
-/// Lines of a text whose columns are still to be told.
+/// Lines of a text whose columns are not yet determined.
 pub(super) struct Table {
     pub(super) source: Source,
     pub(super) format: String,
@@ -135,7 +135,7 @@ impl Table {
             properties[i].ty = AttributeType::UInt16;
         }
         let mut schema = Schema::new(&properties, &mut self.warnings).map_err(|what| {
-            ReadError::broken(scan.source.path(), self.first_row, format!("the columns cannot be told: {what}"))
+            ReadError::broken(scan.source.path(), self.first_row, format!("the columns cannot be determined: {what}"))
                 .advise("name them all in order, for example x,y,z,r,g,b,i")
         })?;
         if let Some(i) = intensity {

@@ -1,6 +1,6 @@
 //! Points as lines of numbers: XYZ, TXT, CSV, ASC; PTS; PTX; OFF.
 //!
-//! [`open`] tells the four kinds apart by content ([`kind`]), counts the lines (one pass over the newlines, so that
+//! [`open`] detects the four kinds by content ([`kind`]), counts the lines (one pass over the newlines, so that
 //! every piece knows the number of its first point) and looks at some thousand rows to learn what the columns hold.
 //!
 //! **Separator**: `;` if the first row has one, else `,`, else blanks and tabs. Blanks around a separator do not count,
@@ -44,7 +44,7 @@ use rows::{filled, is_comment, is_count, number_count};
 
 pub use options::TextOptions;
 
-/// The kinds of text that are told apart by content.
+/// The kinds of text, detected by content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TextKind {
@@ -106,8 +106,8 @@ pub fn is_xyz(first_bytes: &[u8]) -> bool {
 /// Opens a file of any of the four kinds. One that is none of them by content is tried as XYZ.
 ///
 /// # Errors
-/// Not text, columns that cannot be told or do not fit `options`, a header (PTX, OFF) that is cut short or makes no
-/// sense, a line of more than 1 MiB.
+/// Not text, columns that cannot be determined or do not fit `options`, a header (PTX, OFF) that is cut short or makes
+/// no sense, a line of more than 1 MiB.
 pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
     let path = path.as_ref();
     let source = Source::open(path)?;

@@ -96,7 +96,7 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
     Ok(Box::new(table.scan(Some(columns))?))
 }
 
-/// The counts, behind the keyword or on a line of their own: their place, they, and where the vertices start.
+/// The counts, behind the keyword or on the next line: their place, the counts, and where the vertices start.
 fn counts<'a>(source: &Source, first: &'a [u8], keyword: Keyword) -> Result<(u64, Vec<&'a [u8]>, u64), ReadError> {
     let mut at = keyword.end;
     for (place, line) in lines::lines(&first[keyword.end..]) {

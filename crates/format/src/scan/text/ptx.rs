@@ -68,7 +68,7 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
 }
 
 impl Grids {
-    /// What is told of the scans.
+    /// The descriptions of the scans.
     fn parts(&self) -> Vec<ScanPart> {
         let ends = self.poses.iter().skip(1).map(|p| p.first_point).chain([self.points]);
         let part = |(pose, end): (&Pose, u64)| {

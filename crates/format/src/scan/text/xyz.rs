@@ -70,7 +70,7 @@ impl Head {
         Ok(Self { names, start: at, separator, numeric })
     }
 
-    /// The columns by name: as asked for, else by the header.
+    /// The columns by name: as given, else by the header.
     pub(super) fn columns(&self, source: &Source, options: &TextOptions) -> Result<Option<Vec<Column>>, ReadError> {
         named(source, self.start, options, self.names.as_deref(), self.numeric.len())
     }
@@ -103,7 +103,7 @@ pub(super) fn named(
     list(&names).map(Some)
 }
 
-/// The separator that was asked for; `Some(None)` means blanks.
+/// The separator given; `Some(None)` means blanks.
 pub(super) fn wanted_separator(options: &TextOptions) -> Option<Option<u8>> {
     let wanted = options.separator?;
     Some(u8::try_from(wanted).ok().filter(|b| *b > b' '))
