@@ -55,6 +55,45 @@ fn change(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     }
 }
 
+/// What JSON is made of.
+const JSON: &[u8] = b"0123456789.-e\",[]{}";
+
+/// One change at byte `at` of a file of a dataset, which is JSON or packed numbers: cut there, a number as large as it
+/// can be or 0, a character or a number of JSON, a run of bytes twice, flipped bits.
+pub fn hit(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
+    let end = |len: usize| (at + len).min(bytes.len());
+    match random.below(7) {
+        0 => bytes.truncate(at),
+        1 => {
+            let extreme = random.pick(&[u64::MAX, 1 << 63, u64::from(u32::MAX), 1 << 40, 256, 0]).to_le_bytes();
+            let len = end(1 + random.index(8)) - at;
+            put(bytes, at, &extreme[..len]);
+        }
+        2 => bytes[at] = random.pick(JSON),
+        3 => {
+            let number: &[u8] = random.pick(&[b"1e308", b"-1", b"18446744073709551615", b"4294967295", b"0"]);
+            let end = end(random.index(4));
+            bytes.splice(at..end, number.iter().copied());
+        }
+        4 => {
+            let copy = bytes[at..end(random.index(60))].to_vec();
+            let to = random.index(bytes.len());
+            bytes.splice(to..to, copy);
+        }
+        _ => (0..=random.index(4)).for_each(|_| {
+            let at = random.index(bytes.len());
+            bytes[at] ^= 1 << random.index(8);
+        }),
+    }
+}
+
+/// Highest resident set of this process, where the system reports it: what a test that plants lengths looks at.
+pub fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
+}
+
 /// Overwrites bytes from `at` on.
 pub fn put(bytes: &mut [u8], at: usize, new: &[u8]) {
     bytes[at..at + new.len()].copy_from_slice(new);

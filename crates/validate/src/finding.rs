@@ -175,8 +175,8 @@ impl Findings {
         Self {
             format,
             cap,
-            slots: Check::ALL.iter().map(|_| Mutex::default()).collect(),
-            checked: Check::ALL.iter().map(|_| AtomicU64::new(0)).collect(),
+            slots: std::iter::repeat_with(Mutex::default).take(Check::COUNT).collect(),
+            checked: std::iter::repeat_with(AtomicU64::default).take(Check::COUNT).collect(),
         }
     }
 

@@ -4,7 +4,7 @@ use pointmill_format::DatasetKind;
 use serde::Serialize;
 
 use crate::check::Check;
-use crate::finding::{CheckResult, Finding};
+use crate::finding::{CheckResult, Finding, Findings};
 
 /// What a validation found. Serialises to the object of `validate --json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,6 +33,24 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// What the checks found; nothing else is known yet.
+    pub(crate) fn new(findings: Findings) -> Self {
+        let format = findings.format();
+        let (checks, problems) = findings.finish();
+        Self {
+            ok: checks.iter().all(|c| c.ok),
+            format,
+            encoding: None,
+            points: 0,
+            nodes: 0,
+            checks,
+            problems,
+            quality: Vec::new(),
+            leaves: None,
+            against: None,
+        }
+    }
+
     /// The account of a check; `None` if the format does not have it.
     pub fn check(&self, check: Check) -> Option<&CheckResult> {
         self.checks.iter().find(|c| c.name == check)

@@ -3,6 +3,7 @@
 use pointmill_format::Lattice;
 use pointmill_format::batches::{Header, Precision};
 use pointmill_testkit::Random;
+use pointmill_testkit::damage::hit;
 
 use crate::util::{Points, golden, open};
 
@@ -132,27 +133,20 @@ fn survives(bytes: &[u8], seed: u64, rounds: usize) -> usize {
         for _ in 0..1 + random.below(3) {
             // a third in the header and the records, a third in the description, a third anywhere
             let len = bytes.len() as u64;
+            if len == 0 {
+                break;
+            }
             let at = match random.below(3) {
                 0 => random.below(512.min(len)),
                 1 => len - 1 - random.below(900.min(len)),
                 _ => random.below(len),
             } as usize;
-            match random.below(6) {
-                0 => bytes.truncate(at.max(1)),
-                1 => bytes[at] = bytes[at].wrapping_add(1),
-                2 => bytes[at] ^= 1 << random.below(8),
-                3 => {
-                    let extreme = [u64::MAX, 1 << 63, u64::from(u32::MAX), 256, 0][random.below(5) as usize];
-                    let end = (at + 8).min(bytes.len());
-                    bytes[at..end].copy_from_slice(&extreme.to_le_bytes()[..end - at]);
-                }
-                4 => bytes[at] = b"0123456789.-e\",[]{}"[random.below(19) as usize],
-                _ => {
-                    let field =
-                        [16, 24, 28, 112, 116, 120, 128, 136, 144, 152, 160, 168, 176, 184][random.below(14) as usize];
-                    if let Some(b) = bytes.get_mut(field + random.below(4) as usize) {
-                        *b = random.below(256) as u8;
-                    }
+            if random.below(6) > 0 {
+                hit(&mut bytes, at, &mut random);
+            } else {
+                let field = random.pick(&[16, 24, 28, 112, 116, 120, 128, 136, 144, 152, 160, 168, 176, 184]);
+                if let Some(b) = bytes.get_mut(field + random.index(4)) {
+                    *b = random.below(256) as u8;
                 }
             }
         }

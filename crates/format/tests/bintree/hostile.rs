@@ -3,6 +3,7 @@
 use pointmill_format::bintree::Layout;
 use pointmill_format::bytes::Memory;
 use pointmill_testkit::Random;
+use pointmill_testkit::damage::{hit, peak_memory_bytes};
 
 use crate::exercise::exercise;
 use crate::util::{FAR, corridor, files_of, golden, load, open, read_all};
@@ -230,35 +231,6 @@ fn an_index_that_ends_anywhere_is_refused() {
     }
 }
 
-fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
-    let at = random.index(bytes.len());
-    match random.index(6) {
-        0 => bytes.truncate(at),
-        1 => bytes[at] = b"0123456789.-e\",[]{}"[random.index(19)],
-        2 => {
-            let number: &[u8] = [&b"1e308"[..], b"-1", b"18446744073709551615", b"4294967295", b"0"][random.index(5)];
-            bytes.splice(at..(at + random.index(4)).min(bytes.len()), number.iter().copied());
-        }
-        3 => {
-            let end = (at + random.index(60)).min(bytes.len());
-            let copy = bytes[at..end].to_vec();
-            let to = random.index(bytes.len());
-            bytes.splice(to..to, copy);
-        }
-        _ => (0..1 + random.index(4)).for_each(|_| {
-            let at = random.index(bytes.len());
-            bytes[at] ^= 1 << random.index(8);
-        }),
-    }
-}
-
-/// Highest resident set of this process, where the system reports it.
-fn peak_memory_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
-}
-
 #[test]
 fn damaged_files_give_points_or_an_error_within_bounded_memory() {
     let index = |layout: &str| std::fs::read(golden(layout).join("index.json")).unwrap();
@@ -274,7 +246,8 @@ fn damaged_files_give_points_or_an_error_within_bounded_memory() {
     for seed in 0..4000 {
         let random = &mut Random::new(seed);
         let (mut index, mut leaves) = originals[random.index(4)].clone();
-        mutate(if random.index(4) == 0 { &mut leaves } else { &mut index }, random);
+        let file = if random.index(4) == 0 { &mut leaves } else { &mut index };
+        hit(file, random.index(file.len()), random);
         match exercise(&index, &leaves) {
             Ok(_) => read += 1,
             Err(e) => {

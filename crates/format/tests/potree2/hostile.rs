@@ -7,6 +7,7 @@ use pointmill_format::potree2::{
 };
 use pointmill_format::{Attribute, AttributeType, NodeKey, NodePoints, ReadError};
 use pointmill_testkit::Random;
+use pointmill_testkit::damage::{hit, peak_memory_bytes};
 use pointmill_testkit::files::corpus;
 
 use crate::util::{attributes, file_mut, golden, load, memory, metadata, one_node, open};
@@ -47,31 +48,6 @@ fn assert_fault(files: &Memory, part: &str) {
     assert!(fault.contains(part) && !fault.contains('\n'), "{fault}");
 }
 
-fn mutate(files: &mut Memory, random: &mut Random) {
-    let file = file_mut(files, [METADATA_FILE, HIERARCHY_FILE, OCTREE_FILE][random.index(3)]);
-    let at = random.index(file.len());
-    match random.index(5) {
-        0 => file.truncate(at),
-        1 => {
-            let extreme = [u64::MAX, 1 << 63, u64::from(u32::MAX), 1 << 40, 0][random.index(5)].to_le_bytes();
-            let end = (at + 1 + random.index(8)).min(file.len());
-            file[at..end].copy_from_slice(&extreme[..end - at]);
-        }
-        2 => file[at] = b"0123456789.-e\",[]{}"[random.index(19)],
-        _ => (0..1 + random.index(4)).for_each(|_| {
-            let at = random.index(file.len());
-            file[at] ^= 1 << random.index(8);
-        }),
-    }
-}
-
-/// Highest resident set of this process, where the system reports it.
-fn peak_memory_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
-}
-
 #[test]
 fn damaged_files_give_points_or_an_error_within_bounded_memory() {
     let mut originals: Vec<Memory> = ["default", "brotli"].map(|e| load(&golden(e))).into();
@@ -80,7 +56,8 @@ fn damaged_files_give_points_or_an_error_within_bounded_memory() {
     for seed in 0..4_000 {
         let random = &mut Random::new(seed);
         let mut files = originals[random.index(originals.len())].clone();
-        mutate(&mut files, random);
+        let file = file_mut(&mut files, random.pick(&[METADATA_FILE, HIERARCHY_FILE, OCTREE_FILE]));
+        hit(file, random.index(file.len()), random);
         match read_all(&files) {
             Ok(_) => read += 1,
             Err(e) => {

@@ -255,17 +255,10 @@ fn stopped(findings: Findings, done: &[Check], why: &str, header: Option<&Header
 }
 
 fn finish(findings: Findings, header: Option<&Header>) -> Outcome {
-    let (checks, problems) = findings.finish();
     Outcome {
-        ok: checks.iter().all(|c| c.ok),
-        format: DatasetKind::Batches,
         encoding: header.map(|h| if h.compressed() { "zstd" } else { "raw" }),
         points: header.map_or(0, |h| h.points),
         nodes: header.map_or(0, |h| h.batches),
-        checks,
-        problems,
-        quality: Vec::new(),
-        leaves: None,
-        against: None,
+        ..Outcome::new(findings)
     }
 }

@@ -76,18 +76,13 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let against = compare(against.as_ref(), &tree, &unknown, &context)?;
 
     let header = dataset.header();
-    let (checks, problems) = findings.finish();
     Ok(Outcome {
-        ok: checks.iter().all(|c| c.ok),
-        format: DatasetKind::Bintree,
         encoding: Some(header.layout.name()),
         points: header.points,
         nodes: dataset.nodes().len() as u64,
-        checks,
-        problems,
-        quality: Vec::new(),
         leaves: Some(quality),
         against,
+        ..Outcome::new(findings)
     })
 }
 
@@ -164,17 +159,5 @@ fn unreadable_index(findings: Findings, error: &ReadError) -> Outcome {
     }
     let at = error.offset().map_or_else(String::new, |at| format!(" (byte {at})"));
     findings.push(Finding::new(check, subject, "a tree", error.what() + &at));
-    let (checks, problems) = findings.finish();
-    Outcome {
-        ok: false,
-        format: DatasetKind::Bintree,
-        encoding: None,
-        points: 0,
-        nodes: 0,
-        checks,
-        problems,
-        quality: Vec::new(),
-        leaves: None,
-        against: None,
-    }
+    Outcome::new(findings)
 }

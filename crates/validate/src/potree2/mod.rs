@@ -96,18 +96,13 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     };
 
     let quality = quality(&tree, &walked, &geometry);
-    let (checks, problems) = findings.finish();
     Ok(Outcome {
-        ok: checks.iter().all(|c| c.ok),
-        format: DatasetKind::Potree2,
         encoding: Some(metadata.encoding.name()),
         points: metadata.points,
         nodes: tree.nodes.len() as u64,
-        checks,
-        problems,
         quality,
-        leaves: None,
         against: summary,
+        ..Outcome::new(findings)
     })
 }
 
@@ -129,19 +124,7 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: &ReadError) -> 
     if findings.found(Check::Metadata) == 0 {
         findings.push(Finding::new(Check::Metadata, "metadata.json", "valid metadata", error.what()));
     }
-    let (checks, problems) = findings.finish();
-    Ok(Outcome {
-        ok: false,
-        format: DatasetKind::Potree2,
-        encoding: None,
-        points: 0,
-        nodes: 0,
-        checks,
-        problems,
-        quality: Vec::new(),
-        leaves: None,
-        against: None,
-    })
+    Ok(Outcome::new(findings))
 }
 
 fn say_what_was_skipped(

@@ -21,17 +21,23 @@ pub(crate) trait Number: Copy {
     fn as_u16(self) -> Option<u16>;
 }
 
+macro_rules! read_in_either_order {
+    () => {
+        #[inline]
+        fn read(bytes: &[u8], endian: Endian) -> Self {
+            let bytes = bytes.try_into().unwrap_or_default();
+            match endian {
+                Endian::Little => Self::from_le_bytes(bytes),
+                Endian::Big => Self::from_be_bytes(bytes),
+            }
+        }
+    };
+}
+
 macro_rules! integers {
     ($($ty:ty)*) => {$(
         impl Number for $ty {
-            #[inline]
-            fn read(bytes: &[u8], endian: Endian) -> Self {
-                let bytes = bytes.try_into().unwrap_or_default();
-                match endian {
-                    Endian::Little => Self::from_le_bytes(bytes),
-                    Endian::Big => Self::from_be_bytes(bytes),
-                }
-            }
+            read_in_either_order!();
 
             #[inline]
             fn as_f64(self) -> f64 {
@@ -55,14 +61,7 @@ macro_rules! integers {
 macro_rules! floats {
     ($($ty:ty)*) => {$(
         impl Number for $ty {
-            #[inline]
-            fn read(bytes: &[u8], endian: Endian) -> Self {
-                let bytes = bytes.try_into().unwrap_or_default();
-                match endian {
-                    Endian::Little => Self::from_le_bytes(bytes),
-                    Endian::Big => Self::from_be_bytes(bytes),
-                }
-            }
+            read_in_either_order!();
 
             #[inline]
             fn as_f64(self) -> f64 {
