@@ -10,5 +10,5 @@ pub(crate) fn inside(folder: &Path) -> Vec<Located> {
     if !folder.join("report.json").is_file() {
         return Vec::new();
     }
-    DatasetKind::ALL.into_iter().filter_map(|kind| locate(folder.join(kind.name())).ok()).collect()
+    DatasetKind::ALL.iter().filter_map(|kind| locate(folder.join(kind.name())).ok()).collect()
 }

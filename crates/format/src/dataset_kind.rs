@@ -81,7 +81,7 @@ const MARK_WITHIN_BYTES: u64 = 64 << 10;
 
 impl DatasetKind {
     /// Every kind.
-    pub const ALL: [Self; 3] = [Self::Potree2, Self::Bintree, Self::Batches];
+    pub const ALL: &[Self] = &[Self::Potree2, Self::Bintree, Self::Batches];
 
     const fn row(self) -> &'static Row {
         match self {
@@ -181,7 +181,7 @@ pub fn locate(path: impl AsRef<Path>) -> Result<Located, ReadError> {
 }
 
 fn find(path: &Path) -> Option<Located> {
-    let mut kinds = DatasetKind::ALL.into_iter();
+    let mut kinds = DatasetKind::ALL.iter().copied();
     if path.is_dir() {
         let kind = kinds.find(|kind| path.join(kind.marker_file()).is_file())?;
         let path = if kind.is_single_file() { path.join(kind.marker_file()) } else { path.to_path_buf() };
@@ -200,9 +200,9 @@ fn find(path: &Path) -> Option<Located> {
 
 /// What can be given instead, of every kind.
 fn advice() -> String {
-    let folders = DatasetKind::ALL.into_iter().filter(|kind| !kind.is_single_file());
+    let folders = DatasetKind::ALL.iter().copied().filter(|kind| !kind.is_single_file());
     let folders: Vec<String> = folders.map(|kind| format!("{} ({})", kind.marker_file(), kind.title())).collect();
-    let files = DatasetKind::ALL.into_iter().filter_map(|kind| kind.row().extension);
+    let files = DatasetKind::ALL.iter().copied().filter_map(|kind| kind.row().extension);
     let files: String = files.map(|extension| format!(", or a .{extension} file")).collect();
     format!("give a folder with {}{files}", folders.join(" or "))
 }
@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn a_dataset_is_found_by_the_file_it_is_known_by_or_its_folder() {
         let temp = tempfile::tempdir().unwrap();
-        for kind in DatasetKind::ALL {
+        for &kind in DatasetKind::ALL {
             let folder = temp.path().join(kind.name());
             let file = folder.join(kind.marker_file());
             fs::create_dir(&folder).unwrap();
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn files_belong_to_one_kind_and_names_come_back() {
-        let owned = |name| DatasetKind::ALL.into_iter().filter(|kind| kind.owns(name)).collect::<Vec<_>>();
+        let owned = |name| DatasetKind::ALL.iter().copied().filter(|kind| kind.owns(name)).collect::<Vec<_>>();
         for (name, kind) in [
             ("metadata.json", DatasetKind::Potree2),
             ("octree.bin", DatasetKind::Potree2),
@@ -267,7 +267,7 @@ mod tests {
         for name in ["", "n2.bin", "n01", "letter.txt", "report.json"] {
             assert_eq!(owned(name), [], "{name}");
         }
-        for kind in DatasetKind::ALL {
+        for &kind in DatasetKind::ALL {
             assert_eq!(kind.to_string().parse(), Ok(kind));
         }
         assert!("Potree".parse::<DatasetKind>().unwrap_err().to_string().contains("potree2, bintree, batches"));

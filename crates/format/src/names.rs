@@ -36,8 +36,11 @@ macro_rules! named {
             type Err = $crate::UnknownName;
 
             fn from_str(word: &str) -> Result<Self, Self::Err> {
-                let found = Self::ALL.into_iter().find(|choice| choice.name() == word);
-                found.ok_or_else(|| $crate::UnknownName::new(word, $choice, &Self::ALL.map(Self::name)))
+                let found = Self::ALL.iter().copied().find(|choice| choice.name() == word);
+                found.ok_or_else(|| {
+                    let known: Vec<_> = Self::ALL.iter().map(|choice| choice.name()).collect();
+                    $crate::UnknownName::new(word, $choice, &known)
+                })
             }
         }
     };

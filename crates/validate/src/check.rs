@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn no_format_has_two_checks_of_one_name_and_every_check_serves_a_format() {
-        for format in DatasetKind::ALL {
+        for &format in DatasetKind::ALL {
             let names: BTreeSet<_> = Check::of(format).iter().map(|c| c.name()).collect();
             assert_eq!(names.len(), Check::of(format).len(), "{format}");
         }

@@ -147,7 +147,7 @@ fn foreign_file(folder: &Path) -> Result<Option<PathBuf>, ()> {
     let kind = DatasetKind::detect(folder);
     let inside: Vec<&str> = match kind {
         None if folder.join(REPORT_FILE).is_file() => {
-            let names = DatasetKind::ALL.into_iter().map(DatasetKind::name);
+            let names = DatasetKind::ALL.iter().map(|kind| kind.name());
             names.filter(|name| foreign_file(&folder.join(name)).is_ok()).collect()
         }
         _ => Vec::new(),

@@ -151,7 +151,7 @@ pub enum ColourSource {
 
 impl ColourSource {
     /// Every source.
-    pub const ALL: [Self; 3] = [Self::Rgb, Self::Intensity, Self::None];
+    pub const ALL: &[Self] = &[Self::Rgb, Self::Intensity, Self::None];
 
     /// The word in the description.
     pub const fn name(self) -> &'static str {

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use crate::UnknownName;
 
-/// The type of one element of an attribute. All are stored little-endian.
+/// The type of one element of an attribute: all that the formats have. All are stored little-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)] // the names say it
 pub enum AttributeType {

@@ -15,7 +15,7 @@ pub enum Encoding {
 
 impl Encoding {
     /// Every encoding.
-    pub const ALL: [Self; 2] = [Self::Default, Self::Brotli];
+    pub const ALL: &[Self] = &[Self::Default, Self::Brotli];
 
     /// The word in the metadata.
     pub const fn name(self) -> &'static str {
