@@ -19,6 +19,14 @@ pub(crate) fn interleave(v: [u32; 3]) -> u64 {
     spread(v[0]) << 2 | spread(v[1]) << 1 | spread(v[2])
 }
 
+/// The way from a cell of the octree to the one `levels` (at most 21) below it that is `2^shift` units wide: three bits
+/// per level, the highest first.
+#[inline]
+pub(crate) fn path(t: TreePoint, shift: u32, levels: u32) -> u64 {
+    let mask = (1 << levels) - 1;
+    interleave(t.cell(shift).map(|c| c & mask))
+}
+
 /// Compares two points in Morton order without building their codes (31 bits per axis, x before y before z).
 #[inline]
 pub(crate) fn compare(a: [u32; 3], b: [u32; 3]) -> std::cmp::Ordering {

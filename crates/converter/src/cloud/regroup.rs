@@ -26,13 +26,12 @@ impl<'a> Regrouper<'a> {
     }
 
     /// Takes the records of `segments` and puts them back grouped by `code` (a Morton code: groups that are near in space
-    /// are near in the store). `found` gets the code of each group, its first record, and where it is; a code may come
-    /// several times.
+    /// are near in the store). `found` gets the code of each group and where it is; a code may come several times.
     pub(crate) fn regroup<'s>(
         &mut self,
         segments: impl IntoIterator<Item = &'s Segment>,
         mut code: impl FnMut(&[u8]) -> u64,
-        mut found: impl FnMut(u64, &[u8], Segment),
+        mut found: impl FnMut(u64, Segment),
     ) -> Result<(), ConvertError> {
         let mut source = None;
         for segment in segments {
@@ -64,7 +63,7 @@ impl<'a> Regrouper<'a> {
         &mut self,
         source: u32,
         code: &mut impl FnMut(&[u8]) -> u64,
-        found: &mut impl FnMut(u64, &[u8], Segment),
+        found: &mut impl FnMut(u64, Segment),
     ) -> Result<(), ConvertError> {
         let stride = self.stride;
         if self.records.is_empty() {
@@ -81,7 +80,7 @@ impl<'a> Regrouper<'a> {
         let block = self.store.open(source)?;
         let mut start = 0;
         for &(code, count) in &self.grouping.groups {
-            found(code, &self.sorted[start as usize * stride..][..stride], Segment { block, start, count });
+            found(code, Segment { block, start, count });
             start += count;
         }
         self.records.clear();

@@ -1,6 +1,8 @@
 //! Cuts the cloud into chunks: octree nodes small enough to be built in memory, alone. Which nodes these are changes
 //! nothing in the output; it is a matter of memory and load.
 
+use std::collections::BTreeMap;
+
 use pointmill_format::NodeKey;
 
 use crate::cloud::{Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, morton};
@@ -38,11 +40,8 @@ pub(super) fn divide(cloud: &Cloud<'_>, max_points: u64) -> Result<Vec<Chunk>, C
 
 /// The parts of a cell some levels below it, in Morton order.
 fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) -> Result<Vec<Cell>, ConvertError> {
-    let level = (u32::from(cell.key.level) + SPLIT_LEVELS).min(TREE_BITS);
-    let node = |t: TreePoint| {
-        let [x, y, z] = t.cell(TREE_BITS - level);
-        NodeKey { level: level as u8, x, y, z }
-    };
+    let levels = SPLIT_LEVELS.min(TREE_BITS - u32::from(cell.key.level));
+    let shift = TREE_BITS - u32::from(cell.key.level) - levels;
     let mut extremes: Option<(TreePoint, TreePoint)> = None;
     let code = |record: &[u8]| {
         let t = frame.tree(record);
@@ -51,24 +50,19 @@ fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) 
             lo[a] = lo[a].min(t[a]);
             hi[a] = hi[a].max(t[a]);
         }
-        morton::interleave(t.cell(TREE_BITS - level).map(|c| c & 0x1f_ffff))
+        morton::path(t, shift, levels)
     };
-    let mut parts: Vec<Cell> = Vec::new();
-    regrouper.regroup(&cell.segments, code, |_, first, segment| {
-        let key = node(frame.tree(first));
-        let at = parts.iter().position(|p| p.key == key).unwrap_or_else(|| {
-            let (segments, moments) = (Segments::default(), Moments::default());
-            parts.push(Cell { key, points: 0, segments, is_one_place: false, moments });
-            parts.len() - 1
-        });
-        parts[at].points += u64::from(segment.count);
-        parts[at].segments.push(segment);
-    })?;
-    if extremes.is_some_and(|(lo, hi)| lo == hi) {
-        parts.iter_mut().for_each(|p| p.is_one_place = true);
-    }
-    parts.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));
-    Ok(parts)
+    let mut parts = BTreeMap::<u64, Segments>::new();
+    regrouper.regroup(&cell.segments, code, |path, segment| parts.entry(path).or_default().push(segment))?;
+    let is_one_place = extremes.is_some_and(|(lo, hi)| lo == hi);
+    let part = |(path, segments): (u64, Segments)| Cell {
+        key: (0..levels).rev().fold(cell.key, |key, l| key.child((path >> (3 * l) & 7) as u8).unwrap_or(key)),
+        points: segments.iter().map(|s| u64::from(s.count)).sum(),
+        segments,
+        is_one_place,
+        moments: Moments::default(),
+    };
+    Ok(parts.into_iter().map(part).collect())
 }
 
 /// The highest nodes that are small enough (or hold one place only) become chunks.

@@ -28,8 +28,7 @@ pub(crate) fn order(records: &[u8], frame: &RecordFrame, level: u8, scratch: &mu
     let room = MortonSorter::room(trees.len());
     let levels = (room / 3).min(frame.cube.resolved_level().saturating_sub(level)).min(21);
     let shift = TREE_BITS - level - levels;
-    let mask = (1 << levels) - 1;
-    sorter.codes(trees.len()).extend(trees.iter().map(|t| morton::interleave(t.cell(shift).map(|c| c & mask))));
+    sorter.codes(trees.len()).extend(trees.iter().map(|t| morton::path(*t, shift, levels)));
     let bytes = |i: usize| &records[i * stride..][..stride];
     sorter.sort(3 * levels, 0, |a, b| morton::compare(trees[a].0, trees[b].0).then_with(|| bytes(a).cmp(bytes(b))));
     out.clear();

@@ -49,6 +49,7 @@ impl ColourSum {
     }
 
     /// Adds what another sum holds, as if its points had been added here.
+    #[inline]
     pub fn merge(&mut self, other: &Self) {
         self.points += other.points;
         for (sum, channel) in self.channels.iter_mut().zip(other.channels) {
@@ -63,6 +64,7 @@ impl ColourSum {
 
     /// The mean of each channel, halves rounded up; 0 without points.
     #[must_use]
+    #[inline]
     pub fn mean(&self) -> [u8; 3] {
         let points = self.points.max(1);
         self.channels.map(|sum| ((sum + points / 2) / points) as u8)

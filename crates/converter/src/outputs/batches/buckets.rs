@@ -184,7 +184,7 @@ fn divide(
         |(regrouper, buckets), piece| {
             let (segments, level) = &pieces[piece];
             let code = |record: &[u8]| start_of(frame.bucket(position(record)), *level);
-            regrouper.regroup(segments, code, |code, _, segment| {
+            regrouper.regroup(segments, code, |code, segment| {
                 buckets.entry((code, *level)).or_default().push(segment);
             })
         },

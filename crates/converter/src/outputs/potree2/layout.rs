@@ -3,7 +3,7 @@
 
 use pointmill_format::Attribute;
 
-use crate::cloud::{RecordFrame, position};
+use crate::cloud::RecordFrame;
 use crate::sources::{POSITION_BYTES, Schema};
 
 /// Which bytes of a stored record go where.
@@ -52,11 +52,8 @@ impl OutputLayout {
             }
         }
         for record in out[start..].chunks_exact_mut(self.stride) {
-            let q = position(record);
-            if let Some(bytes) = record.first_chunk_mut::<POSITION_BYTES>() {
-                for (channel, v) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(0..3) {
-                    *channel = (q[v] as u32).wrapping_add(self.shift[v]).to_le_bytes();
-                }
+            for (axis, shift) in record[..POSITION_BYTES].as_chunks_mut::<4>().0.iter_mut().zip(self.shift) {
+                *axis = u32::from_le_bytes(*axis).wrapping_add(shift).to_le_bytes();
             }
         }
     }
