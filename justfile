@@ -19,7 +19,7 @@ features:
 
 # Converts the scan in fixtures/ and validates the dataset, as the README does
 demo:
-    eval "$(sed -n '/^cargo run --release/p' README.md)"
+    eval "$(sed -n '/^cargo run/p' README.md)"
 
 # All of it
 ci:
