@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Options in the documents that are not pointmill's: of cargo, and of `side_by_side` and `trade_offs` in the bench crate.
-const OTHER_OPTIONS: [&str; 17] = [
+const OTHER_OPTIONS: &[&str] = &[
     "--all-features",
     "--bin",
     "--bench",
@@ -19,6 +19,7 @@ const OTHER_OPTIONS: [&str; 17] = [
     "--out",
     "--path",
     "--points",
+    "--profile",
     "--release",
     "--runs",
     "--scene",
