@@ -26,7 +26,7 @@ fn las_parse(c: &mut Criterion) {
         let scan = match las::open(&path) {
             Ok(scan) => scan,
             Err(error) => {
-                eprintln!("las_parse/{ending} is left out: {error}");
+                eprintln!("las_parse/{ending} is omitted: {error}");
                 continue;
             }
         };

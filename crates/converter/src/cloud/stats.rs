@@ -58,7 +58,7 @@ pub(crate) struct SourceStats {
     pub(crate) bounds: Aabb,
     /// Range of the colour of the points that go in.
     pub(crate) rgb: Range,
-    /// Range of the colour of batches that the filter cut, points that it left out included.
+    /// Range of the colour of batches that the filter cut, points that it omitted included.
     pub(crate) rgb_unfiltered: Range,
 }
 

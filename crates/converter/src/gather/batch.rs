@@ -84,7 +84,7 @@ impl<'a> Worker<'a> {
         if kept == 0 {
             return Ok(());
         }
-        // Identity, if nothing was left out: then the rows of a slice are consecutive.
+        // Identity, if nothing was omitted: then the rows of a slice are consecutive.
         let selection = std::mem::take(&mut self.selection);
         let mut outcome = Ok(());
         let mut start = 0;

@@ -5,7 +5,7 @@ use pointmill_format::{Column, PointBatch};
 use super::context::Context;
 use crate::cloud::Stats;
 
-/// What colour values mean is a property of the whole file: points that are left out count as well.
+/// What colour values mean is a property of the whole file: points that are omitted count as well.
 pub(super) fn unfiltered_colour(pass: &Context<'_>, source: usize, batch: &PointBatch, stats: &mut Stats) {
     let places = &pass.intake.sources[source].columns;
     let Some(rgb) = pass.intake.schema.rgb() else { return };

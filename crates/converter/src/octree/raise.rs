@@ -1,7 +1,7 @@
 //! The rule by which points move up the tree, the same inside a chunk and above the chunks.
 //!
 //! A node is a leaf if it holds no more points than the capacity, or if all of them share one place. An inner node
-//! takes a sample of what its children hold; they keep the rest. A leaf that loses everything is left out. An inner
+//! takes a sample of what its children hold; they keep the rest. A leaf that loses everything is omitted. An inner
 //! node that loses everything takes one point back from below, so that no inner node is empty and yet no sample has a
 //! hole. That is why nodes stay *pending* until nothing above can ask them any more; nearly always that is known at
 //! once, because a node has many pairs of points of which its parent can take one only.

@@ -1,4 +1,4 @@
-//! Which attributes a dataset keeps, and why others are left out.
+//! Which attributes a dataset keeps, and why others are omitted.
 
 use crate::cloud::Range;
 use crate::plan::AttributeChoice;

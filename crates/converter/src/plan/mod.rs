@@ -55,7 +55,7 @@ pub enum AttributeChoice {
     Usual,
     /// All that any input has.
     All,
-    /// All but those that have one value everywhere; the report names what is left out.
+    /// All but those that have one value everywhere; the report names what is omitted.
     Scene,
     /// These, in this order; `position` is implied.
     List(Vec<String>),

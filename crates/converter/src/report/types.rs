@@ -57,7 +57,7 @@ pub struct OutputReport {
     pub duplicates_dropped: u64,
     /// Attributes that were kept.
     pub attributes: Vec<String>,
-    /// Attributes that were left out, and why.
+    /// Attributes that were omitted, and why.
     pub attributes_dropped: Vec<DroppedAttribute>,
     /// Bytes of its files.
     pub bytes: u64,

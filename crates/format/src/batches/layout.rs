@@ -55,9 +55,9 @@ pub struct Layout {
     pub colour: Section,
     /// Extra attributes, in the order in which they were given.
     pub attributes: Vec<Section>,
-    /// `None` if left out.
+    /// `None` if omitted.
     pub mid10: Option<Section>,
-    /// `None` if left out.
+    /// `None` if omitted.
     pub lo10: Option<Section>,
     /// Where the originals begin; their number is known at the end.
     pub originals: u64,

@@ -134,12 +134,12 @@ impl<B: AsRef<[u8]>> Batches<B> {
         self.words(Part::Hi10)
     }
 
-    /// Bits 19–10. `None` if the plane was left out or sections are compressed.
+    /// Bits 19–10. `None` if the plane was omitted or sections are compressed.
     pub fn mid10(&self) -> Option<&[u32]> {
         self.words(Part::Mid10)
     }
 
-    /// Bits 9–0. `None` if the plane was left out or sections are compressed.
+    /// Bits 9–0. `None` if the plane was omitted or sections are compressed.
     pub fn lo10(&self) -> Option<&[u32]> {
         self.words(Part::Lo10)
     }

@@ -54,7 +54,7 @@ impl Bintree {
         Ok(())
     }
 
-    /// What to draw from `camera` and how: leaves in preorder, those out of sight of `frustum`, if there is one, left out.
+    /// What to draw from `camera` and how: leaves in preorder, those out of sight of `frustum`, if there is one, omitted.
     ///
     /// `switch_distance`: see [`super::switch_distance`]. One pass over the part of the tree that is in sight; below a
     /// node that is far or near as a whole nothing is measured.

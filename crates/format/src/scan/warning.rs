@@ -85,7 +85,7 @@ pub enum ScanWarning {
     NoElevation,
     /// E57: a colour without red, green or blue is not read.
     ColourIncomplete,
-    /// E57: the rotation is no quaternion (`left out`) or none of length 1 (`normalised`).
+    /// E57: the rotation is no quaternion (`ignored`) or none of length 1 (`normalised`).
     Rotation { normalised: bool },
     /// E57: too many scans for numbers of 16 bits.
     SourceIdsShared { scans: usize },
@@ -151,7 +151,7 @@ impl ScanWarning {
             Self::Bounds => "the header's bounds are inverted or not finite; they are not used".to_owned(),
             Self::NoZ => "there is no z; it is 0 for every point".to_owned(),
             Self::ColumnIgnored { number, name } => {
-                format!("column {number} ({name}) holds no numbers; it is left out")
+                format!("column {number} ({name}) holds no numbers; it is omitted")
             }
             Self::ViewpointIgnored { viewpoint } => format!("the sensor's viewpoint ({viewpoint}) is not applied"),
             Self::GridSize { width, height, points } => {
@@ -239,7 +239,7 @@ impl ScanWarning {
             Self::NoElevation => "its points have no elevation; it is taken as 0",
             Self::ColourIncomplete => "its colour lacks red, green or blue; it is not read",
             Self::Rotation { normalised: true } => "the rotation is no unit quaternion; it is normalised",
-            Self::Rotation { normalised: false } => "the rotation is no quaternion; it is left out",
+            Self::Rotation { normalised: false } => "the rotation is no quaternion; it is ignored",
             _ => "",
         };
         fixed.to_owned()

@@ -103,7 +103,7 @@ pub(super) fn rgb_of(block: &Block, rules: &Rules, i: usize) -> Option<[u64; 3]>
 /// A dataset whose records can be read again, to look for those that differ.
 pub(crate) trait Records: Sync {
     /// Hands over every readable record, in blocks and with its place, in parallel; in any order. Broken payloads are
-    /// passed over: the walk has reported them.
+    /// skipped: the walk has reported them.
     ///
     /// # Errors
     /// The operating system could not read.

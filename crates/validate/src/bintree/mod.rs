@@ -68,7 +68,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let unknown = Unknown { lattice: !lattice_known, uncertain: quality.uncertain, unread: leaves_unread };
     let summaries = splits::check(&tree, summaries, &findings);
     degenerate::check(&tree, &summaries, &ends, &findings);
-    unknown.say_what_was_passed_over(&findings);
+    unknown.note_what_was_skipped(&findings);
 
     let records = Records { tree: &tree, readable: &readable };
     let memory_bytes = options.memory_bytes;
@@ -107,16 +107,14 @@ impl Unknown {
         }
     }
 
-    fn say_what_was_passed_over(&self, findings: &Findings) {
+    fn note_what_was_skipped(&self, findings: &Findings) {
         let unread = (self.unread > 0).then(|| format!("{} leaves could not be read", self.unread));
         if let Some(why) = self.integers() {
-            [Check::Positions, Check::LeafOrder]
-                .into_iter()
-                .for_each(|c| findings.note(c, format!("{why}: passed over")));
+            [Check::Positions, Check::LeafOrder].into_iter().for_each(|c| findings.note(c, format!("{why}: skipped")));
         }
         if let Some(why) = self.integers().or(unread) {
             for check in [Check::SplitAxis, Check::Split, Check::Sides, Check::Degenerate] {
-                findings.note(check, format!("{why}: nodes above were passed over"));
+                findings.note(check, format!("{why}: nodes above were skipped"));
             }
         }
     }

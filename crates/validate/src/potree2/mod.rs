@@ -84,7 +84,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         max_problems: options.max_problems,
     })?;
     checks::ranges::check(metadata, &geometry, &walked.seen, walked.unreadable == 0, &findings);
-    say_what_was_skipped(&walked, &dataset, &geometry, options, &findings);
+    note_what_was_skipped(&walked, &dataset, &geometry, options, &findings);
     let summary = match &against {
         Some(against) => Some(against.compare(&Context {
             records: &Records { dataset: &dataset, tree: &tree },
@@ -127,7 +127,7 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: &ReadError) -> 
     Ok(Outcome::new(findings))
 }
 
-fn say_what_was_skipped(
+fn note_what_was_skipped(
     walked: &Walked,
     dataset: &Dataset,
     geometry: &Geometry,

@@ -1,4 +1,4 @@
-//! Files whose planes do not tell the lattice integers: what is certain is checked, and the rest is said.
+//! Files whose planes do not determine the lattice integers: what is certain is checked, the rest is reported.
 
 use pointmill_validate::{Check, Severity};
 

@@ -26,7 +26,7 @@ pub(crate) struct Args {
     /// Two sizes of scene that the job `growth` compares, points
     #[arg(long, value_delimiter = ',', default_value = "5000000,100000000", value_parser = parse_count)]
     pub(crate) growth: Vec<u64>,
-    /// Runs of each program; the median is told
+    /// Runs of each program; the median is reported
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) runs: u32,
     /// Where scenes (kept and used again) and outputs (removed) go; the default is a folder for temporary files
@@ -35,7 +35,7 @@ pub(crate) struct Args {
     /// The pointmill to measure; the default is built and found beside this program
     #[arg(long)]
     pub(crate) pointmill: Option<PathBuf>,
-    /// A line to add under the machine, such as the version of a program that does not tell it
+    /// A line to add under the machine, such as the version of a program that does not report it
     #[arg(long)]
     pub(crate) note: Vec<String>,
     /// Markdown file whose section of this scene is replaced or added; the default is standard output

@@ -2,7 +2,7 @@
 //! turn, and writes what each run cost as Markdown, with the ratios that count.
 //!
 //! What the numbers do not show: disks (inputs come from the page cache), other scans than the generated ones, and
-//! the quality of what was written (`pointmill validate` tells that).
+//! the quality of what was written (`pointmill validate` reports that).
 
 mod args;
 mod cases;
@@ -121,7 +121,7 @@ fn on_path(program: &str) -> bool {
     let found = std::env::var_os("PATH")
         .is_some_and(|path| std::env::split_paths(&path).any(|dir| dir.join(program).is_file()));
     if !found {
-        eprintln!("{program} is not on PATH and is left out");
+        eprintln!("{program} is not on PATH and is omitted");
     }
     found
 }

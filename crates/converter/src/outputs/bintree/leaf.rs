@@ -128,7 +128,7 @@ enum Extra {
     Rgba(usize),
 }
 
-/// Optional columns, and why others are left out.
+/// Optional columns, and why others are omitted.
 fn extras(cloud: &Cloud<'_>, class: Option<usize>) -> (Vec<Extra>, DropReason) {
     let schema = cloud.schema();
     let others = (0..schema.attributes.len()).filter(|i| Some(*i) != class);
@@ -160,7 +160,7 @@ fn named(schema: &Schema, names: &[String], class: Option<usize>) -> Vec<Extra> 
     extras
 }
 
-/// Where constant attributes are left out, names the value that each has.
+/// Where constant attributes are omitted, names the value that each has.
 fn name_constants(schema: &Schema, ranges: &[Range], dropped: &mut [DroppedAttribute]) {
     for d in dropped {
         if let Some(values) = schema.find(&d.name).and_then(|i| ranges[i].constant()) {

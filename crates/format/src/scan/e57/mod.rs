@@ -15,7 +15,7 @@
 //! * All other fields keep their names, and their integers as they are stored ([`Attribute::scale`] and `offset` give
 //!   what scaled ones mean). A scan that lacks a field has zeros. Times marked as invalid are NaN, or 0 as integers.
 //! * `rowIndex` and `columnIndex` come only if [`E57Options::keep_row_column`] asks for them.
-//! * Images and text fields are not read, as [`ScanInfo::warnings`] reports; other extensions are passed over.
+//! * Images and text fields are not read, as [`ScanInfo::warnings`] reports; other extensions are skipped.
 //!
 //! ```no_run
 //! use pointmill_format::scan::e57;

@@ -8,7 +8,7 @@ use super::fields::Encoding;
 pub(super) const PADDING: usize = 16;
 
 /// Calls `put(i, value)` with the stored bits of each of `n` values, `bits` (0–64) wide. `bytes`: the packed values
-/// and [`PADDING`]; values that are not there are left out.
+/// and [`PADDING`]; values that are not there are omitted.
 #[inline(always)]
 fn each_packed(bits: u32, bytes: &[u8], n: usize, mut put: impl FnMut(usize, u64)) {
     macro_rules! whole {

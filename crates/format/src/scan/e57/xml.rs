@@ -1,7 +1,7 @@
 //! The XML section, as the `e57` crate understands it.
 //!
 //! The crate `e57` reads a separate file in memory, header and XML alone: what it need not or cannot read is taken out
-//! first. Text fields (which it refuses) become constants of a value that marks them; images are left out if they are
+//! first. Text fields (which it refuses) become constants of a value that marks them; images are omitted if they are
 //! what it stumbles over.
 
 use std::io::Cursor;

@@ -126,7 +126,7 @@ impl Layout {
     }
 
     /// Finds layered chunks without a table, up to `end` or until `point_limit` points are found. What follows the
-    /// last whole chunk is left out.
+    /// last whole chunk is omitted.
     pub(super) fn walk(&self, source: &Source, end: u64, point_limit: u64) -> Result<Vec<Chunk>, ReadError> {
         let (mut at, mut points, mut chunks) = (self.chunks_start(), 0, Vec::new());
         while points < point_limit {

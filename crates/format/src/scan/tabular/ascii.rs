@@ -149,7 +149,7 @@ fn store_checked<T>(
     Ok(())
 }
 
-/// Values side by side, if the column is of their type and not left out.
+/// Values side by side, if the column is of their type and not omitted.
 fn put<T: Element, const N: usize>(column: &mut Column, at: usize, values: [T; N]) {
     if let Some(out) = column.values_mut::<T>().and_then(|v| v.get_mut(at..at + N)) {
         out.copy_from_slice(&values);
@@ -183,7 +183,7 @@ impl<'a> Tokens<'a> {
         b <= b' ' || Some(b) == self.separator
     }
 
-    /// The bytes up to the next separator, which is passed over; without quotes.
+    /// The bytes up to the next separator, which is skipped; without quotes.
     pub(crate) fn token(&mut self) -> &'a [u8] {
         let start = self.start();
         if self.line.get(start) == Some(&b'"') {

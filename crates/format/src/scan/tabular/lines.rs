@@ -69,7 +69,7 @@ pub(crate) fn walk(
 }
 
 /// Counts the rows from byte `from` on and cuts them into pieces that number from 0.
-/// A line is a row if `is_row` says so; the others are passed over. Stops before row `limit`.
+/// A line is a row if `is_row` says so; the others are skipped. Stops before row `limit`.
 pub(crate) fn index(
     source: &Source,
     from: u64,

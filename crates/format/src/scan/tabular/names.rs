@@ -15,7 +15,7 @@ pub(crate) enum Role {
     Classification,
     /// Three colours (and alpha) in the bits of one 32-bit number, as PCL stores them.
     PackedColour,
-    /// Nothing: it is passed over.
+    /// Nothing: it is skipped.
     Padding,
     /// Anything else: the name under which it is kept.
     Other(String),

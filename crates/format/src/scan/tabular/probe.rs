@@ -45,7 +45,7 @@ impl ColumnRange {
     }
 }
 
-/// The ranges of the fields `picks` (indices) in a sample of the rows. Rows that cannot be read are passed over here;
+/// The ranges of the fields `picks` (indices) in a sample of the rows. Rows that cannot be read are skipped here;
 /// the decode reports them.
 fn probe_fields(scan: &RowScan, picks: &[usize]) -> Vec<ColumnRange> {
     let mut ranges = vec![ColumnRange::EMPTY; picks.len()];
@@ -89,7 +89,7 @@ pub(crate) fn probe_rows(scan: &RowScan, picks: &[usize], mut visit: impl FnMut(
     }
 }
 
-/// The fields `picks` as one column of doubles, everything else left out.
+/// The fields `picks` as one column of doubles, everything else omitted.
 fn probe_schema(schema: &Schema, picks: &[usize]) -> Schema {
     let field = |(i, f): (usize, &Field)| {
         let target = match (picks.iter().position(|p| *p == i), f.target) {

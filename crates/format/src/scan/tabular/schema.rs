@@ -16,7 +16,7 @@ pub(crate) struct Property {
     pub(crate) elements: usize,
     /// Bytes from the start of the record to the first one; unused in text.
     pub(crate) at: usize,
-    /// A list: `ty` is the type of its length; `elements` is 1. It is passed over.
+    /// A list: `ty` is the type of its length; `elements` is 1. It is skipped.
     pub(crate) list: bool,
 }
 

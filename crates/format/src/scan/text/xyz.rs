@@ -65,7 +65,7 @@ impl Head {
         if numeric.iter().filter(|n| **n).count() < 2 {
             let what = format!("the line {:?} is no row of numbers", shown(row));
             return Err(ReadError::broken(source.path(), at, what)
-                .advise("only one header line is passed over; delete the others or start them with #"));
+                .advise("only one header line is skipped; delete the others or start them with #"));
         }
         Ok(Self { names, start: at, separator, numeric })
     }
