@@ -18,6 +18,9 @@ pub struct LatticeReason {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub enum LatticeBasis {
+    /// Not chosen yet: the headers do not suffice.
+    #[default]
+    Open,
     /// The plan.
     Requested,
     /// The lattice that all sources share.
@@ -38,7 +41,6 @@ pub enum LatticeBasis {
     /// The step in which the sources store coordinates.
     StoredStep,
     /// Neither lattice nor extent: the usual step.
-    #[default]
     Usual,
     /// The finest power of ten.
     PowerOfTen,
@@ -47,6 +49,7 @@ pub enum LatticeBasis {
 impl fmt::Display for LatticeReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.basis {
+            LatticeBasis::Open => f.write_str("known once the points are read"),
             LatticeBasis::Requested => f.write_str("as requested"),
             LatticeBasis::Sources => f.write_str("that of the sources"),
             LatticeBasis::FinestOfSources => f.write_str("the finest scale of the sources, per axis"),

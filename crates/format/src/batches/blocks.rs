@@ -1,17 +1,31 @@
 //! Compressed sections: blocks of whole batches, each a zstd frame (`docs/formats/batches.md`, §8).
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use super::{AlignedBytes, Part};
 
 /// Most batches of a block: 10 MiB of words.
 pub(super) const MAX_BATCHES_PER_BLOCK: u32 = 256;
 
 /// One block, decompressed. Reuse one for sections that are read batch by batch: batches of the same block cost nothing.
+/// It may serve several files.
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(not(feature = "zstd"), allow(dead_code))] // the same type in all builds; without zstd nothing fills it
 pub struct BlockScratch {
-    /// What `bytes` holds.
-    block: Option<(Part, u32)>,
+    /// What `bytes` holds: file, section and block.
+    block: Option<(FileId, Part, u32)>,
     bytes: AlignedBytes,
+}
+
+/// An open file, told apart from all others that this process has opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct FileId(u64);
+
+impl FileId {
+    pub(super) fn new() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
 }
 
 /// The head of a section: batches a block, and the number of blocks, as far as the bytes go.
@@ -56,7 +70,7 @@ pub use zstd_blocks::DEFAULT_BATCHES_PER_BLOCK;
 #[cfg(feature = "zstd")]
 mod zstd_blocks {
     use super::super::{BATCH_POINTS, Part};
-    use super::{BlockScratch, entry, head};
+    use super::{BlockScratch, FileId, entry, head};
 
     /// Batches of a block unless another number is given: 640 KiB of words.
     pub const DEFAULT_BATCHES_PER_BLOCK: u32 = 16;
@@ -66,26 +80,27 @@ mod zstd_blocks {
     const MAX_RATIO: u64 = 32_768;
 
     impl BlockScratch {
-        /// The raw bytes of `slot`, out of a checked compressed `section` with `size` bytes per point.
+        /// The raw bytes of `slot`, out of a checked compressed `section` with `size` bytes per point; the pair says which
+        /// section it is.
         ///
         /// On failure: where in the section, and what.
         pub(in super::super) fn batch(
             &mut self,
             section: &[u8],
-            part: Part,
+            (file, part): (FileId, Part),
             size: usize,
             slot: u32,
             points: u64,
         ) -> Result<&[u8], (u64, String)> {
             let (per_block, _) = head(section).filter(|(k, _)| *k > 0).ok_or((0, "has no block table".to_owned()))?;
             let block = slot / per_block;
-            if self.block != Some((part, block)) {
+            if self.block != Some((file, part, block)) {
                 self.block = None;
                 let first = u64::from(block * per_block) * u64::from(BATCH_POINTS);
                 let full = u64::from(per_block) * u64::from(BATCH_POINTS);
                 let raw = points.saturating_sub(first).min(full) * size as u64;
                 self.decompress(section, block, raw)?;
-                self.block = Some((part, block));
+                self.block = Some((file, part, block));
             }
             let batch = BATCH_POINTS as usize * size;
             let bytes = self.bytes.as_ref();

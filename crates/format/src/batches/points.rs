@@ -30,7 +30,7 @@ pub struct BatchScratch {
 impl<B: AsRef<[u8]>> Batches<B> {
     /// Decodes one slot, with the planes of `precision` or as many of them as the file has; replaces the contents of
     /// `out`. Positions are world coordinates. The columns are `colour` (u32: colour words, [`rgb_of`] and [`lod_of`]),
-    /// then [`Self::attributes`].
+    /// then [`Self::attributes`]. After an error `out` has no points.
     ///
     /// ```
     /// use pointmill_format::{NodePoints, batches::{BatchScratch, Batches, Precision, lod_of}};
@@ -64,7 +64,14 @@ impl<B: AsRef<[u8]>> Batches<B> {
         let mut positions = out.take_world();
         let decoded = self.decode_positions(slot, precision, scratch, &mut positions);
         out.positions = Positions::World(positions);
-        decoded?;
+        if let Err(error) = decoded.and_then(|()| self.decode_columns(slot, scratch, out)) {
+            out.clear();
+            return Err(error);
+        }
+        Ok(())
+    }
+
+    fn decode_columns(&self, slot: u32, scratch: &mut BatchScratch, out: &mut NodePoints) -> Result<(), ReadError> {
         let attributes = self.attributes().enumerate().map(|(i, a)| (Part::Attribute(i), a.elements, a.size()));
         let parts = std::iter::once((Part::Colour, 1, 4)).chain(attributes);
         for ((column, (part, elements, size)), block) in out.columns.iter_mut().zip(parts).zip(&mut scratch.blocks[3..])

@@ -7,6 +7,7 @@ use bytemuck::{AnyBitPattern, Pod, Zeroable};
 use crate::bytes::ByteSource;
 use crate::{Attribute, Element, ReadError};
 
+use super::blocks::FileId;
 use super::check::{Check, Places};
 use super::header::CORRUPT;
 use super::{
@@ -24,7 +25,8 @@ pub struct Original {
     pub colour: u32,
 }
 
-/// An open file of quantised batches: any bytes that are aligned to 8, a map ([`Batches::map`]) or memory.
+/// An open file of quantised batches: any bytes that are aligned to 8, a map (feature `mmap`:
+/// `Batches::map`) or memory.
 ///
 /// Places and lengths were checked when it was opened. Threads may share it.
 ///
@@ -42,6 +44,7 @@ pub struct Original {
 /// ```
 #[derive(Debug)]
 pub struct Batches<B> {
+    id: FileId,
     bytes: B,
     path: PathBuf,
     header: Header,
@@ -101,7 +104,7 @@ impl<B: AsRef<[u8]>> Batches<B> {
         let description = check.description()?;
         let places = check.places(&description)?;
         check.records(cast(range(slice, places.records)))?;
-        Ok(Self { bytes, path: path.to_path_buf(), header, description, places })
+        Ok(Self { id: FileId::new(), bytes, path: path.to_path_buf(), header, description, places })
     }
 
     /// The fields of the header.
@@ -194,14 +197,14 @@ impl<B: AsRef<[u8]>> Batches<B> {
         }
         #[cfg(feature = "zstd")]
         {
-            scratch.batch(bytes, part, size, slot, self.header.points).map_err(|(at, what)| {
+            scratch.batch(bytes, (self.id, part), size, slot, self.header.points).map_err(|(at, what)| {
                 let what = format!("section {}: {what}", self.name(part));
                 ReadError::broken(&self.path, section.offset + at, what).advise(CORRUPT)
             })
         }
         #[cfg(not(feature = "zstd"))]
         {
-            let _ = (scratch, CORRUPT);
+            let _ = (scratch, self.id, CORRUPT);
             let what = "has compressed sections, which this program cannot read";
             Err(ReadError::unsupported(&self.path, what).advise("build it with the feature zstd"))
         }

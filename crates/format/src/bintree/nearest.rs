@@ -100,7 +100,7 @@ impl NearestPoints {
         // The farthest of those found is on top.
         let mut found = BinaryHeap::new();
         let limit2 = max_distance * max_distance;
-        if count == 0 || place.iter().any(|v| !v.is_finite()) {
+        if count == 0 || max_distance.is_nan() || max_distance < 0.0 || place.iter().any(|v| !v.is_finite()) {
             return Ok(Vec::new());
         }
         for (leaf, distance2) in self.boxes.nearest_neighbor_iter_with_distance_2(place) {

@@ -71,7 +71,8 @@ impl Bintree {
 
     /// The children of a node, low and high; none of a leaf.
     pub fn children(&self, index: u32) -> Option<[u32; 2]> {
-        Some([index + 1, self.node(index)?.high()?])
+        let high = self.node(index)?.high()?;
+        Some([index + 1, high])
     }
 
     /// The indices of all leaves, in preorder.

@@ -44,6 +44,7 @@ impl fmt::Display for Advice {
             Self::NameColumns => {
                 f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")
             }
+            Self::Supported(kinds) if kinds.is_empty() => f.write_str("this build reads no scans; enable a feature"),
             Self::Supported(kinds) => write!(f, "supported are {kinds}"),
             Self::CopyOrSupported(kinds) => {
                 write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")

@@ -127,6 +127,13 @@ impl NodePoints {
         }
     }
 
+    /// Leaves no points.
+    pub(crate) fn clear(&mut self) {
+        self.columns.iter_mut().for_each(Column::clear);
+        self.stored.clear();
+        self.positions = Positions::World(Default::default());
+    }
+
     /// The memory of integer positions, emptied, to be filled and put back.
     pub(crate) fn take_quantized(&mut self) -> [Vec<i32>; 3] {
         match std::mem::replace(&mut self.positions, Positions::Quantized(Default::default())) {

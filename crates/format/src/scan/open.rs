@@ -227,18 +227,27 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
     }
 }
 
-/// The extensions of scans. They never decide the kind, but show that a file was meant to be a scan.
-const ENDINGS: [&str; 11] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "off", "xyz", "asc", "csv"];
+/// The extensions of scans that this build reads. They never decide the kind, but show that a file was meant to be a scan.
+fn is_ending_of_scans(extension: &str) -> bool {
+    let endings: [(bool, &[&str]); 5] = [
+        (cfg!(feature = "las"), &["las", "laz"]),
+        (cfg!(feature = "e57"), &["e57"]),
+        (cfg!(feature = "ply"), &["ply"]),
+        (cfg!(feature = "pcd"), &["pcd"]),
+        (cfg!(feature = "text"), &["pts", "ptx", "off", "xyz", "asc", "csv"]),
+    ];
+    endings.iter().any(|(is_read, names)| *is_read && names.contains(&extension))
+}
 
 /// Why a file of no kind is refused: as no scan at all, or as one of which too little is left.
 fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     let supported = Advice::Supported(supported_scans());
-    match ending.filter(|e| ENDINGS.contains(&e.as_str())) {
+    match ending.filter(|e| is_ending_of_scans(e)) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),
         Some(ending) => ReadError::broken(path, 0, Fault::UnknownFormat { extension: Some(ending) })
             .advise(Advice::CopyOrSupported(supported_scans())),
-        None if starts_with_number(first) => {
+        None if cfg!(feature = "text") && starts_with_number(first) => {
             ReadError::broken(path, 0, Fault::Row("no whole row of three numbers or more".to_owned()))
                 .advise(Advice::NameColumns)
         }

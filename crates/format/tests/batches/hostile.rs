@@ -170,6 +170,9 @@ fn two_thousand_damaged_files_end_in_an_error_or_in_points() {
 
 #[cfg(feature = "zstd")]
 mod compressed {
+    use pointmill_format::NodePoints;
+    use pointmill_format::batches::{BatchScratch, compress};
+
     use super::*;
 
     fn blocks() -> Vec<u8> {
@@ -199,6 +202,30 @@ mod compressed {
         let mut bytes = blocks();
         bytes[hi10 + 37] -= 8; // one byte less in the raw block's header
         assert_fault(&bytes, "section hi10: block 0");
+    }
+
+    #[test]
+    fn one_scratch_serves_several_files_and_an_error_leaves_no_points() {
+        let compressed = |name: &str| {
+            let (raw, mut file) =
+                (open(&std::fs::read(golden(name)).unwrap()).unwrap(), std::io::Cursor::new(Vec::new()));
+            compress(&raw, &mut file, 3, 16).unwrap();
+            (raw, file.into_inner())
+        };
+        let (mut scratch, mut points, mut expected) =
+            (BatchScratch::default(), NodePoints::default(), NodePoints::default());
+        for (raw, bytes) in [compressed("example.qbatch"), compressed("far.qbatch")] {
+            open(&bytes).unwrap().read_batch(0, Precision::Thirty, &mut scratch, &mut points).unwrap();
+            raw.read_batch(0, Precision::Thirty, &mut BatchScratch::default(), &mut expected).unwrap();
+            let world = |p: &NodePoints| (0..p.len()).map(|i| p.world(i)).collect::<Vec<_>>();
+            assert_eq!((world(&points), points.columns()), (world(&expected), expected.columns()));
+        }
+        let mut bytes = blocks();
+        let colour = Header::parse(&bytes, "a".as_ref()).unwrap().sections.colour as usize;
+        bytes[colour + 24] ^= 0xff; // the frame behind the table of one block
+        let broken = open(&bytes).unwrap();
+        assert!(broken.read_batch(0, Precision::Thirty, &mut scratch, &mut points).is_err());
+        assert_eq!((points.len(), points.column::<u32>("colour")), (0, Some(&[][..])));
     }
 
     #[test]
