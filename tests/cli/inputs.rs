@@ -190,7 +190,7 @@ fn info_tells_how_finely_coordinates_are_stored() {
     assert_eq!(info(&dir, "las/format3.las", &[])["resolution"], Value::Null);
     let path = fixture("rows/open3d_f4_binary.pcd");
     let text = dir.succeed(["info", path.to_str().unwrap(), "--deep"]).stdout();
-    assert!(text.contains("stored x in single precision, steps of"), "{text}");
+    assert!(text.contains("stored in single precision, steps of"), "{text}");
 }
 
 #[test]

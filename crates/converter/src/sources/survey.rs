@@ -76,8 +76,8 @@ impl Survey {
         }
         let Sample { bounds, decimals, is_whole } = sample(scan);
         let sampled = (!bounds.is_empty()).then_some(Extent { bounds, is_sampled: !is_whole });
-        let fineness =
-            std::array::from_fn(|a| stated(info.resolution[a], decimals[a].grid(bounds.max[a] - bounds.min[a])));
+        let longest = [0, 1, 2].map(|a| bounds.max[a] - bounds.min[a]).into_iter().fold(0.0, f64::max);
+        let fineness = std::array::from_fn(|a| stated(info.resolution[a], decimals[a].grid(longest)));
         Self { extent: declared.or(sampled), fineness }
     }
 }
