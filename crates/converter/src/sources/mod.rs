@@ -12,7 +12,7 @@ pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
 pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
 #[cfg(test)]
 pub(crate) use survey::Extent;
-pub(crate) use survey::{Fineness, Survey, far_out, intersection};
+pub(crate) use survey::{Fineness, Survey, far_out, intersection, single_step};
 
 use self::divisor::Divisors;
 use crate::error::{ConvertError, InputFault};
