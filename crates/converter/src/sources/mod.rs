@@ -6,7 +6,8 @@ mod schema;
 
 use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
-pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
+pub(crate) use crs::resolve_all as resolve_crs_of_all;
+pub use crs::{ResolvedCrs, resolve_crs};
 pub(crate) use extent::{Extent, far_out, intersection};
 pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
 

@@ -31,7 +31,7 @@ pub enum Unit {
 
 /// EPSG's units of length: code, metres, name. The first three are the usual ones.
 #[rustfmt::skip]
-const LENGTHS: [(u16, f64, &str); 47] = [
+const LENGTHS: [Named; 47] = [
     (9001, 1.0, "metre"), (9002, 0.3048, "foot"), (9003, 1200.0 / 3937.0, "US survey foot"),
     (1025, 0.001, "millimetre"), (1033, 0.01, "centimetre"), (9036, 1000.0, "kilometre"),
     (9005, 0.304_797_265_4, "Clarke's foot"), (9014, 1.8288, "fathom"), (9030, 1852.0, "nautical mile"),
@@ -65,7 +65,7 @@ const LENGTHS: [(u16, f64, &str); 47] = [
 const USUAL: usize = 3;
 
 /// EPSG's units of angle whose values are plain numbers: code, radians, name.
-const ANGLES: [(u16, f64, &str); 9] = [
+const ANGLES: [Named; 9] = [
     (9102, PI / 180.0, "degree"),
     (9122, PI / 180.0, "degree"),
     (9101, 1.0, "radian"),
@@ -92,23 +92,22 @@ impl Unit {
         if !(metres.is_finite() && metres > 0.0) {
             return Self::Unknown;
         }
-        let usual = LENGTHS[..USUAL].iter().map(|(_, size, _)| *size).find(|size| is_near(metres, *size, SAME));
-        Self::Length(usual.unwrap_or(metres))
+        let usual = nearest(&LENGTHS[..USUAL], metres, SAME).or_else(|| nearest(&LENGTHS, metres, SAME_NAME));
+        Self::Length(usual.map_or(metres, |(_, size, _)| *size))
     }
 
-    /// The unit of that many radians; degrees if they are nearly one. [`Self::Unknown`] unless finite and > 0.
+    /// The unit of that many radians; a known one if they are nearly its. [`Self::Unknown`] unless finite and > 0.
     pub fn angle(radians: f64) -> Self {
-        match radians.is_finite() && radians > 0.0 {
-            true if is_near(radians, ANGLES[0].1, SAME) => Self::DEGREE,
-            true => Self::Angle(radians),
-            false => Self::Unknown,
+        if !(radians.is_finite() && radians > 0.0) {
+            return Self::Unknown;
         }
+        Self::Angle(nearest(&ANGLES, radians, SAME).map_or(radians, |(_, size, _)| *size))
     }
 
     /// The unit with that EPSG code; [`Self::Unknown`] if it is none, or one that numbers alone do not carry (degrees,
     /// minutes and seconds as the digits of one number).
     pub fn from_epsg(code: u16) -> Self {
-        let size = |table: &[(u16, f64, &str)]| table.iter().find(|(c, ..)| *c == code).map(|(_, size, _)| *size);
+        let size = |table: &[Named]| table.iter().find(|(c, ..)| *c == code).map(|(_, size, _)| *size);
         match (size(&LENGTHS), size(&ANGLES)) {
             (Some(metres), _) => Self::Length(metres),
             (None, Some(radians)) => Self::Angle(radians),
@@ -130,25 +129,24 @@ impl Unit {
     }
 }
 
-fn is_near(value: f64, of: f64, part: f64) -> bool {
-    (value - of).abs() <= part * of
+/// A unit of code, size, name.
+type Named = (u16, f64, &'static str);
+
+/// The first unit whose size differs from `size` by at most `part` of its own.
+fn nearest(table: &'static [Named], size: f64, part: f64) -> Option<&'static Named> {
+    table.iter().find(|(_, of, _)| (size - of).abs() <= part * of)
 }
 
 impl fmt::Display for Unit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |table: &[(u16, f64, &'static str)], size: f64| {
-            table.iter().find(|(_, of, _)| is_near(size, *of, SAME_NAME)).map(|(.., name)| *name)
+        let (table, size, base) = match *self {
+            Self::Length(metres) => (&LENGTHS[..], metres, "m"),
+            Self::Angle(radians) => (&ANGLES[..], radians, "rad"),
+            Self::Unknown => return f.write_str("unknown unit"),
         };
-        match *self {
-            Self::Length(metres) => match name(&LENGTHS, metres) {
-                Some(name) => f.write_str(name),
-                None => write!(f, "unit of {metres} m"),
-            },
-            Self::Angle(radians) => match name(&ANGLES, radians) {
-                Some(name) => f.write_str(name),
-                None => write!(f, "unit of {radians} rad"),
-            },
-            Self::Unknown => f.write_str("unknown unit"),
+        match nearest(table, size, SAME_NAME) {
+            Some((.., name)) => f.write_str(name),
+            None => write!(f, "unit of {size} {base}"),
         }
     }
 }

@@ -130,7 +130,10 @@ mod tests {
         let (crs, warnings) = with_all(&[(34735, directory.clone()), (34736, doubles)], false);
         assert_eq!((crs.unit, warnings), (Some(Unit::US_SURVEY_FOOT), vec![]));
         let (crs, warnings) = with(34735, directory);
-        assert_eq!((crs.unit, warnings), (Some(Unit::Unknown), vec![ScanWarning::GeoTiffUnit { key: 3076, code: 32767 }]));
+        assert_eq!(
+            (crs.unit, warnings),
+            (Some(Unit::Unknown), vec![ScanWarning::GeoTiffUnit { key: 3076, code: 32767 }])
+        );
     }
 
     #[test]
