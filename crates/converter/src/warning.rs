@@ -55,6 +55,13 @@ pub enum Warning {
         /// Why.
         reason: LatticeReason,
     },
+    /// Single precision does not resolve the coordinates of an input well.
+    CoarseSingle {
+        /// The input.
+        path: PathBuf,
+        /// Distance of neighbouring coordinates at the largest ones, per axis, world units.
+        resolution: [f64; 3],
+    },
     /// A few points are far from all others.
     Outliers {
         /// How many.
@@ -215,6 +222,7 @@ impl Warning {
             Self::ReadAgain => "read_again",
             Self::FinerStep { .. } => "finer_step",
             Self::CoarserStep { .. } => "coarser_step",
+            Self::CoarseSingle { .. } => "coarse_single",
             Self::Outliers { .. } => "outliers",
             Self::ValuesChanged { .. } => "values_changed",
             Self::ValuesMissing { .. } => "values_missing",
@@ -256,6 +264,12 @@ impl Warning {
                 steps(*scale)
             ),
             Self::CoarserStep { scale, reason } => format!("coordinate step {}: {reason}", steps(*scale)),
+            Self::CoarseSingle { path, resolution } => format!(
+                "{}: stores coordinates in single precision, which resolves {} here and no finer; no tool can restore \
+                 what it lacks",
+                path.display(),
+                steps(*resolution)
+            ),
             Self::Outliers { points, factor, holds_back_step, .. } => outliers(*points, *factor, *holds_back_step),
             Self::ValuesChanged { attribute, output: None, changes } => format!("{attribute}: {changes}"),
             Self::ValuesChanged { attribute, output: Some(kind), changes } => {

@@ -13,7 +13,7 @@ pub use crs::{ResolvedCrs, resolve_crs};
 pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
 #[cfg(test)]
 pub(crate) use survey::Extent;
-pub(crate) use survey::{Fineness, Survey, far_out, intersection};
+pub(crate) use survey::{Fineness, Survey, far_out, intersection, single_step};
 
 use self::divisor::Divisors;
 use crate::error::{ConvertError, InputFault};
