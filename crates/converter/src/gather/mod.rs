@@ -35,6 +35,9 @@ use pass::{Pass, PassEnd};
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
 const MAX_PASSES: usize = 5;
 
+/// Outliers make the extent at least this many times longer.
+const FAR_OUTSIDE: f64 = 10.0;
+
 /// Fewer steps than this over the extent of a scene are a loss whatever the sources resolve.
 const FEWEST_STEPS: f64 = (1 << 20) as f64;
 
@@ -179,11 +182,13 @@ impl Read<'_> {
         });
         let Some(far) = far::find(sources, plan.filter.bounds.as_ref(), enough, rt)? else { return Ok(None) };
         let without = lattice::inside(plan, sources, self.lattice, self.stats, &far.others);
-        let longest = far.others.extent().into_iter().fold(0.0, f64::max);
+        let (extent, (min, max)) = (far.others.extent(), self.corners());
+        let longest = extent.into_iter().fold(0.0, f64::max);
         let costs = |a: usize| {
             let (step, finer) = (next.lattice.scale[a], without.lattice.scale[a]);
+            let is_far = extent[a] * FAR_OUTSIDE <= max[a] - min[a];
             // an unknown resolution counts as lost where the others keep fewer than 20 bits
-            step > 1.5 * finer && (losses[a] != Loss::Unknown || step * FEWEST_STEPS > longest)
+            is_far && step > finer && (losses[a] != Loss::Unknown || step * FEWEST_STEPS > longest)
         };
         Ok((self.is_far_out() || (0..3).any(costs)).then_some((far, without)))
     }

@@ -21,8 +21,8 @@ pub(super) use self::steps::ulp;
 /// A step that could be this many times finer, had the headers been right, is worth a second read.
 const WORTH_READING_AGAIN: f64 = 100.0;
 
-/// A step this many times coarser than the sources' moves coordinates by more than half of their step.
-const COSTLY_STEPS: f64 = 1.5;
+/// A step more than this many times coarser than the sources' moves coordinates by more than one of theirs.
+const COSTLY_STEPS: f64 = 2.0;
 
 /// An axis that one step for all axes would leave with fewer steps than this has its own.
 const FEWEST_STEPS: f64 = (1 << 20) as f64;
