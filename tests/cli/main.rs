@@ -9,7 +9,9 @@ mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod odd_places;
 mod reporting;
+
 mod same_points;
 mod sameness;
 mod several;

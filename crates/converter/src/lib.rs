@@ -53,12 +53,13 @@ pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
 pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
-    AttributeChoice, Duplicates, Filter, OnFault, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
+    AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice,
+    Setting,
 };
 pub use reason::{GridReason, LatticeBasis, LatticeReason};
 pub use report::{
     CoordinateChange, DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport,
-    PointsReport, Report, TreeReport,
+    PointsReport, Report, SharedPlaceReport, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
 pub use warning::{CrsNote, Proj4Fault, Warning};

@@ -19,7 +19,7 @@ mod segments;
 mod stats;
 mod store;
 
-pub(crate) use cell::Cell;
+pub(crate) use cell::{Cell, SharedPlace};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{ANCHOR_BITS, Cube, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
@@ -58,6 +58,8 @@ pub(crate) struct Cloud<'a> {
     pub(crate) cells: Vec<Cell>,
     pub(crate) stats: Stats,
     pub(crate) facts: Facts,
+    /// Places that very many points share, the fullest first.
+    pub(crate) shared_places: Vec<SharedPlace>,
     /// Of headers and points, in order of discovery.
     pub(crate) warnings: Vec<Warning>,
 }
@@ -70,6 +72,7 @@ pub(crate) struct Gathered {
     pub(crate) store: Store,
     pub(crate) cells: Vec<Cell>,
     pub(crate) stats: Stats,
+    pub(crate) shared_places: Vec<SharedPlace>,
 }
 
 impl<'a> Cloud<'a> {
@@ -84,10 +87,23 @@ impl<'a> Cloud<'a> {
         gathered: Gathered,
         mut warnings: Vec<Warning>,
     ) -> Result<Self, ConvertError> {
-        let Gathered { lattice, is_lossless, frame, store, cells, stats } = gathered;
+        let Gathered { lattice, is_lossless, frame, store, cells, stats, shared_places } = gathered;
         warnings.extend_from_slice(&stats.warnings);
         let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
-        Ok(Self { plan, sources, intake, lattice, is_lossless, frame, store, cells, stats, facts, warnings })
+        Ok(Self {
+            plan,
+            sources,
+            intake,
+            lattice,
+            is_lossless,
+            frame,
+            store,
+            cells,
+            stats,
+            facts,
+            shared_places,
+            warnings,
+        })
     }
 
     /// The layout of stored records.

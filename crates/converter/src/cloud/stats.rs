@@ -25,6 +25,8 @@ pub(crate) struct Stats {
     pub(crate) other_class: u64,
     pub(crate) thinned: u64,
     pub(crate) invalid: u64,
+    /// Skipped because they lie exactly at the origin of their scan.
+    pub(crate) origin_skipped: u64,
     pub(crate) unreadable: u64,
     /// 64-bit integers that a double does not hold exactly.
     pub(crate) rounded_values: u64,
@@ -54,6 +56,8 @@ pub(crate) struct SourceStats {
     pub(crate) read: u64,
     /// That go in.
     pub(crate) kept: u64,
+    /// Exactly at the origin of their scan, before any filter.
+    pub(crate) at_origin: u64,
     /// World coordinates, before any filter.
     pub(crate) bounds: Aabb,
     /// Range of the colour of the points that go in.
@@ -174,8 +178,14 @@ floats!(f32, f64);
 
 impl Stats {
     pub(crate) fn new(schema: &Schema, sources: usize) -> Self {
-        let source =
-            SourceStats { read: 0, kept: 0, bounds: Aabb::EMPTY, rgb: Range::new(3), rgb_unfiltered: Range::new(3) };
+        let source = SourceStats {
+            read: 0,
+            kept: 0,
+            at_origin: 0,
+            bounds: Aabb::EMPTY,
+            rgb: Range::new(3),
+            rgb_unfiltered: Range::new(3),
+        };
         Self {
             bounds: JobBounds::EMPTY,
             ranges: schema.attributes.iter().map(|a| Range::new(a.elements)).collect(),
@@ -188,6 +198,7 @@ impl Stats {
             other_class: 0,
             thinned: 0,
             invalid: 0,
+            origin_skipped: 0,
             unreadable: 0,
             rounded_values: 0,
             warnings: Vec::new(),
@@ -201,6 +212,7 @@ impl Stats {
         for (a, b) in self.sources.iter_mut().zip(&other.sources) {
             a.read += b.read;
             a.kept += b.kept;
+            a.at_origin += b.at_origin;
             a.bounds = a.bounds.union(&b.bounds);
             a.rgb.merge(&b.rgb);
             a.rgb_unfiltered.merge(&b.rgb_unfiltered);
@@ -212,6 +224,7 @@ impl Stats {
         self.other_class += other.other_class;
         self.thinned += other.thinned;
         self.invalid += other.invalid;
+        self.origin_skipped += other.origin_skipped;
         self.unreadable += other.unreadable;
         self.rounded_values += other.rounded_values;
         self.warnings.extend_from_slice(&other.warnings);

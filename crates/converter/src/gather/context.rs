@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
 use super::axis::SourceMap;
+use super::cut::Cut;
+use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{CellHash, Intake, Moments, Segments, Store};
 use crate::plan::Plan;
@@ -25,6 +27,10 @@ pub(super) struct Context<'a> {
     pub(super) intake: &'a Intake,
     /// From the coordinates of each source to the lattice of the pass.
     pub(super) maps: Vec<SourceMap>,
+    /// The filter's box, for each source.
+    pub(super) cuts: Vec<Option<Cut>>,
+    /// Where the scanners of each source stood.
+    pub(super) origins: Vec<Origins>,
     pub(super) partition: Partition,
     pub(super) store: Store,
     pub(super) wants_moments: bool,

@@ -9,10 +9,13 @@ mod axis;
 mod batch;
 mod columns;
 mod context;
+mod cut;
 mod lattice;
+mod origins;
 mod outliers;
 mod partition;
 mod pass;
+mod places;
 mod ranges;
 mod select;
 
@@ -21,13 +24,14 @@ use pointmill_format::{Aabb, Lattice, ReadError};
 pub(crate) use context::Demand;
 pub(crate) use lattice::from_headers;
 
-use crate::cloud::{Cloud, Cube, Gathered, Intake, JobBounds, JobLattice, JobPoint, Stats};
+use crate::cloud::{Cloud, Cube, Gathered, Intake, JobBounds, JobLattice, JobPoint, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
-use crate::plan::Plan;
+use crate::plan::{OriginPoints, Plan};
 use crate::runtime::{Clock, Phase, Runtime};
 use crate::sources::{Source, Sources, far_out};
 use crate::warning::Warning;
 use axis::SourceMap;
+use origins::Origins;
 use pass::{Pass, PassEnd};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
@@ -53,7 +57,7 @@ pub(crate) fn gather<'a>(
             warnings.push(warning);
         };
         match Pass::new(plan, sources, intake, demand, &lattice, hint, rt).run()? {
-            PassEnd::Complete(gathered) => match finer(plan, sources, &gathered)? {
+            PassEnd::Complete(mut gathered) => match finer(plan, sources, &gathered)? {
                 Some(finer) => {
                     let factor = (lattice.lattice.scale[0] / finer.lattice.scale[0]).round();
                     warn(Warning::StepTooCoarse { factor });
@@ -62,6 +66,8 @@ pub(crate) fn gather<'a>(
                     lattice = finer;
                 }
                 None => {
+                    gathered.shared_places = places::find(&mut gathered)?;
+                    odd_places(plan, sources, &gathered).into_iter().for_each(&mut warn);
                     if let Some(outliers) = outliers::find(&gathered) {
                         warn(outliers.warning(gathered.lattice.is_held_back()));
                     }
@@ -86,6 +92,28 @@ pub(crate) fn gather<'a>(
         }
     }
     Err(Unsupported::TooFarApart.into())
+}
+
+/// What there is to say of points at the origins of scans, and of places that very many points share.
+fn odd_places(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Vec<Warning> {
+    let origins: Vec<Origins> = sources.all.iter().map(|s| Origins::of(s.scan.info())).collect();
+    let (known, unknown): (Vec<_>, Vec<_>) =
+        origins.iter().zip(&gathered.stats.sources).partition(|(origins, _)| origins.are_known);
+    let mut warnings = Vec::new();
+    let (points, of) = known.iter().fold((0, 0), |(points, of), (_, s)| (points + s.at_origin, of + s.read));
+    if plan.filter.origin_points == OriginPoints::Keep && places::are_many_at_origin(points, of) {
+        warnings.push(Warning::OriginPoints { points, of });
+    }
+    // What was just said is not said again.
+    let step = gathered.lattice.lattice.scale;
+    let is_new = |place: &&SharedPlace| known.iter().all(|(origins, _)| !origins.are_near(place.position, step));
+    let new: Vec<&SharedPlace> = gathered.shared_places.iter().filter(is_new).collect();
+    if let Some((SharedPlace { position, points }, more)) = new.split_first() {
+        let (position, points, of, more) = (*position, *points, gathered.stats.points, more.len());
+        let at_origin = position == [0.0; 3] && unknown.iter().any(|(_, s)| s.at_origin > 0);
+        warnings.push(Warning::SharedPlace { position, points, of, more, at_origin });
+    }
+    warnings
 }
 
 /// A finer lattice for points that the declared bounds made too coarse.
@@ -132,8 +160,8 @@ fn nothing_to_convert(sources: &Sources, stats: &Stats) -> ConvertError {
             ReadError::broken(&info.path, info.file_bytes, what).advise("there is nothing to convert").into()
         }
         _ => {
-            let Stats { outside_bounds, other_class, thinned, invalid, .. } = *stats;
-            InputFault::NothingLeft { read, outside_bounds, other_class, thinned, invalid }.into()
+            let Stats { outside_bounds, other_class, thinned, invalid, origin_skipped: at_origin, .. } = *stats;
+            InputFault::NothingLeft { read, outside_bounds, other_class, thinned, invalid, at_origin }.into()
         }
     }
 }

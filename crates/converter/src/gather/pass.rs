@@ -7,6 +7,8 @@ use pointmill_format::{Advice, Scratch};
 use super::axis::SourceMap;
 use super::batch::Worker;
 use super::context::{CellPart, CellParts, Context, Demand};
+use super::cut::Cut;
+use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton};
 use crate::error::ConvertError;
@@ -49,6 +51,8 @@ impl<'a> Pass<'a> {
             sources,
             intake,
             maps: sources.all.iter().map(map).collect(),
+            cuts: sources.all.iter().map(|s| plan.filter.bounds.map(|b| Cut::new(&b, s.scan.info()))).collect(),
+            origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
             store: Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, rt.budget.store_bytes),
             wants_moments: demand.moments,
@@ -74,7 +78,7 @@ impl<'a> Pass<'a> {
             .map(|(packed, CellPart { mut segments, moments })| {
                 segments.sort();
                 let points = segments.points();
-                Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, moments }
+                Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, repeats: 0, moments }
             })
             .collect();
         cells.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));
@@ -85,6 +89,7 @@ impl<'a> Pass<'a> {
             store,
             cells,
             stats,
+            shared_places: Vec::new(),
         })))
     }
 

@@ -6,5 +6,5 @@ mod types;
 pub(crate) use build::{Account, filter_settings, grid_report, input_reports, report, settings};
 pub use types::{
     CoordinateChange, DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport,
-    PointsReport, Report, TreeReport,
+    PointsReport, Report, SharedPlaceReport, TreeReport,
 };

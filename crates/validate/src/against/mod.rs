@@ -8,6 +8,7 @@
 pub(crate) mod block;
 mod narrow;
 pub(crate) mod rules;
+mod selection;
 mod sides;
 mod sources;
 

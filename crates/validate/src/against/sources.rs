@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::block::{BLOCK_POINTS, Block, append_words};
 use super::rules::Conversion::{AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
+use super::selection::Selection;
 use crate::options::{Progress, ProgressFn};
 
 /// A scan, and where its columns go.
@@ -23,6 +24,7 @@ pub(crate) struct Source {
     columns: Vec<Option<(usize, usize)>>,
     /// The column that the filter by class looks at.
     classification: Option<usize>,
+    selection: Selection,
     /// Columns that must have one value, by the metadata: column, elements, value.
     constants: Vec<(usize, Vec<f64>)>,
     /// Points whose value differs from the constant, by entry of `constants`.
@@ -127,7 +129,8 @@ impl Source {
         let constants: Vec<_> =
             rules.constants.iter().filter_map(|(name, value)| Some((find(name)?, value.clone()))).collect();
         let deviating = constants.iter().map(|_| AtomicU64::new(0)).collect();
-        Self { columns, classification, constants, deviating, scan }
+        let selection = Selection::new(info, rules);
+        Self { columns, classification, selection, constants, deviating, scan }
     }
 
     fn wanted(&self) -> Wanted {
@@ -147,6 +150,7 @@ impl Source {
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
+        self.selection.apply(batch, start, &mut block.keep);
         if let Some(stored) = &rules.stored {
             for i in 0..points {
                 let words = stored.stored(block.position(i));
@@ -193,7 +197,6 @@ impl Source {
         rules: &Rules,
         block: &mut Block,
     ) {
-        let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
         let mut take = |i: usize, world: f64| {
             let (rounded, truncated) = rules.quantize(axis, world);
             block.positions[axis].push(rounded);
@@ -201,7 +204,7 @@ impl Source {
                 block.truncated[axis].push(truncated);
             }
             // a point without a finite position is none
-            block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
+            block.keep[i] &= world.is_finite();
         };
         match (&batch.positions, self.scan.info().lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
