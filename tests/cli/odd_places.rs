@@ -65,9 +65,9 @@ fn masses_elsewhere_are_found_in_small_and_large_clouds_beside_a_surface() {
 #[test]
 fn points_where_a_scanner_stood_are_counted_and_skipped_on_request() {
     let dir = Dir::new();
-    let (here, there) = ("1 0 0 0\n0 1 0 0\n0 0 1 0\n100.5 200.25 3 1", "0 1 0 0\n-1 0 0 0\n0 0 1 0\n-7 0 0.125 1");
+    let (here, there) = ("1 0 0 0\n0 1 0 0\n0 0 1 0\n100.5 200.25 3 1", "0 1 0 0\n-1 0 0 0\n0 0 1 0\n-7 2 0.125 1");
     let mut scan = vec![[1.0, 2.0, 3.0], [0.001, 0.0, 0.0], [4.0, 5.0, 6.0]];
-    // the other scanner stands at −7 0 0.125; here that is a place like any other
+    // the other scanner stands at −7 2 0.125; here that is a place like any other
     scan.push([-107.5, -200.25, -2.875]);
     let near_zero = [[1e-9, 0.0, 0.0]; 3];
     let text = ptx(here, &scan) + &ptx(there, &[&scan[..], &near_zero].concat());
@@ -93,7 +93,7 @@ fn points_where_a_scanner_stood_are_counted_and_skipped_on_request() {
 #[test]
 fn boxes_end_where_they_were_said_to_end() {
     let dir = Dir::new();
-    let las = Las { scale: [0.1; 3], ..Las::numbered((0..10).map(|i| [i, 2 * i, -i])) };
+    let las = Las { scale: [0.1; 3], offset: [0.0; 3], ..Las::numbered((0..10).map(|i| [i, 2 * i, -i])) };
     dir.write("a.las", &las.bytes());
     dir.write(
         "a.txt",
