@@ -37,8 +37,8 @@ impl Origins {
         if info.parts.is_empty() {
             return Self { parts: vec![(0, origin([0.0; 3]))], world: vec![[0.0; 3]], are_known: false };
         }
-        let firsts = info.parts.iter().scan(0, |next, part| Some(std::mem::replace(next, *next + part.points)));
-        let parts = firsts.zip(&info.parts).map(|(first, part)| (first, origin(part.translation)));
+        let present = info.parts.iter().filter(|part| !part.range.is_empty());
+        let parts = present.map(|part| (part.range.start, origin(part.translation)));
         let world = info.parts.iter().map(|part| part.translation).collect();
         Self { parts: parts.collect(), world, are_known: true }
     }
@@ -52,7 +52,7 @@ impl Origins {
             let next = self.parts.partition_point(|(part, _)| *part <= first);
             let end = self.parts.get(next).map_or(batch.len() as u64, |(part, _)| part - batch.first_point);
             let end = (end as usize).min(batch.len());
-            count += self.parts[next.saturating_sub(1)].1.count(&batch.positions, start..end);
+            count += self.before(next).map_or(0, |origin| origin.count(&batch.positions, start..end));
             start = end;
         }
         count
@@ -61,7 +61,11 @@ impl Origins {
     /// True if a point of a batch lies exactly at its origin.
     pub(super) fn hold(&self, batch: &PointBatch, i: usize) -> bool {
         let next = self.parts.partition_point(|(part, _)| *part <= batch.first_point + i as u64);
-        self.parts[next.saturating_sub(1)].1.count(&batch.positions, i..i + 1) > 0
+        self.before(next).is_some_and(|origin| origin.count(&batch.positions, i..i + 1) > 0)
+    }
+
+    fn before(&self, part: usize) -> Option<&Origin> {
+        self.parts.get(part.checked_sub(1)?).map(|(_, origin)| origin)
     }
 
     /// True if a place is one of them, by a step of the cloud's lattice.

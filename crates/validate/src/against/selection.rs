@@ -24,12 +24,9 @@ impl Selection {
         let ranges = rules.bounds.map(|b| [0, 1, 2].map(|axis| range(axis, b.min[axis], b.max[axis])));
         let mut origins = Vec::new();
         if rules.skips_origin {
-            let mut first = 0;
-            for part in &info.parts {
-                origins.push((first, part.translation));
-                first += part.points;
-            }
-            if origins.is_empty() {
+            let present = info.parts.iter().filter(|part| !part.range.is_empty());
+            origins.extend(present.map(|part| (part.range.start, part.translation)));
+            if info.parts.is_empty() {
                 origins.push((0, [0.0; 3]));
             }
         }
