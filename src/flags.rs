@@ -37,6 +37,7 @@ fn advice(advice: &Advice) -> String {
             bounds_value(bounds)
         ),
         Advice::SkipInvalid => "pass --invalid skip to leave such points out".to_owned(),
+        Advice::SkipOriginPoints => "--origin-points skip leaves them out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),

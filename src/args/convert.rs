@@ -89,6 +89,10 @@ pub(crate) struct ConvertArgs {
     /// What to do with points without a valid position
     #[arg(long, value_enum, default_value = "skip", help_heading = "Selecting data")]
     pub(crate) invalid: FaultArg,
+    /// What to do with points exactly at the origin of their scan (where the scanner stood, by the pose of the scan; 0,0,0
+    /// in files without poses): some scanners write them where they measured nothing
+    #[arg(long, value_enum, default_value = "keep", help_heading = "Selecting data")]
+    pub(crate) origin_points: OriginPointsArg,
     /// What to do with inputs, or parts of inputs, that cannot be decoded
     #[arg(long, value_enum, default_value = "fail", help_heading = "Selecting data")]
     pub(crate) unreadable: FaultArg,
@@ -201,6 +205,12 @@ pub(crate) enum SamplingArg {
 pub(crate) enum DuplicatesArg {
     Keep,
     Drop,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OriginPointsArg {
+    Keep,
+    Skip,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

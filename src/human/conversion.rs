@@ -72,6 +72,7 @@ fn points_lines(report: &Report) -> Vec<String> {
         (p.thinned, "by thinning"),
         (duplicates, "as duplicates"),
         (p.invalid, "without a valid position"),
+        (p.at_origin, "at the scanner's origin"),
         (p.unreadable, "unreadable"),
     ];
     let causes = causes.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n)));
@@ -147,7 +148,14 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
 /// Points read that are not in the dataset.
 fn points_not_written(report: &Report) -> u64 {
     let p = &report.points;
-    p.outside_bounds + p.outliers + p.other_class + p.thinned + duplicates_dropped(report) + p.invalid + p.unreadable
+    p.outside_bounds
+        + p.outliers
+        + p.other_class
+        + p.thinned
+        + duplicates_dropped(report)
+        + p.invalid
+        + p.at_origin
+        + p.unreadable
 }
 
 /// Only octrees drop duplicates, and there is one octree at most.

@@ -9,8 +9,10 @@ mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod odd_places;
 mod precision;
 mod reporting;
+
 mod same_points;
 mod sameness;
 mod several;

@@ -80,6 +80,26 @@ pub enum Warning {
         /// The coordinate step would be finer without them.
         holds_back_step: bool,
     },
+    /// Points exactly at the origin of their scan, where the scanner stood.
+    OriginPoints {
+        /// How many.
+        points: u64,
+        /// Of how many points of scans whose origin is known.
+        of: u64,
+    },
+    /// Very many points share one place.
+    SharedPlace {
+        /// World coordinates of the place that most share.
+        position: [f64; 3],
+        /// Points there.
+        points: u64,
+        /// Points of the cloud.
+        of: u64,
+        /// Other places that very many points share.
+        more: usize,
+        /// The place is (0, 0, 0) in a file that does not say where the scanner stood.
+        at_origin: bool,
+    },
     /// Values of an attribute could not stay as they were.
     ValuesChanged {
         /// Its name.
@@ -232,6 +252,8 @@ impl Warning {
             Self::OutliersDropped { .. } => "outliers_dropped",
             Self::CoarseSingle { .. } => "coarse_single",
             Self::Outliers { .. } => "outliers",
+            Self::OriginPoints { .. } => "origin_points",
+            Self::SharedPlace { .. } => "shared_place",
             Self::ValuesChanged { .. } => "values_changed",
             Self::ValuesMissing { .. } => "values_missing",
             Self::MixedRgbDepth { .. } => "mixed_rgb_depth",
@@ -249,6 +271,7 @@ impl Warning {
     pub fn advice(&self) -> Option<Advice> {
         match self {
             Self::Outliers { others, .. } => Some(Advice::CutBounds { bounds: Some(*others) }),
+            Self::OriginPoints { .. } | Self::SharedPlace { at_origin: true, .. } => Some(Advice::SkipOriginPoints),
             Self::MixedRgbDepth { .. } => Some(Advice::SetRgbDepth),
             Self::Crs(CrsNote::NoCode { .. } | CrsNote::UserDefined { .. }) => Some(Advice::NameEpsg),
             Self::Crs(CrsNote::NotInTable { .. } | CrsNote::FalseEasting { .. }) => Some(Advice::GiveProj4),
@@ -282,6 +305,12 @@ impl Warning {
                 steps(*resolution)
             ),
             Self::Outliers { points, factor, holds_back_step, .. } => outliers(*points, *factor, *holds_back_step),
+            Self::OriginPoints { points, of } => format!(
+                "{} of {} points lie exactly at the origin of their scan, where the scanner stood",
+                grouped(*points),
+                grouped(*of)
+            ),
+            Self::SharedPlace { position, points, of, more, .. } => shared_place(*position, *points, *of, *more),
             Self::ValuesChanged { attribute, output: None, changes } => format!("{attribute}: {changes}"),
             Self::ValuesChanged { attribute, output: Some(kind), changes } => {
                 format!("{}: {attribute}: {changes}", kind.name())
@@ -339,6 +368,28 @@ fn outliers(points: u64, factor: f64, holds_back_step: bool) -> String {
          tree would have fewer levels",
         factor.floor()
     )
+}
+
+fn shared_place([x, y, z]: [f64; 3], points: u64, of: u64, more: usize) -> String {
+    let more = match more {
+        0 => String::new(),
+        1 => ", and one more place is shared by at least one in a hundred".to_owned(),
+        n => format!(", and {n} more places are each shared by at least one in a hundred"),
+    };
+    format!("{} of {} points share the position ({x}, {y}, {z}){more}", grouped(points), grouped(of))
+}
+
+/// A count with commas between thousands.
+fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
 }
 
 impl fmt::Display for Warning {

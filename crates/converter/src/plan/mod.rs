@@ -81,6 +81,19 @@ pub struct Filter {
     pub classes: Option<Vec<u8>>,
     /// Keep points whose index in their file is a multiple of this; 0 and 1: all.
     pub every: u64,
+    /// Points exactly at the origin of their scan.
+    pub origin_points: OriginPoints,
+}
+
+/// What to do with points exactly at the origin of their scan: where the scanner stood, by the pose of the scan; (0, 0, 0)
+/// in files without poses. Some scanners write them where they measured nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OriginPoints {
+    /// Keep them; the report has their number.
+    #[default]
+    Keep,
+    /// Skip them and count them in the report.
+    Skip,
 }
 
 /// What to do with points whose position and attributes all repeat.

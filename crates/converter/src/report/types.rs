@@ -24,6 +24,8 @@ pub struct Report {
     pub grid: GridReport,
     /// Every point accounted for.
     pub points: PointsReport,
+    /// Places that very many points share (16 or more, and at least one in a hundred), the fullest first.
+    pub shared_places: Vec<SharedPlaceReport>,
     /// Largest and RMS change of a coordinate, per axis, world units.
     pub coordinate_change: CoordinateChange,
     /// One entry per attribute that was read, in the order of the stored records.
@@ -94,6 +96,9 @@ pub struct InputReport {
     pub points_declared: u64,
     /// Decoded.
     pub points_read: u64,
+    /// Decoded, and exactly at the origin of their scan: where the scanner stood, by the pose of the scan; (0, 0, 0) in
+    /// files without poses.
+    pub points_at_origin: u64,
     /// Claimed by the header: min x y z, max x y z.
     pub bounds_declared: Option<[f64; 6]>,
     /// Of the points decoded, before any filter.
@@ -189,7 +194,7 @@ pub struct GridReport {
     pub why: GridReason,
 }
 
-/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid`, and for every output
+/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid + at_origin`, and for every output
 /// `kept = points + duplicates_dropped`. All are counted, none is a difference; the run fails where a sum is wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]
@@ -208,8 +213,20 @@ pub struct PointsReport {
     pub thinned: u64,
     /// Without a valid position.
     pub invalid: u64,
+    /// Exactly at the origin of their scan, and skipped for it.
+    pub at_origin: u64,
     /// Declared, but in parts of inputs that could not be decoded.
     pub unreadable: u64,
+}
+
+/// A place that very many points share.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct SharedPlaceReport {
+    /// World coordinates.
+    pub position: [f64; 3],
+    /// Points of the cloud that lie there.
+    pub points: u64,
 }
 
 /// Coordinate change by moving to the output lattice.

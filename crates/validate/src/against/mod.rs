@@ -9,6 +9,7 @@ pub(crate) mod block;
 mod exact;
 mod narrow;
 pub(crate) mod rules;
+mod selection;
 mod sides;
 mod sources;
 

@@ -61,11 +61,13 @@ pub(crate) struct Rules {
     /// The job lattice's coordinate of the dataset's integer 0.
     pub(crate) shift: [i64; 3],
     pub(crate) rgb_depth: RgbDepth,
-    /// Source coordinates, closed.
+    /// World coordinates, closed.
     pub(crate) bounds: Option<Aabb>,
     pub(crate) classes: Option<Vec<u8>>,
     /// Indices in the file that are multiples of it; 1: all.
     pub(crate) every: u64,
+    /// Points exactly at the origin of their scan are not in the dataset.
+    pub(crate) skips_origin: bool,
     /// Equal records count once.
     pub(crate) drop_duplicates: bool,
     /// Not written by pointmill: known deviations of other converters are tried too.
@@ -104,6 +106,7 @@ impl Rules {
             bounds,
             classes,
             every: own["filter"]["every"].as_u64().unwrap_or(1).max(1),
+            skips_origin: own["filter"]["originPoints"] == "skip",
             drop_duplicates: own["duplicates"] == "drop",
             foreign: own.is_null(),
             constants: constants(&own["attributesDropped"]),

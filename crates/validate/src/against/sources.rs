@@ -15,6 +15,7 @@ use super::block::{BLOCK_POINTS, Block, append_words};
 use super::exact::Exact;
 use super::rules::Conversion::{AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
+use super::selection::Selection;
 use crate::options::{Progress, ProgressFn};
 
 /// A scan, and where its columns go.
@@ -26,6 +27,7 @@ pub(crate) struct Source {
     columns: Vec<Option<(usize, usize)>>,
     /// The column that the filter by class looks at.
     classification: Option<usize>,
+    selection: Selection,
     /// Columns that must have one value, by the metadata: column, elements, value.
     constants: Vec<(usize, Vec<f64>)>,
     /// Points whose value differs from the constant, by entry of `constants`.
@@ -134,7 +136,8 @@ impl Source {
             let own = info.lattice.map(|l| AxisGrid { step: l.scale[a], offset: l.offset[a] });
             own.and_then(|own| Exact::new(own, rules.job_grid(a)))
         });
-        Self { exact, columns, classification, constants, deviating, scan }
+        let selection = Selection::new(info, rules);
+        Self { exact, columns, classification, selection, constants, deviating, scan }
     }
 
     fn wanted(&self) -> Wanted {
@@ -154,6 +157,7 @@ impl Source {
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
+        self.selection.apply(batch, start, &mut block.keep);
         if let Some(stored) = &rules.stored {
             for i in 0..points {
                 let words = stored.stored(block.position(i));
@@ -200,7 +204,6 @@ impl Source {
         rules: &Rules,
         block: &mut Block,
     ) {
-        let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
         let mut take = |i: usize, world: f64, exact: Option<i64>| {
             let (rounded, truncated) = rules.quantize(axis, world);
             block.positions[axis].push(exact.unwrap_or(rounded));
@@ -208,7 +211,7 @@ impl Source {
                 block.truncated[axis].push(truncated);
             }
             // a point without a finite position is none
-            block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
+            block.keep[i] &= world.is_finite();
         };
         match (&batch.positions, self.scan.info().lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
