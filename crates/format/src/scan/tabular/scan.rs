@@ -3,7 +3,7 @@
 use crate::{Advice, Fault};
 use std::sync::Arc;
 
-use super::ascii::{RowParser, Separator};
+use super::ascii::{RowParser, Separator, Tokens};
 use super::binary::{self, Misfit, Rows};
 use super::lines;
 use super::number::Endian;
@@ -32,6 +32,8 @@ pub(crate) enum Storage {
     Planes(Planes),
     /// Lines of numbers.
     Lines(LineRule),
+    /// Numbers set apart by blanks, among which line ends count.
+    Stream,
 }
 
 /// A run of bytes of a record.
@@ -168,6 +170,7 @@ impl Decoder<'_> {
             }
             Storage::Planes(planes) => self.planes(piece, planes, raw, decoded, batch, sink),
             Storage::Lines(rule) => self.lines(piece, rule, raw, batch, sink),
+            Storage::Stream => self.stream(piece, raw, batch, sink),
         }
     }
 
@@ -284,6 +287,30 @@ impl Decoder<'_> {
                 parser.row(line, row, batch).map_err(|m| self.misfit(piece.byte_offset + (at + m.at) as u64, m))?;
             }
             self.pose(rule, batch);
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn stream(
+        &self,
+        piece: &Piece,
+        raw: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let line = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
+        let elements: Vec<_> = self.schema.attributes.iter().map(|a| a.elements).collect();
+        let (fields, wanted) = (&self.schema.fields, self.wanted);
+        let parser = RowParser { fields, wanted, separator: None, least: usize::MAX, elements: &elements };
+        let mut tokens = Tokens { line, at: 0, separator: None };
+        for (first_point, points) in batches(piece, self.schema) {
+            self.prepare(batch, first_point, points);
+            for row in 0..points {
+                parser.numbers(&mut tokens, row, batch).map_err(|m| self.misfit(piece.byte_offset + m.at as u64, m))?;
+            }
             if sink(batch).is_break() {
                 break;
             }

@@ -138,7 +138,17 @@ impl Builder<'_> {
             let with_alpha = self.properties[i].name.eq_ignore_ascii_case("rgba");
             let alpha = with_alpha.then(|| self.add("alpha", AttributeType::UInt8, 1));
             self.targets[i] = vec![Target::Packed { column, alpha }];
+        } else if let Some(i) = self.colour_array() {
+            let column = self.add("rgb", AttributeType::UInt16, 3);
+            let value = |element| Target::Value { column, element, rule: Rule::Convert };
+            self.targets[i] = (0..3).map(value).collect();
         }
+    }
+
+    /// Three small integers side by side that are called "rgb".
+    fn colour_array(&self) -> Option<usize> {
+        let is_small = |ty| matches!(ty, AttributeType::UInt8 | AttributeType::UInt16);
+        self.properties.iter().position(|p| p.role == Role::PackedColour && p.elements == 3 && is_small(p.ty))
     }
 
     fn singles(&mut self) {
