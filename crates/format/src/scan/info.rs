@@ -77,6 +77,12 @@ impl ScanInfo {
     pub fn attribute(&self, name: &str) -> Option<(usize, &Attribute)> {
         self.attributes.iter().enumerate().find(|(_, a)| a.name == name)
     }
+
+    /// The part that the point `index` of the file belongs to.
+    pub fn part_of(&self, index: u64) -> Option<&ScanPart> {
+        // empty parts start where the next one does
+        self.parts.iter().find(|part| part.range.contains(&index))
+    }
 }
 
 /// How finely coordinates are stored: steps below that carry nothing.
@@ -95,13 +101,20 @@ pub enum Resolution {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ScanPart {
+    /// Its number in the file, from 1.
+    pub number: usize,
     /// Its name, or empty.
     pub name: String,
     /// Points that it declares.
     pub points: u64,
+    /// Its points among those of the whole file, as the pieces count them: no piece holds points of two parts. Empty if
+    /// none of its points are there.
+    pub range: Range<u64>,
+    /// The box that it declares, moved to world coordinates; `None` if it declares none or nonsense.
+    pub bounds: Option<Aabb>,
     /// `world = rotation · local + translation`, rows of the matrix; the reader has applied it.
     pub rotation: [[f64; 3]; 3],
-    /// See `rotation`; world units.
+    /// See `rotation`: where the scan's own origin (the scanner, as a rule) stands; world units.
     pub translation: [f64; 3],
 }
 

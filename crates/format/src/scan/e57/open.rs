@@ -60,7 +60,7 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     warnings.extend(notes.warnings());
     let bounds_declared = bounds(&drafts);
     let resolution = resolution(&source, &drafts);
-    let parts = document.clouds.iter().map(part).collect();
+    let parts = parts(&document.clouds, &drafts);
     let (mut scans, mut cuts) = (Vec::new(), Vec::new());
     for (i, (draft, fills)) in drafts.into_iter().zip(fills).enumerate() {
         let Draft { index, fields, roles, pose, cuts: own, .. } = draft;
@@ -218,10 +218,27 @@ fn resolution(source: &Source, drafts: &[Draft<'_>]) -> Resolution {
     }
 }
 
-/// The description of a scan.
-fn part(cloud: &PointCloud) -> ScanPart {
-    let (rotation, translation) = Pose::new(cloud).0.parts();
-    ScanPart { name: cloud.name.clone().unwrap_or_default(), points: cloud.records, rotation, translation }
+/// The descriptions of all scans, those without points among them.
+fn parts(clouds: &[PointCloud], drafts: &[Draft<'_>]) -> Vec<ScanPart> {
+    let (mut drafts, mut end) = (drafts.iter().peekable(), 0);
+    let part = |(index, cloud): (usize, &PointCloud)| {
+        let start = end;
+        if let Some(draft) = drafts.next_if(|draft| draft.index == index) {
+            end += draft.cuts.iter().map(|cut| cut.records).sum::<u64>();
+        }
+        let pose = Pose::new(cloud).0;
+        let (rotation, translation) = pose.parts();
+        ScanPart {
+            number: index + 1,
+            name: cloud.name.clone().unwrap_or_default(),
+            points: cloud.records,
+            range: start..end,
+            bounds: pose.bounds_declared(cloud),
+            rotation,
+            translation,
+        }
+    };
+    clouds.iter().enumerate().map(part).collect()
 }
 
 /// The box of all scans, if each declares one.
