@@ -71,8 +71,8 @@ pub enum ScanWarning {
     FieldTypesMissing,
     /// PCD: a field of no values.
     FieldEmpty { name: String },
-    /// PCD: packed colours that are NaN in the text.
-    ColourNan,
+    /// PLY, PCD, text: splats without another colour than that of their spherical harmonics.
+    ColourOfHarmonics,
     /// PLY: a version of the format that is read as 1.0.
     PlyVersion { version: String },
     /// No z: it is 0 for every point.
@@ -168,9 +168,11 @@ impl ScanWarning {
             Self::HeaderLineIgnored { word } => format!("the header line {word:?} is not known; it is not read"),
             Self::FieldTypesMissing => "the header has no SIZE and TYPE; all fields are taken as float32".to_owned(),
             Self::FieldEmpty { name } => format!("the field {name} has COUNT 0: it holds no values"),
-            Self::ColourNan => "packed colours are NaN in the text, which loses their bits; these points are black; \
-                                for their colours export it as binary"
-                .to_owned(),
+            Self::ColourOfHarmonics => {
+                "there is no rgb; it is made from the splats' harmonics: 0.5 + 0.28209479 · f_dc, \
+                                        cut to 0–1, as 0–255 (f_dc_0 to f_dc_2 are kept)"
+                    .to_owned()
+            }
             Self::PlyVersion { version } => format!("the format version {version:?} is read as 1.0"),
             Self::Other(text) => text.clone(),
             las_or_e57 => las_or_e57.las_line().unwrap_or_else(|| las_or_e57.e57_line()),

@@ -1,6 +1,11 @@
 //! PCD headers and values as programs in the field write them, each with its right values.
 
-use crate::common::read_bytes;
+use std::ops::ControlFlow;
+
+use pointmill_format::{Scratch, Wanted};
+use pointmill_testkit::files;
+
+use crate::common::{ROWS, read_bytes};
 
 /// A file of version .7 with these lines in place of FIELDS, SIZE, TYPE and COUNT.
 fn pcd(fields: &str, points: u64, data: &str) -> Vec<u8> {
@@ -115,9 +120,17 @@ fn a_colour_that_is_nan_keeps_its_bits_in_binary_and_is_told_in_text() {
     bytes.extend(0xffc8_0a14u32.to_le_bytes());
     let cloud = read_bytes(&bytes).unwrap();
     assert_eq!((cloud.values("rgb"), cloud.info.warnings.len()), (vec![200.0, 10.0, 20.0], 0));
-    let cloud = read_bytes([pcd(XYZ_RGB, 2, "ascii\n"), b"1 2 3 nan\n1 2 3 1e-40\n".to_vec()].concat()).unwrap();
+    let text = [pcd(XYZ_RGB, 2, "ascii\n"), b"1 2 3 nan\n1 2 3 1e-40\n".to_vec()].concat();
+    let cloud = read_bytes(&text).unwrap();
     assert_eq!(cloud.values("rgb"), [0.0, 0.0, 0.0, 1.0, 22.0, 194.0]);
-    assert!(cloud.warned("packed colours are NaN in the text"));
+    let scan = (ROWS.open)(&files::temporary(&text)).unwrap();
+    let (wanted, mut lost) = (Wanted::all(scan.info()), Vec::new());
+    scan.decode(0, &wanted, &mut Scratch::default(), &mut |batch| {
+        lost.extend(batch.changes().map(|(column, changes)| (column, changes.not_finite)));
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert_eq!(lost, [(0, 1)]);
 }
 
 #[test]

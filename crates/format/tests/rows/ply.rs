@@ -141,3 +141,91 @@ fn points_beyond_the_declared_ones_are_told() {
     let cloud = read_bytes(ascii + "1 2 3\n4 5 6\n").unwrap();
     assert!(cloud.len() == 1 && cloud.warned("the 6 bytes that follow them are not read"));
 }
+
+/// Two splats of one chunk from (0,0,0) to (1,1,1): the least and the greatest.
+fn compressed(chunk: &str, bounds: &[f32], vertex: &str) -> Vec<u8> {
+    let head = ply("binary_little_endian", &format!("{chunk}element vertex 2\n{vertex}"));
+    let splats = [0, 0, 0, 0x0080_ff40u32, u32::MAX, u32::MAX, u32::MAX, u32::MAX];
+    [head.into_bytes(), floats(bounds), splats.iter().flat_map(|v| v.to_le_bytes()).collect()].concat()
+}
+
+fn of_floats(names: &[&str]) -> String {
+    names.iter().map(|name| format!("property float {name}\n")).collect()
+}
+
+const BOUNDS: [&str; 12] = [
+    "min_x",
+    "min_y",
+    "min_z",
+    "max_x",
+    "max_y",
+    "max_z",
+    "min_scale_x",
+    "min_scale_y",
+    "min_scale_z",
+    "max_scale_x",
+    "max_scale_y",
+    "max_scale_z",
+];
+const VALUES: [f32; 12] = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, -5.0, -6.0, -7.0, 1.0, 2.0, 3.0];
+const PACKED: &str = "property uint packed_position\nproperty uint packed_rotation\nproperty uint packed_scale\nproperty uint packed_color\n";
+
+#[test]
+fn compressed_splats_are_unpacked_with_and_without_bounds_of_colours() {
+    let chunk = format!("element chunk 1\n{}", of_floats(&BOUNDS));
+    let cloud = read_bytes(compressed(&chunk, &VALUES, PACKED)).unwrap();
+    assert_eq!(cloud.xyz, [[0.0, 1.0], [0.0, 1.0], [0.0, 1.0]]);
+    assert_eq!(cloud.values("rgb"), [0.0, 128.0, 255.0, 255.0, 255.0, 255.0]);
+    assert_eq!((cloud.values("alpha"), cloud.values("scale_1")), (vec![64.0, 255.0], vec![-6.0, 2.0]));
+    assert_eq!(cloud.info.format, "PLY 1.0, binary little-endian, compressed splats");
+    // red of 0.5 to 1, green beyond both ends, blue of 0 alone
+    let colours = ["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"];
+    let chunk = format!("{chunk}{}", of_floats(&colours));
+    let values = [VALUES.as_slice(), &[0.5, -1.0, 0.0, 1.0, 2.0, 0.0]].concat();
+    let cloud = read_bytes(compressed(&chunk, &values, PACKED)).unwrap();
+    assert_eq!(cloud.values("rgb"), [128.0, 129.0, 0.0, 255.0, 255.0, 0.0]);
+    assert!(cloud.warned("it is made from the splats' harmonics") && cloud.info.warnings.len() == 1);
+}
+
+#[test]
+fn compressed_splats_of_another_layout_are_named_and_not_called_damaged() {
+    let chunk = format!("element chunk 1\n{}", of_floats(&BOUNDS));
+    let named = |bytes: &[u8], why: &str| {
+        let e = read_bytes(bytes).unwrap_err();
+        assert!(matches!(e.kind(), pointmill_format::ErrorKind::Unsupported), "{e}");
+        assert!(e.to_string().contains("its points are compressed splats") && e.what().contains(why), "{e}");
+    };
+    named(&compressed("", &[], PACKED), "without the element chunk");
+    named(&compressed(&chunk.replace("min_z", "low_z"), &VALUES, PACKED), "whose chunks have no min_z or max_z");
+    named(&compressed(&chunk, &VALUES, &PACKED.replace("uint packed_color", "ushort packed_color")), "packed_color");
+    named(&compressed(&chunk, &VALUES, &format!("{PACKED}property uint packed_normal\n")), "not known");
+    let text = String::from_utf8_lossy(&compressed(&chunk, &[], PACKED)).replace("binary_little_endian", "ascii");
+    named(text.as_bytes(), "as text");
+    let few = compressed(&chunk, &VALUES, PACKED);
+    let few = String::from_utf8_lossy(&few).replace("vertex 2", "vertex 257");
+    assert!(read_bytes(few).unwrap_err().what().contains("257 splats need 2 chunks, 1 are declared"));
+    // cut short within the second
+    let whole = compressed(&chunk, &VALUES, PACKED);
+    let cloud = read_bytes(&whole[..whole.len() - 1]).unwrap();
+    assert!(cloud.len() == 1 && cloud.warned("declares 2 points, 1 whole ones are there"));
+}
+
+#[test]
+fn harmonics_colour_splats_that_have_no_other_colour() {
+    let names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"];
+    let rows = "0 0 0 1.7724539 -1.7724539 0 0.5\n1 1 1 0.25 9 nan -2\n";
+    let header = |more: &str| ply("ascii", &format!("element vertex 2\n{}{more}", of_floats(&names)));
+    let cloud = read_bytes(header("") + rows).unwrap();
+    assert_eq!(cloud.attributes(), "rgb uint16x3, f_dc_0 floatx1, f_dc_1 floatx1, f_dc_2 floatx1, opacity floatx1");
+    assert_eq!(cloud.values("rgb"), [255.0, 0.0, 128.0, 145.0, 255.0, 0.0]);
+    assert_eq!(
+        (cloud.values("f_dc_0"), cloud.values("opacity")),
+        (vec![f64::from(1.772_453_9f32), 0.25], vec![0.5, -2.0])
+    );
+    assert!(cloud.warned("0.5 + 0.28209479 · f_dc"));
+    // a colour of their own comes first
+    let rows = "0 0 0 1.7 -1.7 0 0.5 1 2 3\n1 1 1 0 9 0 -2 4 5 6\n";
+    let own = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    let cloud = read_bytes(header(own) + rows).unwrap();
+    assert_eq!((cloud.values("rgb"), cloud.info.warnings.len()), (vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 0));
+}

@@ -7,8 +7,8 @@
 //! one that is not the identity is reported in [`ScanInfo::warnings`](crate::ScanInfo::warnings).
 //!
 //! Ascii files of PCL write a packed colour of TYPE F as that float in decimals, or as the integer of its bits: digits
-//! alone are the bits, a point or an exponent makes it the float. One that is NaN there has lost its colour and is black,
-//! with a warning if a sample has such.
+//! alone are the bits, a point or an exponent makes it the float. One that is NaN there has lost its colour: it is
+//! black, and counted ([`PointBatch::changes`](crate::PointBatch::changes)).
 //!
 //! Where WIDTH times HEIGHT is not POINTS, the one that fits the data is taken, with a warning.
 //!
@@ -25,9 +25,7 @@ mod place;
 use std::path::Path;
 
 use crate::scan::source::Source;
-use crate::scan::tabular::{
-    Property, Role, RowScan, Schema, precision, resolution, settle_float_colours, warn_of_nan_colours,
-};
+use crate::scan::tabular::{Property, Role, RowScan, Schema, precision, resolutions, settle_float_colours};
 use crate::{Advice, AttributeType, Fault, ReadError, Scan};
 use header::{Encoding, Header};
 
@@ -55,9 +53,8 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     let mut scan = RowScan::new(source, format, placed.declared, schema, placed.storage);
     scan.pieces = placed.pieces;
     scan.info.warnings = warnings;
-    scan.info.resolution = resolution(axis);
+    scan.info.resolution = resolutions(&properties);
     settle_float_colours(&mut scan);
-    warn_of_nan_colours(&mut scan);
     Ok(Box::new(scan))
 }
 

@@ -1,9 +1,9 @@
 //! Rows written as text to columns.
 
-use super::binary::{Misfit, out_of_range, unpack};
+use super::binary::{Misfit, harmonic_colour, out_of_range, unpack};
 use super::number::{Number, unit_to_u16};
 use super::schema::{Field, Rule, Target};
-use crate::{AttributeType, Column, Element, PointBatch, Positions, Wanted};
+use crate::{AttributeType, Changes, Column, Element, PointBatch, Positions, Wanted};
 
 /// How the numbers of a line are set apart: by blanks, and by this byte if there is one.
 pub(crate) type Separator = Option<u8>;
@@ -75,10 +75,25 @@ impl RowParser<'_> {
             Target::Packed { column, alpha } => {
                 let start = tokens.start();
                 let v = tokens.number()?;
-                let (rgb, a) = unpack(packed_bits(&tokens.line[start..tokens.at], v, field.ty));
+                let bits = packed_bits(&tokens.line[start..tokens.at], v, field.ty);
+                if bits.is_none() && self.wanted.is_wanted(column) {
+                    batch.count_changes(column, &Changes { not_finite: 1, ..Changes::default() });
+                }
+                let (rgb, a) = unpack(bits.unwrap_or(0));
                 put(&mut batch.columns[column], row * 3, rgb);
                 if let Some(alpha) = alpha {
                     put(&mut batch.columns[alpha], row, [a]);
+                }
+            }
+            Target::Harmonic { value, colour, element } => {
+                let v = tokens.number()?;
+                match &mut batch.columns[value] {
+                    Column::Float32(out) => store(out, row, v as f32),
+                    Column::Float64(out) => store(out, row, v),
+                    _ => {}
+                }
+                if let Column::UInt16(out) = &mut batch.columns[colour] {
+                    store(out, row * 3 + element, harmonic_colour(v));
                 }
             }
             Target::List => {
@@ -137,16 +152,16 @@ impl RowParser<'_> {
 /// The bits of a packed colour that was written as the number `v`, which `text` starts with.
 ///
 /// PCL writes a float's colour as that float, or as the integer of its bits under the type F: digits alone are the bits.
-/// NaN has lost them: 0.
+/// `None`: NaN, which has lost them.
 #[inline]
-fn packed_bits(text: &[u8], v: f64, ty: AttributeType) -> u32 {
+fn packed_bits(text: &[u8], v: f64, ty: AttributeType) -> Option<u32> {
     let is_digits = !text.iter().any(|b| matches!(b, b'.' | b'a'..=b'z' | b'A'..=b'Z'));
     if ty == AttributeType::Float32 && !is_digits {
         // not by way of a double: that would round twice
         let single = fast_float2::parse_partial::<f32, _>(text).map_or(v as f32, |(v, _)| v);
-        return if single.is_nan() { 0 } else { single.to_bits() };
+        return (!single.is_nan()).then(|| single.to_bits());
     }
-    if v < 0.0 { v as i32 as u32 } else { v as u32 }
+    Some(if v < 0.0 { v as i32 as u32 } else { v as u32 })
 }
 
 fn store<T>(out: &mut [T], index: usize, v: T) {
@@ -364,13 +379,14 @@ mod tests {
 
     #[test]
     fn packed_colours_are_read_as_float_and_as_integer() {
-        let bits = |text: &str, ty| packed_bits(text.as_bytes(), parse(text.trim().as_bytes()).unwrap(), ty);
+        let bits =
+            |text: &str, ty| packed_bits(text.as_bytes(), parse(text.trim().as_bytes()).unwrap(), ty).unwrap_or(7);
         let float = |text: &str| bits(text, AttributeType::Float32);
         assert_eq!((float("4.2108e+06"), float("4210800.0")), (0x4a80_80e0, 0x4a80_80e0));
         assert_eq!((float("4210800 "), float("-8355712")), (4_210_800, (-8_355_712i32) as u32));
         assert_eq!(float("8.206463e-39"), 0x0059_5c48);
         assert_eq!((float("0"), float("1.4e-45"), float("-1.7146522e+38")), (0, 1, 0xff00_ff00));
-        assert_eq!((float("nan"), float("inf"), float("-inf")), (0, 0x7f80_0000, 0xff80_0000));
+        assert_eq!((float("nan"), float("inf"), float("-inf")), (7, 0x7f80_0000, 0xff80_0000));
         assert_eq!(bits("-1", AttributeType::Int32), u32::MAX);
         assert_eq!(
             (bits("4286611584", AttributeType::UInt32), bits("16777215.0", AttributeType::UInt32)),

@@ -11,7 +11,7 @@ pub(crate) mod binary;
 pub(crate) mod header_lines;
 pub(crate) mod lines;
 mod names;
-mod number;
+pub(crate) mod number;
 mod probe;
 mod scan;
 mod schema;
@@ -20,8 +20,8 @@ pub(crate) mod text_rows;
 
 pub(crate) use names::{Role, las_type, role};
 pub(crate) use number::Endian;
-pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours, warn_of_nan_colours};
-pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage};
+pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};
+pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage, Unpack};
 pub(crate) use schema::{Field, MAX_FIELDS, Property, Rule, Schema, Target};
 
 use crate::scan::source::Source;
@@ -51,13 +51,21 @@ pub(crate) fn warn_of_bytes_behind(
     Ok(())
 }
 
+/// How finely the positions among `properties` are stored, per axis; an axis that is not there is zero.
+pub(crate) fn resolutions(properties: &[Property]) -> [crate::Resolution; 3] {
+    std::array::from_fn(|axis| {
+        let property = properties.iter().find(|p| p.role == Role::Axis(axis));
+        property.map_or(crate::Resolution::Single, |p| resolution(p.ty))
+    })
+}
+
 /// How finely positions of that type are stored.
-pub(crate) fn resolution(ty: crate::AttributeType) -> crate::Resolution {
+fn resolution(ty: crate::AttributeType) -> crate::Resolution {
     use crate::AttributeType as T;
     match ty {
         T::Float32 => crate::Resolution::Single,
         T::Float64 => crate::Resolution::Double,
-        _ => crate::Resolution::Step(1.0),
+        _ => crate::Resolution::Grid(crate::AxisGrid { step: 1.0, offset: 0.0 }),
     }
 }
 

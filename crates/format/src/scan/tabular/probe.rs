@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::scan::{Decoder, RowScan, Storage};
 use super::schema::{Field, Rule, Schema, Target};
-use crate::{Attribute, AttributeType, Column, Piece, ScanWarning, Scratch, Wanted};
+use crate::{Attribute, AttributeType, Column, Piece, Scratch, Wanted};
 
 /// Places in the file that are looked at, evenly spread.
 const PLACES: usize = 16;
@@ -114,20 +114,6 @@ fn shortened(piece: &Piece) -> Piece {
     // half of what lines of average length would allow
     let points = (u128::from(piece.points) * u128::from(BYTES) / u128::from(piece.byte_len) / 2) as u64;
     Piece { points: points.clamp(1, ROWS), byte_len: BYTES, ..*piece }
-}
-
-/// Warns of packed colours that are NaN in text, in a sample: their bits are lost.
-pub(crate) fn warn_of_nan_colours(scan: &mut RowScan) {
-    let is_packed = |f: &Field| matches!(f.target, Target::Packed { .. }) && f.ty == AttributeType::Float32;
-    let Some(pick) = scan.schema.fields.iter().position(is_packed) else { return };
-    if !is_text(scan) {
-        return;
-    }
-    let mut has_nan = false;
-    probe_rows(scan, &[pick], |row| has_nan |= row.iter().any(|v| v.is_nan()));
-    if has_nan {
-        scan.info.warnings.push(ScanWarning::ColourNan);
-    }
 }
 
 /// Colours that are floats: 0–1 unless a sample says 0–255 or 0–65535. Sets the rule of their fields.

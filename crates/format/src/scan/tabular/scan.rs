@@ -32,8 +32,23 @@ pub(crate) enum Storage {
     Planes(Planes),
     /// Lines of numbers.
     Lines(LineRule),
+    /// Records that are made from what lies in the file.
+    Unpacked(Box<dyn Unpack>),
     /// Numbers set apart by blanks, among which line ends count.
     Stream,
+}
+
+/// Makes records of rows that are packed otherwise.
+pub(crate) trait Unpack: std::fmt::Debug + Send + Sync {
+    /// Replaces `out` by the little-endian records of `points` points; returns the bytes of one. `raw` is for its use.
+    fn unpack(
+        &self,
+        source: &Source,
+        first_point: u64,
+        points: usize,
+        raw: &mut Vec<u8>,
+        out: &mut Vec<u8>,
+    ) -> Result<usize, ReadError>;
 }
 
 /// A run of bytes of a record.
@@ -106,7 +121,7 @@ impl RowScan {
             points_declared: points,
             bounds_declared: None,
             lattice: None,
-            resolution: Resolution::Double,
+            resolution: [Resolution::Double; 3],
             parts: Vec::new(),
             attributes: schema.attributes.clone().into(),
             crs: Default::default(),
@@ -170,6 +185,7 @@ impl Decoder<'_> {
             }
             Storage::Planes(planes) => self.planes(piece, planes, raw, decoded, batch, sink),
             Storage::Lines(rule) => self.lines(piece, rule, raw, batch, sink),
+            Storage::Unpacked(unpack) => self.unpacked(piece, unpack.as_ref(), raw, decoded, batch, sink),
             Storage::Stream => self.stream(piece, raw, batch, sink),
         }
     }
@@ -224,6 +240,28 @@ impl Decoder<'_> {
             self.prepare(batch, first_point, points);
             let filled = Rows { bytes: decoded, stride: rows.stride, endian: rows.endian };
             binary::fill(filled, &self.schema.fields, self.wanted, 0, batch)
+                .map_err(|m| self.misfit(piece.byte_offset, m))?;
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn unpacked(
+        &self,
+        piece: &Piece,
+        unpack: &dyn Unpack,
+        raw: &mut Vec<u8>,
+        decoded: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        for (first_point, points) in batches(piece, self.schema) {
+            let stride = unpack.unpack(self.source, first_point, points, raw, decoded)?;
+            self.prepare(batch, first_point, points);
+            let rows = Rows { bytes: decoded, stride, endian: Endian::Little };
+            binary::fill(rows, &self.schema.fields, self.wanted, 0, batch)
                 .map_err(|m| self.misfit(piece.byte_offset, m))?;
             if sink(batch).is_break() {
                 break;
