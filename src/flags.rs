@@ -75,6 +75,9 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
         }
+        Some(ReadAdvice::DecimalMark) => {
+            "say whether commas are decimal marks: --decimal comma or --decimal point".to_owned()
+        }
         Some(advice) => advice.to_string(),
     };
     format!("{}; {advice}", error.what_and_where())

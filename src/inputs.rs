@@ -10,8 +10,8 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use pointmill_format::scan::text::TextKind;
-use pointmill_format::{ErrorKind, OpenOptions, ScanKind, supported_scans};
+use pointmill_format::scan::text::{TextKind, is_other_text};
+use pointmill_format::{ErrorKind, OpenOptions, OtherKind, ScanKind, supported_scans};
 
 use crate::args::InputArgs;
 use crate::exit::Failure;
@@ -22,8 +22,23 @@ use crate::human::quantities::plural;
 pub(crate) struct Inputs {
     /// Sorted by path, each file once.
     pub(crate) files: Vec<PathBuf>,
+    /// Files that a folder or a glob brought along and that are no scans, in order of path.
+    pub(crate) other_files: Vec<PathBuf>,
     /// One line each.
     pub(crate) notes: Vec<String>,
+}
+
+impl Inputs {
+    /// The notes, and a line for the other files: for commands that write no report.
+    pub(crate) fn all_notes(&self) -> impl Iterator<Item = String> {
+        let other = (!self.other_files.is_empty()).then(|| other_files(&self.other_files));
+        self.notes.iter().cloned().chain(other)
+    }
+}
+
+/// Says which files were skipped.
+fn other_files(files: &[PathBuf]) -> String {
+    pointmill_converter::Warning::OtherFiles { files: files.to_vec() }.to_string()
 }
 
 /// Whether a file is a scan.
@@ -97,10 +112,11 @@ impl Search {
     /// A file that a folder or a glob brought along.
     fn add_met_file(&mut self, path: &Path, kind: fn(&Path) -> io::Result<Kind>) {
         // A file that cannot be opened but has the extension of a scan is kept: its reader reports why, and --unreadable
-        // decides.
+        // decides. So is one of named columns.
+        let is_other = || self.options.columns.is_none() && is_other(path).unwrap_or(false);
         match kind(path).unwrap_or_else(|_| kind_by_ending(path)) {
-            Kind::Scan => self.add_scan(path),
-            Kind::NoScan => self.no_scans.push(path.to_path_buf()),
+            Kind::Scan if !is_other() => self.add_scan(path),
+            _ => self.no_scans.push(path.to_path_buf()),
         }
     }
 
@@ -112,6 +128,9 @@ impl Search {
                 Err(e) => match (e.path(), e.io_error()) {
                     (Some(path), Some(error)) if error.kind() == io::ErrorKind::NotFound => {
                         self.add_met_file(path, kind_in_folder);
+                    }
+                    (Some(path), Some(error)) if is_of_the_system(path, error) => {
+                        self.no_scans.push(path.to_path_buf())
                     }
                     (Some(path), Some(error)) => return Err(Failure::io(path, "searching the folder", error)),
                     // A link that leads back to a folder above it: what is there is found anyway.
@@ -160,22 +179,32 @@ impl Search {
         };
         let name = |path: &PathBuf| path.display().to_string();
         let examples = |paths: &[PathBuf]| paths.iter().take(3).map(name).collect();
-        note(self.no_scans.len(), "other file", "skipped, not scans", examples(&self.no_scans));
         note(self.repeated.len(), "input", "named more than once, read once", examples(&self.repeated));
 
         let mut files: Vec<PathBuf> = self.found.into_values().collect();
         files.sort();
         if files.is_empty() {
             let places: Vec<String> = typed.iter().take(3).map(name).collect();
-            let skipped = if notes.is_empty() { String::new() } else { format!("; {}", notes.join("; ")) };
+            let others = self.no_scans.first().map(|_| format!("; {}", other_files(&self.no_scans)));
+            let skipped = others.unwrap_or_default();
             return Err(Failure::Input(format!(
                 "{}: no scan found (supported: {}){skipped}",
                 places.join(", "),
                 supported_scans()
             )));
         }
-        Ok(Inputs { files, notes })
+        let mut other_files = self.no_scans;
+        other_files.sort();
+        other_files.dedup();
+        Ok(Inputs { files, other_files, notes })
     }
+}
+
+/// True for a folder that the operating system keeps on a disk and does not open.
+fn is_of_the_system(path: &Path, error: &io::Error) -> bool {
+    let names = ["lost+found", "System Volume Information", "$RECYCLE.BIN"];
+    error.kind() == io::ErrorKind::PermissionDenied
+        && path.file_name().is_some_and(|name| names.iter().any(|system| name == *system))
 }
 
 /// One path for all spellings of a file; for a broken link its own place in its folder's.
@@ -202,6 +231,15 @@ fn kind_in_folder(path: &Path) -> io::Result<Kind> {
     }
 }
 
+/// True for a file that is called like a scan, or has rows of numbers, and is something else: a raster, a well log, a
+/// table, prose under the extension of a text scan.
+fn is_other(path: &Path) -> io::Result<bool> {
+    let mut first = Vec::new();
+    fs::File::open(path)?.take(OTHER_BYTES).read_to_end(&mut first)?;
+    let is_text = matches!(ScanKind::of(&first), None | Some(ScanKind::Text(_))) && !ends_with(path, &BINARY_ENDINGS);
+    Ok(OtherKind::of(&first).is_some() || is_text && is_other_text(&first))
+}
+
 fn content(path: &Path) -> io::Result<Option<ScanKind>> {
     ScanKind::of_file(path).map_err(|e| {
         let line = e.to_string();
@@ -214,6 +252,12 @@ fn content(path: &Path) -> io::Result<Option<ScanKind>> {
 
 /// Extensions of scans whose content may be too damaged to be recognised.
 const SCAN_ENDINGS: [&str; 8] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "xyz"];
+
+/// Those that are no text.
+const BINARY_ENDINGS: [&str; 5] = ["las", "laz", "e57", "ply", "pcd"];
+
+/// Bytes that show whether a text is a table.
+const OTHER_BYTES: u64 = 4 << 10;
 
 /// Extensions with which lines of numbers count as a scan. `txt` is not among them: name such files, or use a glob.
 const TEXT_ENDINGS: [&str; 7] = ["xyz", "asc", "csv", "xyzi", "xyzrgb", "pts", "ptx"];
@@ -298,9 +342,41 @@ mod tests {
         let dir = folder();
         let inputs = find(&[dir.path().to_path_buf()]).unwrap();
         assert_eq!(names(&inputs), ["b.dat", "c.ply", "a.LAZ"]);
-        let [note] = inputs.notes.as_slice() else { panic!("{:?}", inputs.notes) };
+        let [note] = &inputs.all_notes().collect::<Vec<_>>()[..] else { panic!("{:?}", inputs.other_files) };
         assert!(note.starts_with("4 other files skipped, not scans"), "{note}");
         assert!(["._b.laz", "counted.log", "matrix.txt"].iter().all(|name| note.contains(name)), "{note}");
+    }
+
+    #[test]
+    fn what_is_called_like_a_scan_and_is_none_is_skipped_in_a_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, text) in [
+            ("scan.xyz", "1 2 3\n4 5 6\n"),
+            ("scan.csv", "a,b,x,y,z\n1,2,3,4,5\n"),
+            ("broken.pts", "2\n1 2 3\n4 5\n"),
+            ("dem.asc", "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n"),
+            ("weather.csv", "time,temperature,humidity\n1,20.5,40\n2,21,41\n"),
+            ("well.las", "~Version Information\n VERS. 2.0\n"),
+            ("face.pts", "version: 1\nn_points: 2\n{\n1 2\n}\n"),
+            ("water.xyz", "3\nwater\nO 0 0 0\nH 0 0 1\nH 0 1 0\n"),
+            ("tile.las", "<html>not found</html>\n"),
+            ("tile.tfw", "1\n0\n0\n-1\n500\n600\n"),
+            ("tile.prj", "PROJCS[\"a\"]"),
+        ] {
+            fs::write(dir.path().join(name), text).unwrap();
+        }
+        fs::write(dir.path().join("cut.xyz"), [0; 20]).unwrap();
+        let inputs = find(&[dir.path().to_path_buf()]).unwrap();
+        assert_eq!(names(&inputs), ["broken.pts", "cut.xyz", "scan.csv", "scan.xyz", "tile.las"]);
+        assert_eq!(inputs.other_files.len(), 7, "{:?}", inputs.other_files);
+        let named = OpenOptions::default().columns(["t", "x", "y"]);
+        assert!(names(&expand(&[dir.path().to_path_buf()], &named).unwrap()).contains(&"weather.csv"));
+        let line = |name: &str| match find(&[dir.path().join(name)]) {
+            Err(Failure::Unsupported(line)) => line,
+            other => panic!("{name}: {other:?}"),
+        };
+        assert!(line("dem.asc").contains("an Arc/Info ASCII grid, a raster, not a scan"));
+        assert!(line("well.las").contains("a well log"));
     }
 
     #[test]

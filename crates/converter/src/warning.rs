@@ -22,6 +22,11 @@ pub enum Warning {
         /// What was odd.
         warning: ScanWarning,
     },
+    /// Files that were found with the scans are none.
+    OtherFiles {
+        /// All of them, in order of path.
+        files: Vec<PathBuf>,
+    },
     /// An input that cannot be read was skipped.
     InputSkipped {
         /// The input.
@@ -171,6 +176,7 @@ impl Warning {
     pub const fn kind(&self) -> &'static str {
         match self {
             Self::Scan { .. } => "scan",
+            Self::OtherFiles { .. } => "other_files",
             Self::InputSkipped { .. } => "input_skipped",
             Self::PointsSkipped { .. } => "points_skipped",
             Self::ReadAgain => "read_again",
@@ -207,6 +213,7 @@ impl Warning {
     pub fn what(&self) -> String {
         match self {
             Self::Scan { path, warning } => format!("{}: {warning}", path.display()),
+            Self::OtherFiles { files } => other_files(files),
             Self::InputSkipped { error, .. } => format!("input skipped: {error}"),
             Self::PointsSkipped { points, error, .. } => format!("{points} points skipped: {error}"),
             Self::ReadAgain => "the points lie outside the declared bounds, or their extent does not fit the chosen \
@@ -245,6 +252,12 @@ impl Warning {
             Self::NoColour => "batches: no input has colour or intensity; all points are white".to_owned(),
         }
     }
+}
+
+fn other_files(files: &[PathBuf]) -> String {
+    let named: Vec<_> = files.iter().take(3).map(|f| f.display().to_string()).collect();
+    let (noun, more) = (if files.len() == 1 { "file" } else { "files" }, if files.len() > 3 { ", …" } else { "" });
+    format!("{} other {noun} skipped, not scans ({}{more})", files.len(), named.join(", "))
 }
 
 /// The line of an error of something that was skipped: without the advice to skip it.

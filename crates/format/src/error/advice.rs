@@ -20,6 +20,8 @@ pub enum Advice {
     CheckColumns,
     /// Rows of two numbers: cut short, or x and y alone, which [`crate::OpenOptions::columns`] can say.
     NameColumns,
+    /// A comma that may be a decimal mark or a separator, which [`crate::OpenOptions::decimal`] can say.
+    DecimalMark,
     /// The kinds of scans that this build reads ([`crate::supported_scans`]).
     Supported(String),
     /// Cut short or damaged, or of another kind than those that this build reads.
@@ -44,6 +46,7 @@ impl fmt::Display for Advice {
             Self::NameColumns => {
                 f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")
             }
+            Self::DecimalMark => f.write_str("say whether commas are decimal marks"),
             Self::Supported(kinds) if kinds.is_empty() => f.write_str("this build reads no scans; enable a feature"),
             Self::Supported(kinds) => write!(f, "supported are {kinds}"),
             Self::CopyOrSupported(kinds) => {

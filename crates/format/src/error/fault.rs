@@ -14,6 +14,8 @@ pub enum Fault {
         /// The extension of the file, if it is one that scans have: the file is damaged, or misnamed.
         extension: Option<String>,
     },
+    /// The file is something else, not a scan: "an Arc/Info ASCII grid, a raster".
+    OtherKind(String),
     /// The format is known, this version of it is not.
     UnknownVersion {
         /// "LAS", "E57", ….
@@ -98,6 +100,7 @@ impl fmt::Display for Fault {
             Self::UnknownFormat { extension: Some(extension) } => {
                 write!(f, "called .{extension}, but it is no scan that is known here")
             }
+            Self::OtherKind(what) => write!(f, "this is {what}, not a scan"),
             Self::UnknownVersion { format, found: (major, minor), known } => {
                 write!(f, "{format} version {major}.{minor} is not known ({known})")
             }

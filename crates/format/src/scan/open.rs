@@ -6,7 +6,8 @@ use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
 
-use crate::{Advice, Fault, ReadError, Scan, UnknownName};
+use crate::scan::other_kind::OtherKind;
+use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
 
 /// Maximum bytes from the start of a file to detect its kind; text needs some lines.
 const SNIFF_BYTES: u64 = 4 << 10;
@@ -47,6 +48,8 @@ pub struct OpenOptions {
     pub columns: Option<Vec<String>>,
     /// Text: what stands between two fields; `None`: found. A blank means any blanks.
     pub separator: Option<char>,
+    /// Text: what stands before the decimals of a number.
+    pub decimal: Decimal,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
 }
@@ -63,6 +66,13 @@ impl OpenOptions {
     #[must_use]
     pub fn separator(mut self, separator: char) -> Self {
         self.separator = Some(separator);
+        self
+    }
+
+    /// Sets [`Self::decimal`].
+    #[must_use]
+    pub fn decimal(mut self, decimal: Decimal) -> Self {
+        self.decimal = decimal;
         self
     }
 
@@ -117,7 +127,7 @@ impl ScanKind {
         }
         // last: a binary file may hold lines of numbers, too
         #[cfg(feature = "text")]
-        if let Some(kind) = crate::scan::text::kind(first_bytes) {
+        if let Some(kind) = crate::scan::text::kind(first_bytes).filter(|_| OtherKind::of(first_bytes).is_none()) {
             return Some(Self::Text(kind));
         }
         None
@@ -220,9 +230,8 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
         ScanKind::Pcd => crate::scan::pcd::open(path),
         #[cfg(feature = "text")]
         ScanKind::Text(_) => {
-            let options =
-                crate::scan::text::TextOptions { columns: options.columns.clone(), separator: options.separator };
-            crate::scan::text::open(path, &options)
+            let OpenOptions { columns, separator, decimal, .. } = options.clone();
+            crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })
         }
     }
 }
@@ -243,6 +252,12 @@ fn is_ending_of_scans(extension: &str) -> bool {
 fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     let supported = Advice::Supported(supported_scans());
+    if let Some(other) = OtherKind::of(first) {
+        return ReadError::unsupported(path, Fault::OtherKind(other.to_string())).advise(supported);
+    }
+    if cfg!(feature = "text") && (first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff])) {
+        return ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8");
+    }
     match ending.filter(|e| is_ending_of_scans(e)) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),
         Some(ending) => ReadError::broken(path, 0, Fault::UnknownFormat { extension: Some(ending) })

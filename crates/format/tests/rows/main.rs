@@ -6,3 +6,4 @@ mod corpus;
 mod damage;
 mod golden;
 mod hand_made;
+mod text_kinds;

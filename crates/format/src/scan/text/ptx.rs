@@ -50,7 +50,9 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
         rule: LineRule { least, poses: grids.poses, ..LineRule::new(None, is_point) },
         warnings,
         numeric: vec![true; most],
+        row_numbers: false,
         pts_intensity: false,
+        unit_colours: false,
         first_row: grids.first_row,
         source,
     };
@@ -141,7 +143,7 @@ fn is_point(line: &[u8]) -> bool {
     if first.is_some_and(|b| (b'1'..=b'9').contains(b)) {
         return true;
     }
-    let mut tokens = Tokens { line, at: 0, separator: None };
+    let mut tokens = Tokens::of(line);
     !(0..3).all(|_| !tokens.is_empty() && parse(tokens.token()) == Ok(0.0))
 }
 
