@@ -35,6 +35,7 @@ fn advice(advice: &Advice) -> String {
         Advice::SkipInvalid => "pass --invalid skip to leave such points out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
+        Advice::CommasSeparate => "pass --decimal point if they separate columns".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
         Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),
         Advice::Reproject => "reproject the inputs, or name the system with --crs".to_owned(),

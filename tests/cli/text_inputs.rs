@@ -73,3 +73,18 @@ fn a_broken_scan_of_a_folder_follows_its_own_policy() {
     let report = dir.report("out");
     assert_eq!((&report["points"]["read"], &report["other_files"]["count"]), (&json!(2), &json!(1)));
 }
+
+#[test]
+fn tables_with_titles_are_scans_where_they_are_named() {
+    let dir = Dir::new();
+    dir.write("in/a.xyz", b"1 2 3\n4 5 6\n");
+    dir.write("in/control.csv", b"label,x,y,z\nP1,1.5,2.5,3.5\nP2,4.5,5.5,6.5\n");
+    dir.write("flat.csv", b"lon,lat\n9.25,48.5\n9.5,48.75\n");
+    let read = |input: &str| {
+        dir.succeed(["convert", input, "-o", "out", "-q", "--overwrite"]);
+        dir.report("out")["inputs"][0]["bounds_measured"].clone()
+    };
+    assert_eq!(read("in"), json!([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), "labelled points of a folder are no scan");
+    assert_eq!(read("in/control.csv"), json!([1.5, 2.5, 3.5, 4.5, 5.5, 6.5]));
+    assert_eq!(read("flat.csv"), json!([9.25, 48.5, 0.0, 9.5, 48.75, 0.0]));
+}

@@ -204,6 +204,7 @@ impl Warning {
         match self {
             Self::Outliers { others, .. } => Some(Advice::CutBounds { bounds: Some(*others) }),
             Self::MixedRgbDepth { .. } => Some(Advice::SetRgbDepth),
+            Self::Scan { warning: ScanWarning::DecimalComma { .. }, .. } => Some(Advice::CommasSeparate),
             Self::Crs(CrsNote::NoCode { .. }) => Some(Advice::NameEpsg),
             Self::Crs(CrsNote::NotInTable { .. }) => Some(Advice::GiveProj4),
             Self::DifferentCrs { .. } => Some(Advice::Reproject),

@@ -206,9 +206,11 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
-        // Columns were named for it: then it is text, if it can be.
+        // Columns were named for it, by the user or in it: then it is text, if it can be.
         #[cfg(feature = "text")]
-        None if options.columns.is_some() && !first.is_empty() && !first.contains(&0) => {
+        None if (options.columns.is_some() && !first.is_empty() && !first.contains(&0))
+            || crate::scan::text::has_titles(&first) =>
+        {
             ScanKind::Text(crate::scan::text::TextKind::Xyz)
         }
         None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {

@@ -165,7 +165,9 @@ impl ScanWarning {
             Self::ColumnIgnored { number, name } => {
                 format!("column {number} ({name}) holds no numbers; it is omitted")
             }
-            Self::RowNumbersIgnored => "column 1 numbers or names the rows; it is omitted".to_owned(),
+            Self::RowNumbersIgnored => {
+                "column 1 numbers or names the rows; it is omitted, unless all columns are named".to_owned()
+            }
             Self::TitlesOfNumbers { line } => format!("the first line ({line}) has titles of columns, no point"),
             Self::TitleTwice { number, name } => {
                 format!("column {number} ({name}) is called like a coordinate; it is an attribute")

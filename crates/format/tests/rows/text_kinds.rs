@@ -173,6 +173,23 @@ fn missing_values_and_quotes_are_read() {
 }
 
 #[test]
+fn a_damaged_row_is_an_error_wherever_it_stands() {
+    for bytes in
+        ["1,five,3\n4,5,6\n7,8,9\n", "4,5,6\n1,five,3\n7,8,9\n", "1.2.3 4 5\n1 2 3\n4 5 6\n", "1 234.5;2;3\n4;5;6\n"]
+    {
+        let cloud = read_bytes(bytes).unwrap();
+        assert_eq!((cloud.errors.len(), cloud.info.warnings.len()), (1, 0), "{bytes}: {:?}", cloud.info.warnings);
+    }
+}
+
+#[test]
+fn points_may_have_names() {
+    let cloud = read_bytes("name,x,y,z\nP1,1.5,2.5,3.5\nP2,4.5,5.5,6.5\n").unwrap();
+    assert_eq!(cloud.xyz, [[1.5, 4.5], [2.5, 5.5], [3.5, 6.5]]);
+    assert!(cloud.warned("column 1 (name) holds no numbers"));
+}
+
+#[test]
 fn lines_may_end_with_cr() {
     assert_eq!(points("1 2 3\r4 5 6\r"), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
     assert_eq!(points("x;y;z\r1,5;2,5;3,5"), [[1.5, 2.5, 3.5]]);

@@ -8,42 +8,6 @@ use crate::{AttributeType, Column, Element, PointBatch, Positions, Wanted};
 /// How the numbers of a line are set apart: by blanks, and by this byte if there is one.
 pub(crate) type Separator = Option<u8>;
 
-/// The byte before the decimals of a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum DecimalMark {
-    /// A point.
-    #[default]
-    Point,
-    /// A comma, always.
-    Comma,
-    /// A comma between two digits; any other is a separator.
-    InnerComma,
-}
-
-impl DecimalMark {
-    /// The line with points as decimal marks, in `buffer` unless it has them already.
-    ///
-    /// Every byte keeps its place. A point of the line becomes a byte that no number has: beside decimal commas it
-    /// groups thousands or contradicts the other numbers.
-    pub(crate) fn to_points<'a>(self, line: &'a [u8], buffer: &'a mut Vec<u8>) -> &'a [u8] {
-        if self == Self::Point {
-            return line;
-        }
-        let is_digit = |i: Option<usize>| i.and_then(|i| line.get(i)).is_some_and(u8::is_ascii_digit);
-        let is_mark = |i: usize| self == Self::Comma || (is_digit(i.checked_sub(1)) && is_digit(i.checked_add(1)));
-        buffer.clear();
-        buffer.extend(line.iter().enumerate().map(|(i, b)| match b {
-            b',' if is_mark(i) => b'.',
-            b'.' => NO_NUMBER,
-            b => *b,
-        }));
-        buffer
-    }
-}
-
-/// Not part of any number, and no separator.
-pub(super) const NO_NUMBER: u8 = b'`';
-
 /// Writes lines to a batch.
 pub(crate) struct RowParser<'a> {
     pub(crate) fields: &'a [Field],
@@ -446,17 +410,6 @@ mod tests {
         let mut tokens =
             Tokens { line: b"\"a \"\"b\"\", c\", 1 Jan 2020 , 7", at: 0, separator: Some(b','), strict: true };
         assert_eq!([tokens.token(), tokens.token(), tokens.token()], [&b"a \"\"b\"\", c"[..], b"1 Jan 2020", b"7"]);
-    }
-
-    #[test]
-    fn commas_become_points_in_their_places() {
-        let mut buffer = Vec::new();
-        let mut text = |mark: DecimalMark, line: &str| {
-            String::from_utf8(mark.to_points(line.as_bytes(), &mut buffer).to_vec()).unwrap()
-        };
-        assert_eq!(text(DecimalMark::Point, "1,5 2.5"), "1,5 2.5");
-        assert_eq!(text(DecimalMark::Comma, "1,5 ,25 2.5"), "1.5 .25 2`5");
-        assert_eq!(text(DecimalMark::InnerComma, "1,5, -2,5,\"3,5\",,4"), "1.5, -2.5,\"3.5\",,4");
     }
 
     #[test]

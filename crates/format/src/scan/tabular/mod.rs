@@ -8,6 +8,7 @@
 
 pub(crate) mod ascii;
 pub(crate) mod binary;
+mod decimal_mark;
 pub(crate) mod lines;
 mod names;
 mod number;
@@ -15,6 +16,7 @@ mod probe;
 mod scan;
 mod schema;
 
+pub(crate) use decimal_mark::DecimalMark;
 pub(crate) use names::{Role, las_type, role};
 pub(crate) use number::Endian;
 pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};

@@ -3,8 +3,9 @@
 use crate::{Advice, Fault};
 use std::sync::Arc;
 
-use super::ascii::{self, DecimalMark, RowParser, Separator};
+use super::ascii::{RowParser, Separator};
 use super::binary::{self, Misfit, Rows};
+use super::decimal_mark::{DecimalMark, NO_NUMBER};
 use super::lines;
 use super::number::Endian;
 use super::schema::Schema;
@@ -98,7 +99,7 @@ impl LineRule {
         if self.decimal == DecimalMark::Point || !what.ends_with("is not a number") {
             return what;
         }
-        let marks = what.replace('.', ",").replace(char::from(ascii::NO_NUMBER), ".");
+        let marks = what.replace('.', ",").replace(char::from(NO_NUMBER), ".");
         format!("{marks} with a decimal comma")
     }
 

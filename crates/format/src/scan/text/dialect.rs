@@ -3,13 +3,11 @@
 //! Candidates are tried on every sampled row. One fits if each field is a number, empty, or words; a field that is made
 //! of digits and still no number (`1,5` where points are decimal marks, `5 2` between commas) speaks against it.
 
+use super::commas::{AXES, example, groups_thousands, joins_decimals, joins_numbers};
 use super::options::TextOptions;
-use crate::scan::tabular::LineRule;
-use crate::scan::tabular::ascii::{DecimalMark, Tokens, parse};
+use crate::scan::tabular::ascii::{Tokens, parse};
+use crate::scan::tabular::{DecimalMark, LineRule};
 use crate::{Decimal, ScanWarning};
-
-/// Least numbers of a point.
-const POSITION: usize = 3;
 
 /// How a row becomes fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +58,10 @@ impl Dialect {
         let line = self.decimal.to_points(row, &mut buffer);
         let mut tokens = Tokens { line, at: 0, separator: self.separator, strict: self.strict };
         std::iter::from_fn(|| (!tokens.is_empty()).then(|| tokens.token().to_vec())).collect()
+    }
+
+    fn split_all(self, rows: &[Vec<u8>]) -> Vec<Vec<Vec<u8>>> {
+        rows.iter().map(|row| self.split(row)).collect()
     }
 
     pub(super) fn kinds(self, row: &[u8]) -> Vec<FieldKind> {
@@ -133,9 +135,9 @@ impl Fit {
         Self { dialect, rows: shapes.len(), all: shapes.len() == rows.len(), numbers, shape }
     }
 
-    /// All rows fit and have the same number of columns, `POSITION` or as many as are named.
+    /// All rows fit and have the same number of columns, `AXES` or as many as are named.
     fn is_scan(&self, named: Option<usize>) -> bool {
-        let fits = |(columns, numbers)| named.map_or(numbers >= POSITION, |n| n == columns);
+        let fits = |(columns, numbers)| named.map_or(numbers >= AXES, |n| n == columns);
         self.all && self.shape.is_some_and(fits)
     }
 }
@@ -189,7 +191,7 @@ fn one(separator: Option<u8>, rows: &[Vec<u8>], options: &TextOptions) -> Result
     if commas.rows == 0 {
         return Err(unclear(rows));
     }
-    if groups_thousands(comma, rows) {
+    if groups_thousands(&comma.split_all(rows)) {
         return Err(unclear(rows));
     }
     Ok(comma)
@@ -208,11 +210,15 @@ fn unknown(rows: &[Vec<u8>], options: &TextOptions) -> Result<Dialect, String> {
         Decimal::Comma => Ok(most([comma, inner]).dialect),
         Decimal::Auto if commas.all => {
             let other = inner.is_scan(named) && inner.shape.map(|s| s.0) != commas.shape.map(|s| s.0);
-            if other || joins_decimals(rows) { Err(unclear(rows)) } else { Ok(commas.dialect) }
+            if other || joins_decimals(&Dialect::COMMAS.split_all(rows)) {
+                Err(unclear(rows))
+            } else {
+                Ok(commas.dialect)
+            }
         }
         Decimal::Auto if blanks.all => Ok(blanks.dialect),
         Decimal::Auto if comma.is_scan(named) => {
-            if groups_thousands(comma.dialect, rows) {
+            if groups_thousands(&comma.dialect.split_all(rows)) {
                 Err(unclear(rows))
             } else {
                 Ok(comma.dialect)
@@ -223,7 +229,7 @@ fn unknown(rows: &[Vec<u8>], options: &TextOptions) -> Result<Dialect, String> {
         Decimal::Auto => {
             // rows that do not fit are errors where they are decoded
             let best = most([commas, blanks, comma, inner]);
-            if best.rows * 2 > rows.len() && best.numbers >= POSITION { Ok(best.dialect) } else { Err(unclear(rows)) }
+            if best.rows * 2 > rows.len() && best.numbers >= AXES { Ok(best.dialect) } else { Err(unclear(rows)) }
         }
     }
 }
@@ -239,71 +245,6 @@ fn most<const N: usize>(fits: [Fit; N]) -> Fit {
 
 fn unclear(rows: &[Vec<u8>]) -> String {
     format!("the comma in {} may be a decimal mark, or separate columns or thousands", example(rows))
-}
-
-/// The first digits with a comma between them.
-fn example(rows: &[Vec<u8>]) -> String {
-    let is_part = |b: &u8| b.is_ascii_digit() || b"+-.,".contains(b);
-    let has_inner =
-        |field: &&[u8]| field.windows(3).any(|w| w[1] == b',' && w[0].is_ascii_digit() && w[2].is_ascii_digit());
-    let mut fields = rows.iter().flat_map(|row| row.split(|b| !is_part(b)));
-    let found = fields.find(has_inner).unwrap_or(b"1,5");
-    String::from_utf8_lossy(found).trim_end_matches(',').chars().take(40).collect()
-}
-
-/// True if decimal commas may as well group thousands: three digits follow each, never more than three stand before it,
-/// and a coordinate below 1000 has none, as it would be without a fraction to write.
-fn groups_thousands(dialect: Dialect, rows: &[Vec<u8>]) -> bool {
-    let mut bare = false;
-    for field in rows.iter().flat_map(|row| dialect.split(row).into_iter().take(POSITION)) {
-        let digits = field.strip_prefix(b"-").unwrap_or(&field);
-        match digits.iter().position(|b| *b == b'.') {
-            None if digits.len() > 3 || digits == b"0" => return false,
-            None => bare |= FieldKind::of(&field, dialect.decimal) == FieldKind::Number,
-            Some(at @ 1..=3) if digits.len() == at + 4 && digits[0] != b'0' => {}
-            Some(_) => return false,
-        }
-    }
-    bare
-}
-
-/// True if whole numbers between commas look like coordinates and their decimals by turns: only the second of each two
-/// has leading zeros.
-fn joins_decimals(rows: &[Vec<u8>]) -> bool {
-    let mut zeros = [false; 2];
-    for row in rows {
-        let fields = Dialect::COMMAS.split(row);
-        if fields.len() < 2 * POSITION || fields.len() % 2 == 1 {
-            return false;
-        }
-        for (i, field) in fields.iter().enumerate() {
-            let digits = if i % 2 == 0 { field.strip_prefix(b"-").unwrap_or(field) } else { field };
-            if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
-                return false;
-            }
-            zeros[i % 2] |= digits.len() > 1 && digits[0] == b'0';
-        }
-    }
-    zeros == [false, true]
-}
-
-/// True if some numbers are set apart by commas alone, which are no decimal marks and group no thousands.
-fn joins_numbers(rows: &[Vec<u8>]) -> bool {
-    let mut joined = false;
-    for field in rows.iter().flat_map(|row| row.split(|b| *b <= b' ')) {
-        let parts: Vec<_> = field.split(|b| *b == b',').collect();
-        let has_point = field.contains(&b'.');
-        let thousands = |part: &&[u8]| part.split(|b| *b == b'.').next().is_some_and(|p| p.len() == 3);
-        let points_group = field.iter().filter(|b| **b == b'.').count() > 0 && parts.len() == 2 && {
-            let groups: Vec<_> = parts[0].split(|b| *b == b'.').collect();
-            groups.len() > 1 && groups[1..].iter().all(|g| g.len() == 3)
-        };
-        if parts.len() > 1 && (parts[1..].iter().all(thousands) || points_group) {
-            return false;
-        }
-        joined |= parts.len() > 2 || (parts.len() == 2 && has_point);
-    }
-    joined
 }
 
 /// `;` before `,` before blanks: a decimal comma needs another separator.

@@ -1,6 +1,6 @@
 //! The lines before the first row, and a sample of the rows.
 
-use super::columns::Column;
+use super::column::Column;
 use super::dialect::{Dialect, FieldKind, detect, usual_separator};
 use super::index_column::{self, First};
 use super::options::TextOptions;
@@ -192,14 +192,13 @@ fn is_titles(line: &[u8], options: &TextOptions) -> bool {
     numbers < 2 && all > numbers || numbers < all && Titles::of_line(line, all, separator).name_x_and_y()
 }
 
-/// True for rows below titles that name neither x nor y.
-pub(super) fn is_table(lines: &[&[u8]]) -> bool {
+/// Titles in these lines above a row: whether they name x and y. `None`: there are none.
+pub(super) fn titles_name_x_and_y(lines: &[&[u8]]) -> Option<bool> {
     let options = TextOptions::default();
     let mut data = lines.iter().copied().filter(|line| is_data(line));
-    let (Some(first), Some(second)) = (data.next(), data.next()) else { return false };
-    let separator = usual_separator(first);
+    let (first, second) = (data.next()?, data.next()?);
     let columns = super::rows::fields(second, usual_separator(second)).len();
-    is_titles(first, &options) && !Titles::of_line(first, columns, separator).name_x_and_y()
+    is_titles(first, &options).then(|| Titles::of_line(first, columns, usual_separator(first)).name_x_and_y())
 }
 
 /// Rows from places behind byte `from`.
@@ -219,24 +218,19 @@ fn elsewhere(source: &Source, from: u64, counted: bool) -> Result<Vec<Vec<u8>>, 
     Ok(rows)
 }
 
-/// Which columns hold numbers: by the first row, and where that is empty, by those that are not.
+/// Which columns hold numbers: those where not most rows have words, so that a damaged row is an error where it is read.
 fn numeric(dialect: Dialect, sample: &[Vec<u8>]) -> Vec<bool> {
     let kinds: Vec<_> = sample.iter().map(|row| dialect.kinds(row)).collect();
-    let Some(first) = kinds.first() else { return Vec::new() };
-    let mut width = first.len();
+    let Some(mut width) = kinds.first().map(Vec::len) else { return Vec::new() };
     // a last field that is empty shows in other rows only
-    let open = dialect.separator.is_some_and(|s| sample[0].trim_ascii_end().last() == Some(&s));
-    if open && kinds.iter().any(|row| row.len() == width + 1) {
-        width += 1;
-    }
-    let holds_numbers = |i: usize| match first.get(i) {
-        None | Some(FieldKind::Empty) => {
-            let filled = kinds.iter().filter_map(|row| row.get(i)).find(|k| **k != FieldKind::Empty);
-            filled != Some(&FieldKind::Words)
-        }
-        Some(kind) => *kind == FieldKind::Number,
+    let is_open = dialect.separator.is_some_and(|s| sample[0].trim_ascii_end().last() == Some(&s));
+    width += usize::from(is_open && kinds.iter().any(|row| row.len() == width + 1));
+    let count = |i: usize, is_it: fn(&FieldKind) -> bool| {
+        kinds.iter().filter_map(|row| row.get(i)).filter(|k| is_it(k)).count()
     };
-    (0..width).map(holds_numbers).collect()
+    let has_words =
+        |i: usize| count(i, |k| *k == FieldKind::Words) > count(i, |k| matches!(k, FieldKind::Number | FieldKind::Odd));
+    (0..width).map(|i| !has_words(i)).collect()
 }
 
 fn shown(line: &[u8]) -> String {

@@ -29,7 +29,8 @@
 //!
 //! Sources: Leica Geosystems, "PTS File Format", "PTX File Format"; Geomview manual, "OFF Files".
 
-mod columns;
+mod column;
+mod commas;
 mod dialect;
 mod head;
 mod index_column;
@@ -38,6 +39,8 @@ mod options;
 mod pts;
 mod ptx;
 mod rows;
+mod table;
+mod title_names;
 mod titles;
 mod xyz;
 
@@ -122,6 +125,12 @@ pub fn is_xyz(first_bytes: &[u8]) -> bool {
     rows > 0 && rows * 2 >= data.len().saturating_sub(1)
 }
 
+/// True for text whose first line has the titles x and y: points also where [`kind`] does not say so, because words come
+/// first in each row or there are only two numbers.
+pub fn has_titles(first_bytes: &[u8]) -> bool {
+    !first_bytes.contains(&0) && head::titles_name_x_and_y(&filled(first_bytes)) == Some(true)
+}
+
 /// True for text that is no scan: a table whose titles are not those of points, or lines without a row of numbers.
 ///
 /// A file that a user names may be opened all the same, with [`TextOptions::columns`].
@@ -130,7 +139,7 @@ pub fn is_other_text(first_bytes: &[u8]) -> bool {
         return false;
     }
     match kind(first_bytes) {
-        Some(TextKind::Xyz) => head::is_table(&filled(first_bytes)),
+        Some(TextKind::Xyz) => head::titles_name_x_and_y(&filled(first_bytes)) == Some(false),
         Some(_) => false,
         // comments may be long, and the rows behind them
         None => filled(first_bytes).iter().any(|line| !is_comment(line)),
@@ -168,7 +177,7 @@ pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Sca
 /// # Errors
 /// What is wrong with them, for people: x or y is missing, a name stands twice, a type is not known.
 pub fn check_columns(names: &[String]) -> Result<(), String> {
-    columns::check(names)
+    column::check(names)
 }
 
 #[cfg(test)]

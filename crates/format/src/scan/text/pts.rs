@@ -2,10 +2,10 @@
 
 use std::cell::Cell;
 
-use super::columns::Table;
 use super::head::Head;
 use super::options::TextOptions;
 use super::rows::{count, is_count, is_data};
+use super::table::Table;
 use crate::scan::source::Source;
 use crate::scan::tabular::{lines, reconcile};
 use crate::{ReadError, Scan, ScanWarning};

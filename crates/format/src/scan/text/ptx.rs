@@ -3,8 +3,9 @@
 //! Columns, rows, scanner position, three scanner axes, then the four rows of the matrix that turns (x, y, z, 1) into
 //! world coordinates. Cell by cell follow x, y, z, intensity and perhaps red, green, blue.
 
-use super::columns::{Column, Table};
+use super::column::Column;
 use super::rows::{fields, is_number};
+use super::table::Table;
 use crate::scan::source::Source;
 use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::{LineRule, Pose, lines, reconcile};

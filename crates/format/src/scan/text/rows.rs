@@ -1,7 +1,8 @@
 //! Lines and their fields, as all kinds of text have them.
 
 use super::dialect::usual_separator;
-use crate::scan::tabular::ascii::{DecimalMark, Tokens, parse};
+use crate::scan::tabular::DecimalMark;
+use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::lines;
 
 /// The filled lines of the first bytes, 64 at most; the last one may be cut and counts only if it is the only one.

@@ -1,9 +1,9 @@
 //! Lines of numbers without more order than that.
 
-use super::columns::Table;
 use super::head::Head;
 use super::options::TextOptions;
 use super::rows::is_data;
+use super::table::Table;
 use crate::scan::source::Source;
 use crate::scan::tabular::lines;
 use crate::{ReadError, Scan};
