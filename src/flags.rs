@@ -40,6 +40,7 @@ fn advice(advice: &Advice) -> String {
         Advice::SkipOriginPoints => "--origin-points skip leaves them out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
+        Advice::CommasSeparate => "pass --decimal point if they separate columns".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
         Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),
         Advice::Reproject => "reproject the inputs, or name the system with --crs".to_owned(),
@@ -79,6 +80,9 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
         }
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
+        }
+        Some(ReadAdvice::DecimalMark) => {
+            "say whether commas are decimal marks: --decimal comma or --decimal point".to_owned()
         }
         Some(advice) => advice.to_string(),
     };

@@ -131,6 +131,7 @@ fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
 fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
     let mut plan = Plan::new(inputs.files, args.output.clone());
+    plan.other_files = inputs.other_files;
     plan.open = args.inputs.options()?;
     plan.name = name;
     plan.attributes = match &args.attributes {
@@ -245,7 +246,7 @@ mod tests {
         let args = Args::parse_from(["pointmill", "convert", "a.las", "-o", "out"]);
         let Command::Convert(args) = args.command else { panic!() };
         let files = vec![PathBuf::from("a.las")];
-        let inputs = Inputs { files: files.clone(), notes: Vec::new() };
+        let inputs = Inputs { files: files.clone(), ..Inputs::default() };
         let given = plan(&args, inputs).unwrap();
         let octree: Target = Potree2Settings::default().into();
         assert_eq!(format!("{:?}", targets(&args).unwrap()), format!("{:?}", [octree]));

@@ -50,7 +50,7 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(), Failure> {
     if !args.against.is_empty() {
         let found = inputs::expand(&args.against, &options.open)?;
         if !args.talk.quiet {
-            found.notes.iter().for_each(|note| print_line(note));
+            found.all_notes().for_each(|note| print_line(&note));
         }
         options.against = found.files;
     }

@@ -17,3 +17,4 @@ mod same_points;
 mod sameness;
 mod several;
 mod support;
+mod text_inputs;

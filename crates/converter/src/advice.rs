@@ -39,6 +39,8 @@ pub enum Advice {
     DetectRgbDepth,
     /// State the colour depth.
     SetRgbDepth,
+    /// State that commas of a text separate columns.
+    CommasSeparate,
     /// Name the coordinate reference system by its EPSG code.
     NameEpsg,
     /// Give the coordinate reference system as a proj4 definition.
@@ -79,6 +81,7 @@ impl fmt::Display for Advice {
             Self::SkipOriginPoints => "skip points at the origin of their scan to leave them out",
             Self::DetectRgbDepth => "let the colour depth be detected",
             Self::SetRgbDepth => "state the colour depth to override this",
+            Self::CommasSeparate => "say so if they separate columns",
             Self::NameEpsg => "name the EPSG code if viewers need the projection",
             Self::GiveProj4 => "give a proj4 definition if viewers need the projection",
             Self::Reproject => "reproject the inputs, or name one system for all",

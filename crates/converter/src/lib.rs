@@ -59,8 +59,8 @@ pub use plan::{
 pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
     AttributeReport, ChangedAttribute, ChangedValues, CoordinateChange, DropReason, DroppedAttribute, Estimate,
-    GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport,
-    TreeReport,
+    GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report,
+    SharedPlaceReport, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
 pub use sources::{ResolvedCrs, resolve_crs};

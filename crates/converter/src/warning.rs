@@ -22,6 +22,11 @@ pub enum Warning {
         /// What was odd.
         warning: ScanWarning,
     },
+    /// Files that were found with the scans are none.
+    OtherFiles {
+        /// All of them, in order of path.
+        files: Vec<PathBuf>,
+    },
     /// An input that cannot be read was skipped.
     InputSkipped {
         /// The input.
@@ -244,6 +249,7 @@ impl Warning {
     pub const fn kind(&self) -> &'static str {
         match self {
             Self::Scan { .. } => "scan",
+            Self::OtherFiles { .. } => "other_files",
             Self::InputSkipped { .. } => "input_skipped",
             Self::PointsSkipped { .. } => "points_skipped",
             Self::ReadAgain => "read_again",
@@ -273,6 +279,7 @@ impl Warning {
             Self::Outliers { others, .. } => Some(Advice::CutBounds { bounds: Some(*others) }),
             Self::OriginPoints { .. } | Self::SharedPlace { at_origin: true, .. } => Some(Advice::SkipOriginPoints),
             Self::MixedRgbDepth { .. } => Some(Advice::SetRgbDepth),
+            Self::Scan { warning: ScanWarning::DecimalComma { .. }, .. } => Some(Advice::CommasSeparate),
             Self::Crs(CrsNote::NoCode { .. } | CrsNote::UserDefined { .. }) => Some(Advice::NameEpsg),
             Self::Crs(CrsNote::NotInTable { .. } | CrsNote::FalseEasting { .. }) => Some(Advice::GiveProj4),
             Self::DifferentCrs { .. } => Some(Advice::Reproject),
@@ -285,6 +292,7 @@ impl Warning {
     pub fn what(&self) -> String {
         match self {
             Self::Scan { path, warning } => format!("{}: {warning}", path.display()),
+            Self::OtherFiles { files } => other_files(files),
             Self::InputSkipped { error, .. } => format!("input skipped: {error}"),
             Self::PointsSkipped { points, error, .. } => format!("{points} points skipped: {error}"),
             Self::ReadAgain => "the points lie outside the declared bounds, or their extent does not fit the chosen \
@@ -338,6 +346,12 @@ impl Warning {
             Self::NoColour => "batches: no input has colour or intensity; all points are white".to_owned(),
         }
     }
+}
+
+fn other_files(files: &[PathBuf]) -> String {
+    let named: Vec<_> = files.iter().take(3).map(|f| f.display().to_string()).collect();
+    let (noun, more) = (if files.len() == 1 { "file" } else { "files" }, if files.len() > 3 { ", …" } else { "" });
+    format!("{} other {noun} skipped, not scans ({}{more})", files.len(), named.join(", "))
 }
 
 /// One number where all axes have the same.

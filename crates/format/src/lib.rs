@@ -67,8 +67,8 @@ pub use geometry::{Aabb, AxisGrid, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Batches, Counted, Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart,
-    ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, supported_scans,
+    Batches, Counted, Crs, Decimal, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, Resolution, Scan, ScanInfo,
+    ScanKind, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, supported_scans,
 };
 pub use write_error::WriteError;
 

@@ -49,7 +49,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         match inputs::expand(std::slice::from_ref(path), &options) {
             Err(failure) => out.fail(failure),
             Ok(found) => {
-                found.notes.iter().for_each(|note| print_line(note));
+                found.all_notes().for_each(|note| print_line(&note));
                 for file in &found.files {
                     out.show(scan::describe(file, &options, args.deep))?;
                 }

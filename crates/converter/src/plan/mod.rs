@@ -14,6 +14,8 @@ pub use error::{PlanError, PlanFault, Setting};
 pub struct Plan {
     /// Scans to read, files only (folders and globs are already expanded), any order.
     pub inputs: Vec<PathBuf>,
+    /// Files that were found with the scans and are none: they are told and counted, not read.
+    pub other_files: Vec<PathBuf>,
     /// What text and E57 files do not say of themselves.
     pub open: OpenOptions,
     /// The folder to make.
@@ -174,6 +176,7 @@ impl Plan {
     pub fn new(inputs: Vec<PathBuf>, output: PathBuf) -> Self {
         Self {
             inputs,
+            other_files: Vec::new(),
             open: OpenOptions::default(),
             output,
             name: String::new(),

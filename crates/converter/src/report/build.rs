@@ -4,8 +4,8 @@ use pointmill_format::{Aabb, DatasetKind};
 use serde_json::{Map, Value, json};
 
 use super::types::{
-    AttributeReport, CoordinateChange, GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport,
-    Report, SharedPlaceReport,
+    AttributeReport, CoordinateChange, GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport,
+    PhaseReport, PointsReport, Report, SharedPlaceReport,
 };
 use crate::cloud::{Cloud, Cube, JobLattice, SharedPlace};
 use crate::error::ConvertError;
@@ -18,6 +18,7 @@ use crate::sources::{Sources, resolve_crs};
 /// What a run has to show for itself, beside the cloud.
 pub(crate) struct Account {
     pub(crate) settings: Map<String, Value>,
+    pub(crate) other_files: OtherFilesReport,
     pub(crate) outputs: Vec<OutputReport>,
     pub(crate) phases: Vec<PhaseTime>,
     /// Wall seconds in all.
@@ -31,12 +32,13 @@ pub(crate) struct Account {
 pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
     let stats = &cloud.stats;
     let count = stats.points.max(1) as f64;
-    let Account { settings, outputs, phases, seconds } = account;
+    let Account { settings, other_files, outputs, phases, seconds } = account;
     let of_outputs = outputs.iter().flat_map(|o| &o.warnings);
     Ok(Report {
         version: env!("CARGO_PKG_VERSION").into(),
         options: settings,
         inputs: input_reports(cloud.sources, Some(cloud)),
+        other_files,
         attributes: attribute_reports(cloud),
         grid: grid_report(&cloud.lattice, cloud.is_lossless, &cloud.frame.cube),
         points: points_report(cloud, &outputs)?,

@@ -20,6 +20,8 @@ pub struct Report {
     pub options: Map<String, Value>,
     /// One entry per input, in order of path.
     pub inputs: Vec<InputReport>,
+    /// Files that were found with the inputs and are no scans.
+    pub other_files: OtherFilesReport,
     /// The lattice of the output.
     pub grid: GridReport,
     /// Every point accounted for.
@@ -172,6 +174,26 @@ impl From<Changes> for ChangedValues {
     fn from(changes: Changes) -> Self {
         let Changes { clamped, rounded, not_finite, out_of_range, extremes, .. } = changes;
         Self { clamped, rounded, not_finite, out_of_range, extremes }
+    }
+}
+
+/// Files that were found with the inputs and are no scans.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct OtherFilesReport {
+    /// How many.
+    pub count: u64,
+    /// The first hundred in order of path, with U+FFFD for what is no Unicode in a name.
+    pub paths: Vec<String>,
+}
+
+impl OtherFilesReport {
+    /// Paths that are listed.
+    const LISTED: usize = 100;
+
+    pub(crate) fn new(files: &[PathBuf]) -> Self {
+        let paths = files.iter().take(Self::LISTED).map(|f| f.to_string_lossy().into_owned());
+        Self { count: files.len() as u64, paths: paths.collect() }
     }
 }
 

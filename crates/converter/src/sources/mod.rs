@@ -50,6 +50,9 @@ impl Sources {
         paths.sort();
         paths.dedup();
         let mut warnings = Vec::new();
+        if !plan.other_files.is_empty() {
+            warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
+        }
         let mut scans: Vec<Box<dyn Scan>> = Vec::new();
         let mut points_missing = 0u64;
         for path in &paths {

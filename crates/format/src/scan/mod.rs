@@ -4,9 +4,11 @@ mod archive;
 mod batches;
 #[cfg(any(feature = "e57", feature = "las"))]
 mod catch_panic;
+mod decimal;
 mod decode;
 mod info;
 mod open;
+mod other_kind;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 mod unit;
@@ -29,9 +31,11 @@ pub mod ply;
 pub mod text;
 
 pub use batches::Batches;
+pub use decimal::Decimal;
 pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
+pub use other_kind::OtherKind;
 pub use unit::Unit;
 pub use wanted::{UnknownAttribute, Wanted};
 pub use warning::{Counted, ScanWarning};

@@ -7,7 +7,8 @@ use std::path::Path;
 use std::str::FromStr;
 
 use super::archive::archive;
-use crate::{Advice, Fault, ReadError, Scan, UnknownName};
+use super::other_kind::OtherKind;
+use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
 
 /// Maximum bytes from the start of a file to detect its kind; text needs some lines.
 const SNIFF_BYTES: u64 = 4 << 10;
@@ -48,6 +49,8 @@ pub struct OpenOptions {
     pub columns: Option<Vec<String>>,
     /// Text: what stands between two fields; `None`: found. A blank means any blanks.
     pub separator: Option<char>,
+    /// Text: what stands before the decimals of a number.
+    pub decimal: Decimal,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
 }
@@ -64,6 +67,13 @@ impl OpenOptions {
     #[must_use]
     pub fn separator(mut self, separator: char) -> Self {
         self.separator = Some(separator);
+        self
+    }
+
+    /// Sets [`Self::decimal`].
+    #[must_use]
+    pub fn decimal(mut self, decimal: Decimal) -> Self {
+        self.decimal = decimal;
         self
     }
 
@@ -118,7 +128,7 @@ impl ScanKind {
         }
         // last: a binary file may hold lines of numbers, too
         #[cfg(feature = "text")]
-        if let Some(kind) = crate::scan::text::kind(first_bytes) {
+        if let Some(kind) = crate::scan::text::kind(first_bytes).filter(|_| OtherKind::of(first_bytes).is_none()) {
             return Some(Self::Text(kind));
         }
         None
@@ -197,9 +207,11 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
-        // Columns were named for it: then it is text, if it can be.
+        // Columns were named for it, by the user or in it: then it is text, if it can be.
         #[cfg(feature = "text")]
-        None if options.columns.is_some() && !first.is_empty() && !first.contains(&0) => {
+        None if (options.columns.is_some() && !first.is_empty() && !first.contains(&0))
+            || crate::scan::text::has_titles(&first) =>
+        {
             ScanKind::Text(crate::scan::text::TextKind::Xyz)
         }
         None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {
@@ -221,9 +233,8 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
         ScanKind::Pcd => crate::scan::pcd::open(path),
         #[cfg(feature = "text")]
         ScanKind::Text(_) => {
-            let options =
-                crate::scan::text::TextOptions { columns: options.columns.clone(), separator: options.separator };
-            crate::scan::text::open(path, &options)
+            let OpenOptions { columns, separator, decimal, .. } = options.clone();
+            crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })
         }
     }
 }
@@ -246,6 +257,12 @@ fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let supported = Advice::Supported(supported_scans());
     if let Some(what) = archive(first) {
         return ReadError::unsupported(path, Fault::Archive { what }).advise(Advice::Unpack);
+    }
+    if let Some(other) = OtherKind::of(first) {
+        return ReadError::unsupported(path, Fault::OtherKind(other.to_string())).advise(supported);
+    }
+    if cfg!(feature = "text") && (first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff])) {
+        return ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8");
     }
     match ending.filter(|e| is_ending_of_scans(e)) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),

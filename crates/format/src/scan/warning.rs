@@ -83,6 +83,18 @@ pub enum ScanWarning {
     NoZ,
     /// Text: a column without numbers.
     ColumnIgnored { number: usize, name: String },
+    /// Text: the first column numbers or names the rows.
+    RowNumbersIgnored,
+    /// Text: the first line is numbers, but titles of the columns and no point.
+    TitlesOfNumbers { line: String },
+    /// Text: a column has the title of one that is a coordinate.
+    TitleTwice { number: usize, name: String },
+    /// Text: the values of a column are not what its name or its place says: it is an attribute of its own.
+    ColumnUnusual { number: usize, name: String },
+    /// Text: commas are decimal marks; one of the numbers.
+    DecimalComma { example: String },
+    /// Text: blanks and commas both separate columns.
+    SeparatorsMixed,
     /// E57: what one or more scans of the file share; numbers of the scans, from 0.
     InScans { scans: Vec<usize>, warning: Box<ScanWarning> },
     /// E57: more warnings of scans than are kept.
@@ -165,6 +177,18 @@ impl ScanWarning {
             Self::ColumnIgnored { number, name } => {
                 format!("column {number} ({name}) holds no numbers; it is omitted")
             }
+            Self::RowNumbersIgnored => {
+                "column 1 numbers or names the rows; it is omitted, unless all columns are named".to_owned()
+            }
+            Self::TitlesOfNumbers { line } => format!("the first line ({line}) has titles of columns, no point"),
+            Self::TitleTwice { number, name } => {
+                format!("column {number} ({name}) is called like a coordinate; it is an attribute")
+            }
+            Self::ColumnUnusual { number, name } => {
+                format!("column {number} ({name}) holds values that are none of that kind; it is an attribute")
+            }
+            Self::DecimalComma { example } => format!("commas are decimal marks, as in {example}"),
+            Self::SeparatorsMixed => "blanks and commas both separate columns".to_owned(),
             Self::ViewpointIgnored { viewpoint } => format!("the sensor's viewpoint ({viewpoint}) is not applied"),
             Self::GridSize { width, height, points, taken } => {
                 format!("WIDTH {width} times HEIGHT {height} is not POINTS {points}; {taken} are taken")
