@@ -67,8 +67,9 @@ pub use geometry::{Aabb, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Batches, Counted, Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart,
-    ScanWarning, Scratch, Sink, UnknownAttribute, Wanted, open_scan, supported_scans,
+    Batches, Blob, Counted, Crs, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_POINTS, OpenOptions,
+    Piece, Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanPart, ScanWarning, Scratch, Sink, UnknownAttribute,
+    Wanted, open_scan, scans_named, supported_scans,
 };
 pub use write_error::WriteError;
 

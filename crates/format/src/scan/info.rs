@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::image::ScanImage;
 use crate::{Aabb, Attribute, Lattice, ScanWarning};
 
 /// The coordinate reference system as the file declares it; nothing is derived.
@@ -42,8 +43,10 @@ pub struct ScanInfo {
     pub lattice: Option<Lattice>,
     /// How finely the file stores world coordinates; meaningless for scans that have a lattice.
     pub resolution: Resolution,
-    /// The scans within the file, where its format knows such (E57, PTX); else empty.
+    /// The scans within the file that are read, where its format knows such (E57, PTX); else empty.
     pub parts: Vec<ScanPart>,
+    /// The images within the file (E57).
+    pub images: Vec<ScanImage>,
     /// The columns beside the position, in order.
     pub attributes: Arc<[Attribute]>,
     /// The coordinate reference system.
@@ -66,6 +69,7 @@ impl ScanInfo {
             lattice: None,
             resolution: Resolution::default(),
             parts: Vec::new(),
+            images: Vec::new(),
             attributes: [].into(),
             crs: Crs::default(),
             file_bytes: 0,

@@ -1,9 +1,11 @@
 //! Scans: files of points, of any kind, opened by content and decoded in pieces.
 
 mod batches;
-#[cfg(any(feature = "e57", feature = "las"))]
+#[cfg(feature = "las")]
 mod catch_panic;
+mod chosen;
 mod decode;
+mod image;
 mod info;
 mod open;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
@@ -27,7 +29,9 @@ pub mod ply;
 pub mod text;
 
 pub use batches::Batches;
+pub use chosen::scans_named;
 pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
+pub use image::{Blob, ImageEncoding, ImageGeometry, ImageKind, ImagePose, ScanImage};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
 pub use wanted::{UnknownAttribute, Wanted};

@@ -4,6 +4,7 @@
 mod common;
 mod corpus;
 mod damage;
+mod deviations;
 mod golden;
 mod mutation;
 mod oracle;

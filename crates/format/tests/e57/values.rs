@@ -55,7 +55,7 @@ fn intensity_is_scaled_by_the_limits_or_what_stands_for_them() {
         }
     }
     let sampled = "no limits are declared for its intensity; 0 to 255 are taken, by a sample of the values";
-    assert!(cloud.warned(&format!("scans 3, 6, 7: {sampled}")), "{:?}", cloud.info.warnings);
+    assert!(cloud.warned(&format!("scans 4, 7, 8: {sampled}")), "{:?}", cloud.info.warnings);
     assert_eq!(cloud.info.warnings.len(), 4, "{:?}", cloud.info.warnings);
 }
 

@@ -23,7 +23,7 @@ pub(super) fn piece(
     };
     let plan = &scan.scans[cut.scan];
     if let Some(fault) = &cut.lost {
-        let what = format!("{}; {} points of scan {} are lost", fault.what, cut.records, plan.index);
+        let what = format!("{}; {} points of scan {} are lost", fault.what, cut.records, plan.index + 1);
         return Err(ReadError::broken(scan.source.path(), fault.byte, what).advise(fault.advice.clone()));
     }
     let is_wanted = |column: usize| wanted.is_wanted(column);

@@ -7,9 +7,8 @@
 //! 3. the usual range ([0, 1], [0, 255] or [0, 65535]) that holds a sample of the values, else what the sample spans;
 //!    then with a warning.
 
-use ::e57::{ColorLimits, IntensityLimits, RecordValue};
-
 use super::fields::{Encoding, Field};
+use super::xml::Limit;
 
 /// `value ↦ (value − low) · factor`, rounded and kept within 0 and 65,535; NaN becomes 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,31 +30,21 @@ impl Scaling {
     }
 }
 
-/// The declared range of intensity.
-pub(super) fn intensity(limits: Option<&IntensityLimits>, field: &Field) -> Option<(f64, f64)> {
-    let limits = limits?;
-    range(limits.intensity_min.as_ref(), limits.intensity_max.as_ref(), field)
-}
-
 /// The declared ranges of red, green and blue.
-pub(super) fn colours(limits: Option<&ColorLimits>, fields: [&Field; 3]) -> Option<[(f64, f64); 3]> {
-    let limits = limits?;
-    let red = range(limits.red_min.as_ref(), limits.red_max.as_ref(), fields[0])?;
-    let green = range(limits.green_min.as_ref(), limits.green_max.as_ref(), fields[1])?;
-    Some([red, green, range(limits.blue_min.as_ref(), limits.blue_max.as_ref(), fields[2])?])
+pub(super) fn colours(limits: Option<[[Limit; 2]; 3]>, fields: [&Field; 3]) -> Option<[(f64, f64); 3]> {
+    let [red, green, blue] = limits?;
+    Some([declared(red, fields[0])?, declared(green, fields[1])?, declared(blue, fields[2])?])
 }
 
-/// A range, if the limits make one. A scaled integer limit has the scale of its field.
-fn range(low: Option<&RecordValue>, high: Option<&RecordValue>, field: &Field) -> Option<(f64, f64)> {
-    let meant = |value: &RecordValue| match (value, field.encoding) {
-        (RecordValue::Single(v), _) => f64::from(*v),
-        (RecordValue::Double(v), _) => *v,
-        (RecordValue::ScaledInteger(v), Encoding::Scaled { scale, offset, .. }) => *v as f64 * scale + offset,
-        (RecordValue::ScaledInteger(v) | RecordValue::Integer(v), _) => *v as f64,
+/// A range, if the limits make one.
+pub(super) fn declared(limits: [Limit; 2], field: &Field) -> Option<(f64, f64)> {
+    let meant = |limit: Limit| match (limit, field.encoding) {
+        (Limit::Stored(v), Encoding::Scaled { scale, offset, .. }) => v * scale + offset,
+        (Limit::Stored(v) | Limit::Value(v), _) => v,
     };
-    let range = (meant(low?), meant(high?));
+    let [low, high] = limits.map(meant);
     // writers without limits write 0 and 0, or the ends of their type
-    (range.0 < range.1 && range.0 > -1e30 && range.1 < 1e30).then_some(range)
+    (low < high && low > -1e30 && high < 1e30).then_some((low, high))
 }
 
 /// The union of the ranges, if all fields have one.

@@ -88,6 +88,7 @@ impl LasScan {
             lattice: header.lattice.is_valid().then_some(header.lattice),
             resolution: Default::default(),
             parts: Vec::new(),
+            images: Vec::new(),
             attributes: schema.attributes.clone().into(),
             crs,
             file_bytes: source.len(),

@@ -106,6 +106,7 @@ impl RowScan {
             lattice: None,
             resolution: Resolution::Double,
             parts: Vec::new(),
+            images: Vec::new(),
             attributes: schema.attributes.clone().into(),
             crs: Default::default(),
             file_bytes: source.len(),
