@@ -65,7 +65,7 @@ pub use dataset_kind::{DatasetKind, Located, locate};
 pub use error::{Advice, ErrorKind, Fault, ReadError};
 pub use geometry::{Aabb, Lattice, NodeKey};
 pub use names::UnknownName;
-pub use points::{Attribute, AttributeType, Column, Element, NodePoints, PointBatch, Positions};
+pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Batches, Blob, Counted, Crs, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_POINTS, OpenOptions,
     Piece, Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanPart, ScanWarning, Scratch, Sink, UnknownAttribute,
