@@ -72,6 +72,7 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
         Some(ReadAdvice::SkipUnreadable) => {
             "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
         }
+        Some(ReadAdvice::MoreMemory) => "convert it with a larger --memory".to_owned(),
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
         }

@@ -16,6 +16,7 @@ use pointmill_format::{ErrorKind, OpenOptions, ScanKind, supported_scans};
 use crate::args::InputArgs;
 use crate::exit::Failure;
 use crate::human::quantities::plural;
+use crate::scan_choice;
 
 /// The scans to read, and notes about the search for them.
 #[derive(Debug, Default)]
@@ -48,7 +49,9 @@ impl InputArgs {
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        expand(&typed, &options)
+        let found = expand(&typed, &options)?;
+        scan_choice::check(&found.files, &options)?;
+        Ok(found)
     }
 }
 

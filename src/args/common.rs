@@ -39,6 +39,15 @@ pub(crate) struct ReadingArgs {
     /// Field separator of text scans: one character, or tab, space, comma, semicolon [default: detected]
     #[arg(long, value_name = "CHAR", value_parser = parse_separator, help_heading = "Reading scans")]
     pub(crate) separator: Option<char>,
+    /// Reads only this scan within the files (E57, PTX): its exact name, or its number in the file, from 1; repeat it for
+    /// more scans. Other kinds of files are read whole [default: all scans]
+    #[arg(
+        long = "scan",
+        value_name = "NAME|N",
+        value_parser = clap::builder::NonEmptyStringValueParser::new(),
+        help_heading = "Reading scans"
+    )]
+    pub(crate) scans: Vec<String>,
     /// Keeps rowIndex and columnIndex of E57 scans as attributes
     #[arg(long, help_heading = "Reading scans")]
     pub(crate) row_column: bool,
@@ -53,6 +62,7 @@ impl ReadingArgs {
         }
         let mut options = OpenOptions::default().keep_row_column(self.row_column);
         (options.columns, options.separator) = (self.columns.clone(), self.separator);
+        options.scans = (!self.scans.is_empty()).then(|| self.scans.clone());
         Ok(options)
     }
 }

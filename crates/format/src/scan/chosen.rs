@@ -13,7 +13,8 @@
 /// assert!(scans_named(&names, "5").is_empty());
 /// ```
 pub fn scans_named<N: AsRef<str>>(names: &[N], choice: &str) -> Vec<usize> {
-    let named: Vec<usize> = (0..names.len()).filter(|i| names[*i].as_ref() == choice).collect();
+    let is_named = |i: &usize| !choice.is_empty() && names[*i].as_ref() == choice;
+    let named: Vec<usize> = (0..names.len()).filter(is_named).collect();
     if !named.is_empty() {
         return named;
     }

@@ -49,6 +49,8 @@ pub struct ScanInfo {
     pub images: Vec<ScanImage>,
     /// The columns beside the position, in order.
     pub attributes: Arc<[Attribute]>,
+    /// True if `rgb` has 16 bits because the file says so (E57), however small its values are.
+    pub rgb_is_16_bit: bool,
     /// The coordinate reference system.
     pub crs: Crs,
     /// Bytes of the file.
@@ -71,6 +73,7 @@ impl ScanInfo {
             parts: Vec::new(),
             images: Vec::new(),
             attributes: [].into(),
+            rgb_is_16_bit: false,
             crs: Crs::default(),
             file_bytes: 0,
             warnings: Vec::new(),

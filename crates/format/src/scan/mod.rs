@@ -8,6 +8,8 @@ mod decode;
 mod image;
 mod info;
 mod open;
+#[cfg(feature = "text")]
+mod partial;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 mod wanted;

@@ -243,9 +243,11 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
         ScanKind::Pcd => crate::scan::pcd::open(path),
         #[cfg(feature = "text")]
         ScanKind::Text(_) => {
+            let choices = options.scans.as_deref();
             let options =
                 crate::scan::text::TextOptions { columns: options.columns.clone(), separator: options.separator };
-            crate::scan::text::open(path, &options)
+            let scan = crate::scan::text::open(path, &options)?;
+            Ok(super::partial::choose(scan, choices))
         }
     }
 }

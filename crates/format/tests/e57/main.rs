@@ -6,6 +6,7 @@ mod corpus;
 mod damage;
 mod deviations;
 mod golden;
+mod images;
 mod mutation;
 mod oracle;
 mod values;

@@ -9,7 +9,8 @@
 //!   has NaN coordinates, so that counts stay exact. A missing z (or elevation) is 0, with a warning.
 //! * `rgb` and `intensity` are scaled to 16 bits: by the declared limits of the scan, else by the range of the field in
 //!   the prototype, else (floats without any) by the usual range that holds a sample of the values, with a warning.
-//!   Colours and intensities that are marked as invalid are 0.
+//!   Values outside of that range take its nearest end, NaN and infinity 0; both are counted
+//!   ([`crate::PointBatch::changes`]). Colours and intensities that are marked as invalid are 0 and count as missing.
 //! * `point source id` is the number of the scan in the file, from 0; beyond 65,535 it stays there.
 //! * `NormalX`, `NormalY`, `NormalZ` (of the extension for surface normals) turn with the scan.
 //! * All other fields keep their names, and their integers as they are stored ([`Attribute::scale`] and `offset` give

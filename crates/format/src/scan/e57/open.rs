@@ -79,6 +79,8 @@ pub(super) fn open(path: &Path, options: &E57Options) -> Result<E57Scan, ReadErr
         resolution,
         parts,
         images,
+        // they are scaled to 16 bits from their limits
+        rgb_is_16_bit: true,
         attributes: attributes.into(),
         crs: crs(document.coordinate_metadata.as_deref(), &mut warnings),
         file_bytes: source.len(),

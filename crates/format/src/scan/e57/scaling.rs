@@ -10,11 +10,20 @@
 use super::fields::{Encoding, Field};
 use super::xml::Limit;
 
-/// `value ↦ (value − low) · factor`, rounded and kept within 0 and 65,535; NaN becomes 0.
+/// `value ↦ (value − low) · factor`, rounded (halves up) and kept within 0 and 65,535; NaN and infinity become 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scaling {
     low: f64,
     factor: f64,
+}
+
+/// What became of a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Scaled {
+    /// It is within the range, or so near that it rounds to its end.
+    Within(u16),
+    /// It is not, and takes the nearest end, or 0 if it is not finite.
+    Outside(u16),
 }
 
 impl Scaling {
@@ -24,9 +33,14 @@ impl Scaling {
     }
 
     #[inline(always)]
-    pub(super) fn apply(self, value: f64) -> u16 {
-        // a cast saturates
-        ((value - self.low) * self.factor + 0.5) as u16
+    pub(super) fn apply(self, value: f64) -> Scaled {
+        let scaled = (value - self.low) * self.factor + 0.5;
+        if (0.0..65_536.0).contains(&scaled) {
+            Scaled::Within(scaled as u16)
+        } else {
+            // a cast saturates
+            Scaled::Outside(if value.is_finite() { scaled as u16 } else { 0 })
+        }
     }
 }
 
@@ -70,12 +84,15 @@ mod tests {
 
     #[test]
     fn ends_and_middle_of_a_range() {
+        use Scaled::{Outside, Within};
         let s = Scaling::new((0.0, 255.0));
-        assert_eq!([0.0, 1.0, 128.0, 255.0].map(|v| s.apply(v)), [0, 257, 32_896, 65_535]);
+        assert_eq!([0.0, 1.0, 128.0, 255.0].map(|v| s.apply(v)), [0, 257, 32_896, 65_535].map(Within));
         let s = Scaling::new((-66.0, 66.0));
-        assert_eq!([-66.0, 0.0, 66.0, 67.0, -1e9, f64::NAN].map(|v| s.apply(v)), [0, 32_768, 65_535, 65_535, 0, 0]);
+        assert_eq!([-66.0, 0.0, 66.0, 66.0005].map(|v| s.apply(v)), [0, 32_768, 65_535, 65_535].map(Within));
+        assert_eq!([67.0, -1e9].map(|v| s.apply(v)), [65_535, 0].map(Outside));
+        assert_eq!([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(|v| s.apply(v)), [Outside(0); 3]);
         let s = Scaling::new((0.0, 65_535.0));
-        assert!((0..=u16::MAX).all(|v| s.apply(f64::from(v)) == v));
+        assert!((0..=u16::MAX).all(|v| s.apply(f64::from(v)) == Within(v)));
     }
 
     #[test]

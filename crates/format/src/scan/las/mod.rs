@@ -89,6 +89,7 @@ impl LasScan {
             resolution: Default::default(),
             parts: Vec::new(),
             images: Vec::new(),
+            rgb_is_16_bit: false,
             attributes: schema.attributes.clone().into(),
             crs,
             file_bytes: source.len(),

@@ -107,6 +107,7 @@ impl RowScan {
             resolution: Resolution::Double,
             parts: Vec::new(),
             images: Vec::new(),
+            rgb_is_16_bit: false,
             attributes: schema.attributes.clone().into(),
             crs: Default::default(),
             file_bytes: source.len(),
