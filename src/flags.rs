@@ -1,7 +1,7 @@
 //! Where settings and advice of the libraries get the names of options: nothing below `src/` knows any.
 
 use pointmill_converter::{Advice, ConvertError, DropReason, PlanError, PlanFault, Setting, Warning};
-use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError};
+use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError, ScanWarning};
 
 /// The option that a setting comes from.
 fn option(setting: Setting) -> &'static str {
@@ -93,6 +93,9 @@ fn plan_line(error: &PlanError) -> String {
 
 /// A warning of a conversion, one line.
 pub(crate) fn warning_line(warning: &Warning) -> String {
+    if let Warning::Scan { warning: ScanWarning::Images { .. }, .. } = warning {
+        return format!("{}; pointmill extract writes images", warning.what());
+    }
     with_advice(warning.what(), warning.advice().as_ref())
 }
 

@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use pointmill_format::scan::e57;
-use pointmill_format::{Blob, ImageEncoding, OpenOptions, ReadError, ScanImage, ScanInfo, open_scan};
+use pointmill_format::{Blob, ImageEncoding, OpenOptions, ReadError, ScanImage, ScanInfo, ScanKind, open_scan};
 
 use crate::args::{ExtractArgs, FaultArg};
 use crate::exit::{Failure, print_line};
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<(), Failure> {
     scan_choice::check(&[args.file.clone()], &options)?;
     let scan = open_scan(file, &options)?;
     let info = scan.info();
-    if !info.format.starts_with("E57") && info.parts.is_empty() {
+    if info.parts.is_empty() && ScanKind::of_file(file)? != Some(ScanKind::E57) {
         let line = format!("{}: {}: there are no scans or images within it; E57 has them", file.display(), info.format);
         return Err(Failure::Unsupported(line));
     }
