@@ -61,4 +61,5 @@ pub use report::{
     GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport, Report, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
+pub use sources::{ResolvedCrs, resolve_crs};
 pub use warning::{CrsNote, Proj4Fault, Warning};

@@ -68,8 +68,8 @@ pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Batches, Blob, Counted, Crs, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_POINTS, OpenOptions,
-    Piece, Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanPart, ScanWarning, Scratch, Sink, UnknownAttribute,
-    Wanted, open_scan, scans_named, supported_scans,
+    Piece, Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanPart, ScanWarning, Scratch, Sink, Unit,
+    UnknownAttribute, Wanted, open_scan, scans_named, supported_scans,
 };
 pub use write_error::WriteError;
 
