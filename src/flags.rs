@@ -1,7 +1,7 @@
 //! Where settings and advice of the libraries get the names of options: nothing below `src/` knows any.
 
 use pointmill_converter::{Advice, ConvertError, DropReason, PlanError, PlanFault, Setting, Warning};
-use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError};
+use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError, ScanWarning};
 
 /// The option that a setting comes from.
 fn option(setting: Setting) -> &'static str {
@@ -78,6 +78,7 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
         Some(ReadAdvice::SkipUnreadable) => {
             "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
         }
+        Some(ReadAdvice::MoreMemory) => "convert it with a larger --memory".to_owned(),
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
         }
@@ -101,6 +102,9 @@ fn plan_line(error: &PlanError) -> String {
 
 /// A warning of a conversion, one line.
 pub(crate) fn warning_line(warning: &Warning) -> String {
+    if let Warning::Scan { warning: ScanWarning::Images { .. }, .. } = warning {
+        return format!("{}; pointmill extract writes images", warning.what());
+    }
     with_advice(warning.what(), warning.advice().as_ref())
 }
 

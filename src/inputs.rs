@@ -19,6 +19,7 @@ use crate::exit::Failure;
 use crate::human::quantities::plural;
 use kind::{is_other, kind_by_ending, kind_in_folder};
 
+use crate::scan_choice;
 pub(crate) use kind::{Kind, kind};
 
 /// The scans to read, and notes about the search for them.
@@ -58,7 +59,9 @@ impl InputArgs {
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        expand(&typed, &options)
+        let found = expand(&typed, &options)?;
+        scan_choice::check(&found.files, &options)?;
+        Ok(found)
     }
 }
 

@@ -42,6 +42,15 @@ pub(crate) struct ReadingArgs {
     /// Decimal mark of text scans; auto looks at a sample of the rows, and fails where it cannot tell
     #[arg(long, value_enum, default_value = "auto", value_name = "MARK", help_heading = "Reading scans")]
     pub(crate) decimal: DecimalArg,
+    /// Reads only this scan within the files (E57, PTX): its exact name, or its number in the file, from 1; repeat it for
+    /// more scans. Other kinds of files are read whole [default: all scans]
+    #[arg(
+        long = "scan",
+        value_name = "NAME|N",
+        value_parser = clap::builder::NonEmptyStringValueParser::new(),
+        help_heading = "Reading scans"
+    )]
+    pub(crate) scans: Vec<String>,
     /// Keeps rowIndex and columnIndex of E57 scans as attributes
     #[arg(long, help_heading = "Reading scans")]
     pub(crate) row_column: bool,
@@ -57,6 +66,7 @@ impl ReadingArgs {
         let mut options = OpenOptions::default().keep_row_column(self.row_column);
         (options.columns, options.separator) = (self.columns.clone(), self.separator);
         options.decimal = self.decimal.into();
+        options.scans = (!self.scans.is_empty()).then(|| self.scans.clone());
         Ok(options)
     }
 }

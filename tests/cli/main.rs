@@ -5,6 +5,7 @@ mod bad_input;
 mod bad_output;
 mod batches;
 mod cut_short;
+mod extract;
 mod formats;
 mod hostile;
 mod inputs;
@@ -15,6 +16,7 @@ mod reporting;
 
 mod same_points;
 mod sameness;
+mod scans_within;
 mod several;
 mod support;
 mod text_inputs;

@@ -67,8 +67,9 @@ pub use geometry::{Aabb, AxisGrid, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Batches, Counted, Crs, Decimal, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, Resolution, Scan, ScanInfo,
-    ScanKind, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, supported_scans,
+    Batches, Blob, Counted, Crs, Decimal, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_POINTS,
+    OpenOptions, OtherKind, Piece, Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanPart, ScanWarning, Scratch,
+    Sink, Unit, UnknownAttribute, Wanted, open_scan, scans_named, supported_scans,
 };
 pub use write_error::WriteError;
 

@@ -21,6 +21,9 @@ use crate::plan::{OnFault, Plan};
 use crate::runtime::Events;
 use crate::warning::{Warning, reason_of};
 
+/// The description of one file may take this part of the memory while it is opened.
+const DESCRIPTION_SHARE: u64 = 4;
+
 /// A scan, and where its columns are among all attributes.
 pub(crate) struct Source {
     pub(crate) scan: Box<dyn Scan>,
@@ -55,8 +58,10 @@ impl Sources {
         }
         let mut scans: Vec<Box<dyn Scan>> = Vec::new();
         let mut points_missing = 0u64;
+        let mut options = plan.open.clone();
+        options.description_bytes.get_or_insert(plan.memory_bytes / DESCRIPTION_SHARE);
         for path in &paths {
-            let opened = pointmill_format::open_scan(path, &plan.open);
+            let opened = pointmill_format::open_scan(path, &options);
             match opened.and_then(|scan| Ok((missing_points(&*scan, plan.unreadable)?, scan))) {
                 Ok((missing, scan)) => {
                     let noticed = scan.info().warnings.iter();

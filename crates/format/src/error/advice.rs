@@ -28,6 +28,9 @@ pub enum Advice {
     Supported(String),
     /// Cut short or damaged, or of another kind than those that this build reads.
     CopyOrSupported(String),
+    /// The description of the file is larger than the memory that it may take
+    /// ([`crate::OpenOptions::description_bytes`]).
+    MoreMemory,
     /// A conversion can skip what cannot be read and go on with the rest.
     SkipUnreadable,
     /// Anything else, as text.
@@ -55,6 +58,7 @@ impl fmt::Display for Advice {
             Self::CopyOrSupported(kinds) => {
                 write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")
             }
+            Self::MoreMemory => f.write_str("let it take more memory"),
             Self::SkipUnreadable => f.write_str("copy the file again, or skip what cannot be read"),
             Self::Other(text) => f.write_str(text),
         }

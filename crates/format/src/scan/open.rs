@@ -53,6 +53,12 @@ pub struct OpenOptions {
     pub decimal: Decimal,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
+    /// E57, PTX: the scans within a file that are read, each by name or number ([`crate::scans_named`]); `None`: all.
+    /// Files of other kinds have no scans within them and are read whole.
+    pub scans: Option<Vec<String>>,
+    /// Bytes of memory that the description of a file's scans may take while it is opened (the XML section of E57);
+    /// `None`: 1 GiB.
+    pub description_bytes: Option<u64>,
 }
 
 impl OpenOptions {
@@ -81,6 +87,20 @@ impl OpenOptions {
     #[must_use]
     pub fn keep_row_column(mut self, keep: bool) -> Self {
         self.keep_row_column = keep;
+        self
+    }
+
+    /// Sets [`Self::scans`].
+    #[must_use]
+    pub fn scans<N: Into<String>>(mut self, choices: impl IntoIterator<Item = N>) -> Self {
+        self.scans = Some(choices.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Sets [`Self::description_bytes`].
+    #[must_use]
+    pub fn description_bytes(mut self, bytes: u64) -> Self {
+        self.description_bytes = Some(bytes);
         self
     }
 }
@@ -223,18 +243,23 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
         #[cfg(feature = "las")]
         ScanKind::Las => crate::scan::las::open(path),
         #[cfg(feature = "e57")]
-        ScanKind::E57 => crate::scan::e57::open_with(
-            path,
-            crate::scan::e57::E57Options::default().keep_row_column(options.keep_row_column),
-        ),
+        ScanKind::E57 => {
+            let e57 = crate::scan::e57::E57Options::default()
+                .keep_row_column(options.keep_row_column)
+                .scans(options.scans.clone());
+            let max_xml = options.description_bytes.unwrap_or(e57.max_xml);
+            crate::scan::e57::open_with(path, e57.max_xml(max_xml))
+        }
         #[cfg(feature = "ply")]
         ScanKind::Ply => crate::scan::ply::open(path),
         #[cfg(feature = "pcd")]
         ScanKind::Pcd => crate::scan::pcd::open(path),
         #[cfg(feature = "text")]
         ScanKind::Text(_) => {
+            let choices = options.scans.as_deref();
             let OpenOptions { columns, separator, decimal, .. } = options.clone();
-            crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })
+            let scan = crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })?;
+            Ok(super::partial::choose(scan, choices))
         }
     }
 }

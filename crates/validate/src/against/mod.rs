@@ -49,7 +49,7 @@ const POSITION_RULES: [PositionRule; 4] = [
 /// What one file adds up to, by colour and position rule.
 struct FileSums {
     sums: Mutex<[[Sum; POSITION_RULES.len()]; COLOURS.len()]>,
-    /// A colour value above 255 was seen.
+    /// A colour value above 255 was seen, or the file declares 16 bits.
     wide: AtomicBool,
 }
 
@@ -100,7 +100,10 @@ impl Against {
             .sources
             .list
             .iter()
-            .map(|_| FileSums { sums: Mutex::default(), wide: AtomicBool::new(rules.rgb.is_none()) })
+            .map(|source| {
+                let is_wide = rules.rgb.is_none() || source.declares_16_bit_colour();
+                FileSums { sums: Mutex::default(), wide: AtomicBool::new(is_wide) }
+            })
             .collect();
         self.sources.each_block(rules, context.progress, "sources", |block, at| {
             let file = &files[at];

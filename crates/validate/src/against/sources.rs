@@ -122,6 +122,11 @@ impl Sources {
 }
 
 impl Source {
+    /// True if the file says that its colours have 16 bits.
+    pub(crate) fn declares_16_bit_colour(&self) -> bool {
+        self.scan.info().rgb_is_16_bit
+    }
+
     fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
         let info = scan.info();
         let find = |name: &str| info.attributes.iter().position(|a| a.name == name);

@@ -1,8 +1,6 @@
 //! From the prototypes of all scans to one set of columns, and where each scan finds their values.
 
-use ::e57::{PointCloud, Record, RecordName};
-
-use super::fields::{Encoding, Field};
+use super::fields::{Encoding, Field, Name};
 use super::notes::Notes;
 use super::options::E57Options;
 use super::scaling::Scaling;
@@ -65,10 +63,10 @@ impl Roles {
     pub(super) fn new(
         fields: &[Field],
         scan: usize,
-        options: E57Options,
+        options: &E57Options,
         notes: &mut Notes,
     ) -> Result<Self, &'static str> {
-        use RecordName as N;
+        use Name as N;
         let is_text = |i: usize| fields[i].encoding == Encoding::Text;
         let find = |name: N| fields.iter().position(|f| f.name == name).filter(|i| !is_text(*i));
         let triple = |names: [N; 3]| {
@@ -115,7 +113,7 @@ impl Roles {
                 N::TimeStamp => roles.extras.push((i, find(N::IsTimeStampInvalid))),
                 N::ReturnCount | N::ReturnIndex => roles.extras.push((i, None)),
                 N::RowIndex | N::ColumnIndex if options.keep_row_column => roles.extras.push((i, None)),
-                N::Unknown { .. } if roles.normal.is_none_or(|n| !n.contains(&i)) => roles.extras.push((i, None)),
+                N::Other { .. } if roles.normal.is_none_or(|n| !n.contains(&i)) => roles.extras.push((i, None)),
                 N::ColorRed | N::ColorGreen | N::ColorBlue if roles.colour.is_none() => {
                     notes.add(scan, ScanWarning::ColourIncomplete);
                 }
@@ -168,11 +166,6 @@ impl PositionFields {
         let triples = self.cartesian.into_iter().chain(self.spherical).flatten().flatten();
         triples.chain(self.cartesian_invalid).chain(self.spherical_invalid).for_each(|field| needed[field] = true);
     }
-}
-
-/// The fields of a cloud.
-pub(super) fn fields(cloud: &PointCloud) -> Vec<Field> {
-    cloud.prototype.iter().map(|record: &Record| Field::new(record)).collect()
 }
 
 /// One scan as the schema sees it: its index, fields, their roles, the scaling of colour and intensity.
@@ -284,7 +277,7 @@ impl Schema {
     }
 
     fn extras(&mut self, scans: &[ScanFields<'_>]) -> Result<(), String> {
-        let mut columns: Vec<(&RecordName, &str, Kind)> = Vec::new();
+        let mut columns: Vec<(&Name, &str, Kind)> = Vec::new();
         for scan in scans {
             for (i, _) in &scan.roles.extras {
                 let field = &scan.fields[*i];
