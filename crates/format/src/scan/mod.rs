@@ -5,6 +5,7 @@ mod batches;
 mod catch_panic;
 mod decode;
 mod info;
+mod mapped;
 mod open;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
@@ -29,6 +30,7 @@ pub mod text;
 pub use batches::Batches;
 pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
+pub use mapped::{PointMap, ScanMap, ScanMaps};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
 pub use wanted::{UnknownAttribute, Wanted};
 pub use warning::{Counted, ScanWarning};

@@ -5,7 +5,9 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::Arc;
 
+use super::mapped::{ScanMaps, mapped};
 use crate::{Advice, Fault, ReadError, Scan, UnknownName};
 
 /// Maximum bytes from the start of a file to detect its kind; text needs some lines.
@@ -32,7 +34,7 @@ pub enum ScanKind {
     Text(crate::scan::text::TextKind),
 }
 
-/// What a file does not say of itself, for the kinds that need it.
+/// What a file does not say of itself, for the kinds that need it, and what becomes of its points.
 ///
 /// ```
 /// use pointmill_format::OpenOptions;
@@ -40,7 +42,7 @@ pub enum ScanKind {
 /// let options = OpenOptions::default().columns(["x", "y", "z", "-", "i"]).separator(';');
 /// assert_eq!(options.separator, Some(';'));
 /// ```
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct OpenOptions {
     /// Text: the names of all columns in file order (`text::TextOptions::columns`); `None`: found.
@@ -49,6 +51,8 @@ pub struct OpenOptions {
     pub separator: Option<char>,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
+    /// What becomes of the points; `None`: they stay where they are.
+    pub maps: Option<Arc<dyn ScanMaps>>,
 }
 
 impl OpenOptions {
@@ -70,6 +74,13 @@ impl OpenOptions {
     #[must_use]
     pub fn keep_row_column(mut self, keep: bool) -> Self {
         self.keep_row_column = keep;
+        self
+    }
+
+    /// Sets [`Self::maps`].
+    #[must_use]
+    pub fn maps(mut self, maps: impl ScanMaps + 'static) -> Self {
+        self.maps = Some(Arc::new(maps));
         self
     }
 }
@@ -189,10 +200,18 @@ pub fn supported_scans() -> String {
 /// Opens a scan of any kind that this build reads; the kind is detected from the content, the extension is ignored.
 ///
 /// # Errors
-/// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
-#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+/// A file that is empty, or of no kind that is read here, those of the reader of its kind, and of
+/// [`OpenOptions::maps`].
 pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
-    let path = path.as_ref();
+    let scan = open_as_it_is(path.as_ref(), options)?;
+    match &options.maps {
+        Some(maps) => mapped(scan, &**maps),
+        None => Ok(scan),
+    }
+}
+
+#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,

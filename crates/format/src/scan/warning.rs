@@ -69,6 +69,8 @@ pub enum ScanWarning {
     PlyVersion { version: String },
     /// No z: it is 0 for every point.
     NoZ,
+    /// A reprojection moved the points, but turned neither normals nor the poses of scans.
+    DirectionsProjected,
     /// Text: a column without numbers.
     ColumnIgnored { number: usize, name: String },
     /// E57: what one or more scans of the file share; numbers of the scans, from 0.
@@ -150,6 +152,10 @@ impl ScanWarning {
             }
             Self::Bounds => "the header's bounds are inverted or not finite; they are not used".to_owned(),
             Self::NoZ => "there is no z; it is 0 for every point".to_owned(),
+            Self::DirectionsProjected => {
+                "normals and poses are not turned by the reprojection; they keep the directions of the scan's own axes"
+                    .to_owned()
+            }
             Self::ColumnIgnored { number, name } => {
                 format!("column {number} ({name}) holds no numbers; it is omitted")
             }
