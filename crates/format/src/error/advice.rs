@@ -24,6 +24,10 @@ pub enum Advice {
     Supported(String),
     /// Cut short or damaged, or of another kind than those that this build reads.
     CopyOrSupported(String),
+    /// The coordinate reference system of the scan can be named, in place of what the file declares.
+    NameCrs,
+    /// Choose another coordinate reference system to reproject to, on the same datum, or reproject with other means.
+    OtherCrs,
     /// A conversion can skip what cannot be read and go on with the rest.
     SkipUnreadable,
     /// Anything else, as text.
@@ -48,6 +52,10 @@ impl fmt::Display for Advice {
             Self::Supported(kinds) => write!(f, "supported are {kinds}"),
             Self::CopyOrSupported(kinds) => {
                 write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")
+            }
+            Self::NameCrs => f.write_str("name its coordinate reference system"),
+            Self::OtherCrs => {
+                f.write_str("reproject to a system on the same datum and with the same heights, or reproject it elsewhere")
             }
             Self::SkipUnreadable => f.write_str("copy the file again, or skip what cannot be read"),
             Self::Other(text) => f.write_str(text),

@@ -177,6 +177,16 @@ impl Affine {
     }
 }
 
+impl fmt::Display for Affine {
+    /// The 16 numbers that [`Self::from_matrix`] takes, separated by blanks.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for ([a, b, c], t) in self.linear.iter().zip(self.translation) {
+            write!(f, "{a} {b} {c} {t} ")?;
+        }
+        f.write_str("0 0 0 1")
+    }
+}
+
 fn length(v: [f64; 3]) -> f64 {
     v[0].hypot(v[1]).hypot(v[2])
 }

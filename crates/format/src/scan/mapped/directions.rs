@@ -1,6 +1,6 @@
 //! Normals turn with the points.
 
-use super::ScanMap;
+use super::map::ScanMap;
 use crate::{Affine, Attribute, Column, PointBatch, ScanInfo, Wanted, with_column};
 
 /// Names of normals, in lower case and without anything but letters and digits, but for the axis at their end.

@@ -2,8 +2,8 @@
 
 use super::directions::has_normals;
 use super::positions::{PositionMap, move_all};
-use super::{PointMap, ScanMap};
-use crate::{Aabb, Affine, Resolution, ScanInfo, ScanPart, ScanWarning};
+use super::map::{PointMap, ScanMap};
+use crate::{Aabb, Affine, Resolution, Scan, ScanInfo, ScanPart, ScanWarning};
 
 /// Points per side of the grid whose images stand for those of a box: x, y, z.
 const GRID: [usize; 3] = [13, 13, 3];
@@ -12,14 +12,15 @@ const GRID: [usize; 3] = [13, 13, 3];
 const DIFFERENCE: f64 = 1e-6;
 
 /// The description of the mapped scan.
-pub(super) fn mapped(own: &ScanInfo, map: &ScanMap, positions: &PositionMap) -> ScanInfo {
+pub(super) fn mapped(inner: &dyn Scan, map: &ScanMap, positions: &PositionMap) -> ScanInfo {
+    let own = inner.info();
     let mut info = own.clone();
     info.lattice = match positions {
         PositionMap::Lattice { lattice, .. } => Some(*lattice),
         PositionMap::World { .. } => None,
     };
     info.bounds_declared = own.bounds_declared.and_then(|bounds| image(map, &bounds));
-    info.resolution = resolution(own, map);
+    info.resolution = resolution(inner, map);
     info.parts.iter_mut().for_each(|part| move_part(map, part));
     info.warnings.extend(map.warnings.iter().cloned());
     if map.projection.is_some() && (!own.parts.is_empty() || has_normals(own)) {
@@ -58,19 +59,19 @@ fn project(affine: &Affine, projection: &dyn PointMap, points: &mut [Vec<f64>; 3
 }
 
 /// How finely the mapped coordinates are stored: each step of the file, seen along the axes of the image.
-fn resolution(own: &ScanInfo, map: &ScanMap) -> Resolution {
+fn resolution(inner: &dyn Scan, map: &ScanMap) -> Resolution {
+    let own = inner.info();
     let is_unchanged = map.projection.is_none() && is_permutation(&map.affine);
     if own.lattice.is_none() && (is_unchanged || own.resolution == Resolution::Double) {
         return own.resolution;
     }
-    let steps = match (own.lattice, own.resolution, &own.bounds_declared) {
-        (Some(lattice), ..) => lattice.scale,
-        (None, Resolution::Step(step), _) => [step; 3],
-        (None, Resolution::Single, Some(bounds)) => single_steps(bounds),
-        _ => return Resolution::Double,
+    let Some(bounds) = inner.bounds_hint() else { return Resolution::Double };
+    let steps = match (own.lattice, own.resolution) {
+        (Some(lattice), _) => lattice.scale,
+        (None, Resolution::Step(step)) => [step; 3],
+        (None, _) => single_steps(&bounds),
     };
-    let place = own.bounds_declared.map_or([0.0; 3], |bounds| bounds.center());
-    let Some(derivatives) = derivatives(map, place) else { return Resolution::Double };
+    let Some(derivatives) = derivatives(map, bounds.center()) else { return Resolution::Double };
     let along = |row: [f64; 3]| row.iter().zip(steps).fold(0.0f64, |sum, (d, step)| sum.hypot(d * step));
     let least = derivatives.map(along).into_iter().filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
     if least.is_finite() { Resolution::Step(least) } else { Resolution::Double }
@@ -111,6 +112,7 @@ fn derivatives(map: &ScanMap, place: [f64; 3]) -> Option<[[f64; 3]; 3]> {
 fn move_part(map: &ScanMap, part: &mut ScanPart) {
     let columns = [0, 1, 2].map(|j| map.affine.turn(part.rotation.map(|row| row[j])));
     part.rotation = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
+    part.bounds = part.bounds.and_then(|bounds| image(map, &bounds));
     let mut place = part.translation.map(|v| vec![v]);
     move_all(&map.affine, &mut place);
     if let Some(projection) = &map.projection {

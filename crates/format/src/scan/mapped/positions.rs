@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{PointMap, ScanMap};
+use super::map::{PointMap, ScanMap};
 use crate::{Affine, Lattice, Positions, ScanInfo};
 
 /// How the positions of a scan are mapped.
