@@ -37,7 +37,9 @@ fn advice(advice: &Advice) -> String {
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
         Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),
-        Advice::Reproject => "bring the inputs to one system with --reproject, or name the system of all with --crs".to_owned(),
+        Advice::Reproject => {
+            "bring the inputs to one system with --reproject, or name the system of all with --crs".to_owned()
+        }
         Advice::NameAttributes => "name the attributes to keep with --attributes".to_owned(),
         Advice::PackLeaves => "--layout packed puts them into one".to_owned(),
         other => other.to_string(),

@@ -64,12 +64,16 @@ pub(crate) enum AxesArg {
 impl PlacingArgs {
     /// What to do with the points of every scan; `None`: nothing.
     pub(super) fn placing(&self) -> Result<Option<Placing>, Failure> {
-        let mut placing = Placing {
-            units: self.units.map(UnitsArg::units),
-            y_up: self.axes.is_some(),
-            transform: self.transform.as_deref().map(matrix).transpose()?,
-            ..Placing::default()
-        };
+        let mut placing = Placing::default();
+        if let Some(units) = self.units {
+            placing = placing.with_units(units.units());
+        }
+        if self.axes.is_some() {
+            placing = placing.with_y_up();
+        }
+        if let Some(transform) = &self.transform {
+            placing = placing.with_transform(matrix(transform)?);
+        }
         if let Some(target) = &self.reproject {
             placing = placing.with_target(target).map_err(|e| refused("--reproject", &e))?;
         }

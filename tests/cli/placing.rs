@@ -241,7 +241,10 @@ fn units_are_scaled_to_metres_or_to_those_of_the_system() {
         &[[500_000.105, 5_399_999.97, 100.2], [500_000.11, 5_399_999.9575, 99.79], [500_000.12, 5_399_999.95, 100.22]],
     );
     let options = &dir.report("cm")["options"];
-    assert_eq!((&options["units"], &options["axes"], &options["transform"]), (&"cm".into(), &"y-up".into(), &shift.into()));
+    assert_eq!(
+        (&options["units"], &options["axes"], &options["transform"]),
+        (&"cm".into(), &"y-up".into(), &shift.into())
+    );
     dir.succeed(["validate", "cm", "-q", "--against", "a.xyz"].iter().chain(&args));
     // EPSG:2994 is in feet: the numbers stay
     dir.succeed(["convert", "a.xyz", "-o", "kept", "-q", "--units", "ft", "--crs", "EPSG:2994"]);

@@ -71,7 +71,11 @@ mod tests {
         assert_eq!(between("EPSG:25832+5783", "EPSG:25833+5783", Some(1.0)), Ok(kept));
         assert_eq!(between("EPSG:2227", "EPSG:26910", Some(0.3048)).unwrap().factor, 0.3048);
         let unknown = between("EPSG:2227", "EPSG:26910", None).unwrap();
-        assert!(unknown.factor == 1.0 && matches!(&unknown.warning, Some(ScanWarning::HeightsWithoutUnit { beside }) if beside == "metres"), "{unknown:?}");
+        assert!(
+            unknown.factor == 1.0
+                && matches!(&unknown.warning, Some(ScanWarning::HeightsWithoutUnit { beside }) if beside == "metres"),
+            "{unknown:?}"
+        );
     }
 
     #[test]

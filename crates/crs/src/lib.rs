@@ -10,7 +10,7 @@
 //!
 //! # let file = std::env::temp_dir().join(format!("pointmill-placing-{}.xyz", std::process::id()));
 //! # std::fs::write(&file, "500000000 5400000000 1000\n600000000 5400000000 1000\n")?;
-//! let placing = Placing { units: Some(Units::Millimetre), ..Placing::default() };
+//! let placing = Placing::default().with_units(Units::Millimetre);
 //! let placing = placing.with_crs("EPSG:25832")?.with_target("EPSG:4258")?;
 //! let scan = open_scan(&file, &OpenOptions::default().maps(placing))?;
 //! let bounds = scan.bounds_hint().ok_or("no points")?;

@@ -25,6 +25,9 @@ pub(crate) struct Way {
 /// # Errors
 /// Why there is none that is exact, one line: other datums and no published parameters, or a grid is needed.
 pub(crate) fn way(from: &System, to: &System, area: Option<&Aabb>) -> Result<Way, String> {
+    if let Some(other) = [from, to].into_iter().find(|system| system.has_other_meridian()) {
+        return Err(format!("{} has a prime meridian other than Greenwich", other.name()));
+    }
     // bounds may be wrong, and where the datum stays they do not matter
     let anywhere = build(from, to, SelectionOptions::default());
     let options = options(from, area);
@@ -47,7 +50,12 @@ fn options(from: &System, area: Option<&Aabb>) -> SelectionOptions {
     let options = SelectionOptions::default();
     let Some(b) = area.filter(|_| !from.is_geocentric()) else { return options };
     let (x, y) = if from.is_north_first() { (1, 0) } else { (0, 1) };
-    let bounds = Bounds::new(b.min[x], b.min[y], b.max[x], b.max[y]);
+    // what lies beyond the poles is no place: it must not keep the others from theirs
+    let least = if from.unit().is_none() { [-180.0, -90.0] } else { [f64::NEG_INFINITY; 2] };
+    let inside = |v: f64, axis: usize| v.max(least[axis]).min(-least[axis]);
+    let corner = |c: [f64; 3]| [inside(c[0], 0), inside(c[1], 1)];
+    let (min, max) = (corner(b.min), corner(b.max));
+    let bounds = Bounds::new(min[x], min[y], max[x], max[y]);
     options.with_area_of_interest(AreaOfInterest::source_crs_bounds(bounds))
 }
 
@@ -79,7 +87,7 @@ fn unknown_change(from: &System, to: &System) -> String {
 fn published<'a>(transform: &'a Transform, from: &System, to: &System) -> Option<&'a CoordinateOperationMetadata> {
     let skipped = transform.selection_diagnostics().skipped_operations.iter();
     let in_question = skipped.filter(|s| s.reason == SkippedOperationReason::LessPreferred).map(|s| &s.metadata);
-    let exact = in_question.filter(|m| !m.uses_grids && !m.approximate && is_between(m, from, to));
+    let exact = in_question.filter(|m| !m.uses_grids && !m.deprecated && is_between(m, from, to));
     let accuracy = |m: &CoordinateOperationMetadata| m.accuracy.map_or(f64::INFINITY, |a| a.meters);
     exact.filter(|m| m.accuracy.is_some()).min_by(|a, b| accuracy(a).total_cmp(&accuracy(b)))
 }
@@ -108,8 +116,10 @@ fn check(transform: &Transform, from: &System, to: &System) -> Result<Option<Str
     if operation.uses_grids {
         return Err(format!("the change of datum from {} to {} needs a grid", from.name(), to.name()));
     }
+    // withdrawn operations still rank by their accuracy: one of them leads from NAD83(HARN) to WGS 84, and is wrong
+    let is_sound = !operation.deprecated && !operation.approximate && !diagnostics.approximate;
     match operation.accuracy {
-        Some(accuracy) if !operation.approximate && !diagnostics.approximate && is_between(operation, from, to) => {
+        Some(accuracy) if is_sound && is_between(operation, from, to) => {
             Ok(Some(format!("{}, right within {} m", operation.name, accuracy.meters)))
         }
         _ => Err(unknown_change(from, to)),

@@ -12,13 +12,9 @@ use crate::units::{Units, is_same, name, ratio};
 /// What becomes of the points of scans: units, then axes, then a matrix, then a projection.
 #[derive(Debug, Clone, Default)]
 pub struct Placing {
-    /// The coordinates are in this unit. They become metres, or the unit of the coordinate reference system where that
-    /// has another; z the unit of its heights.
-    pub units: Option<Units>,
-    /// y is up: (x, y, z) becomes (x, −z, y).
-    pub y_up: bool,
-    /// A map of points, in the units and axes that come before.
-    pub transform: Option<Affine>,
+    units: Option<Units>,
+    y_up: bool,
+    transform: Option<Affine>,
     /// The system of all scans, whatever these declare.
     crs: Option<System>,
     /// The system to reproject to.
@@ -26,6 +22,25 @@ pub struct Placing {
 }
 
 impl Placing {
+    /// The coordinates are in this unit. They become metres, or the unit of the coordinate reference system where that
+    /// has another; z the unit of its heights.
+    #[must_use]
+    pub fn with_units(self, units: Units) -> Self {
+        Self { units: Some(units), ..self }
+    }
+
+    /// y is up: (x, y, z) becomes (x, −z, y).
+    #[must_use]
+    pub fn with_y_up(self) -> Self {
+        Self { y_up: true, ..self }
+    }
+
+    /// A map of points, in the units and axes that come before.
+    #[must_use]
+    pub fn with_transform(self, transform: Affine) -> Self {
+        Self { transform: Some(transform), ..self }
+    }
+
     /// The system of all scans, whatever these declare: `EPSG:n`, a `+proj=…` definition or WKT.
     ///
     /// # Errors
@@ -54,7 +69,8 @@ impl Placing {
             return Ok(self.crs.clone());
         }
         let info = scan.info();
-        System::of_scan(&info.crs).map_err(|e| ReadError::unsupported(&info.path, e.to_string()).advise(Advice::NameCrs))
+        System::of_scan(&info.crs)
+            .map_err(|e| ReadError::unsupported(&info.path, e.to_string()).advise(Advice::NameCrs))
     }
 
     /// Factors from the unit of the scan to those of its system, along its axes.

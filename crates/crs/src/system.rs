@@ -9,6 +9,9 @@ use proj_wkt::parse_crs;
 /// Longest text of a definition that is quoted in a message, characters.
 const MAX_QUOTED: usize = 60;
 
+/// EPSG codes of all geographic systems whose prime meridian is not Greenwich.
+const OTHER_MERIDIANS: [std::ops::RangeInclusive<u32>; 4] = [4801..=4821, 4901..=4904, 5229..=5229, 8042..=8043];
+
 /// Why a text is no coordinate reference system that can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -144,6 +147,13 @@ impl System {
         self.def.axis_order() == Some(AxisOrder::NorthEast)
     }
 
+    /// Its longitudes do not count from Greenwich; some such systems have grads, too. The library takes them as if they
+    /// did (measured: 2.3° off for EPSG:4807), so that these are refused.
+    pub(crate) fn has_other_meridian(&self) -> bool {
+        let is_one = |code: u32| OTHER_MERIDIANS.iter().any(|codes| codes.contains(&code));
+        self.def.base_geographic_crs_epsg().is_some_and(is_one)
+    }
+
     /// EPSG code of the datum, 0 if it has none.
     pub(crate) fn datum(&self) -> u32 {
         self.def.datum().epsg()
@@ -158,7 +168,9 @@ fn is_definition(text: &str) -> bool {
     let prefix = text.get(..5).is_some_and(|p| p.eq_ignore_ascii_case("EPSG:"));
     let is_wkt = || {
         let keyword = text.split(['[', '(']).next().unwrap_or_default().trim();
-        text.contains(['[', '(']) && !keyword.is_empty() && keyword.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        text.contains(['[', '('])
+            && !keyword.is_empty()
+            && keyword.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
     };
     let is_proj4 = || text.starts_with('+') && (text.contains("+proj=") || text.contains("+init="));
     let number = |code: &str| code.parse::<u32>().is_ok();
@@ -204,14 +216,15 @@ mod tests {
         for text in ["", "25832", "EPSG:x", "UTM 32", "proj=utm", "a\nb"] {
             assert!(matches!(System::parse(text), Err(CrsError::NotACrs(_))), "{text}");
         }
-        for text in ["EPSG:999999", "LOCAL_CS[\"site\"]", "+proj=nonsense", "EPSG:27572+5720"] {
+        for text in ["EPSG:999999", "LOCAL_CS[\"site\"]", "+proj=nonsense", "EPSG:25832+25833"] {
             assert!(matches!(System::parse(text), Err(CrsError::Unsupported { .. })), "{text}");
         }
     }
 
     #[test]
     fn the_code_of_a_wkt_stands_at_its_end() {
-        let wkt = "PROJCRS[\"x\",BASEGEOGCRS[\"y\",ID[\"EPSG\",4258]],CONVERSION[\"z\",METHOD[\"w\"]],ID[\"EPSG\",2154] ]";
+        let wkt =
+            "PROJCRS[\"x\",BASEGEOGCRS[\"y\",ID[\"EPSG\",4258]],CONVERSION[\"z\",METHOD[\"w\"]],ID[\"EPSG\",2154] ]";
         assert_eq!(code_at_the_end(wkt).as_deref(), Some("EPSG:2154"));
         assert_eq!(code_at_the_end("PROJCS[\"x\",GEOGCS[\"y\",AUTHORITY[\"EPSG\",\"4258\"]],UNIT[\"m\",1]]"), None);
     }

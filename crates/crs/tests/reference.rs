@@ -8,8 +8,9 @@ use std::process::Command;
 use pointmill_crs::Placing;
 use pointmill_format::{OpenOptions, PointBatch, Positions, Wanted, open_scan};
 
-/// The promise: a tenth of a millimetre, where the projection is good for.
-const LARGEST: f64 = 1e-4;
+/// The table has seven decimals, text and degrees a little less: a hundredth of a millimetre is far above their rounding,
+/// and far below the millimetre that is promised.
+const LARGEST: f64 = 1e-5;
 
 /// A row of the table.
 struct Row {
@@ -51,7 +52,9 @@ fn reprojected(points: &[[f64; 3]], from: &str, to: &str) -> Vec<[f64; 3]> {
 
 /// How far two points are apart, flat and in height, metres.
 fn apart(a: [f64; 3], b: [f64; 3], to: &str) -> [f64; 2] {
-    let geographic = ["4326", "4269", "4314", "4277", "4171", "4313", "4242", "4284", "4289", "4150", "4742", "4258", "4156", "4979"];
+    let geographic = [
+        "4326", "4269", "4314", "4277", "4171", "4313", "4242", "4284", "4289", "4150", "4742", "4258", "4156", "4979",
+    ];
     let metre = if to == "EPSG:2994" { 0.3048 } else { 1.0 };
     let (mut x, mut y) = ((a[0] - b[0]) * metre, (a[1] - b[1]) * metre);
     if geographic.iter().any(|code| to.ends_with(code)) {

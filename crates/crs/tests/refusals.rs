@@ -3,7 +3,7 @@
 use std::fs;
 
 use pointmill_crs::{Placing, Units};
-use pointmill_format::{Advice, ErrorKind, OpenOptions, ReadError, Scan, ScanWarning, open_scan};
+use pointmill_format::{Advice, ErrorKind, OpenOptions, Positions, ReadError, Scan, ScanWarning, Wanted, open_scan};
 
 fn opened(points: &str, placing: Placing) -> Result<Box<dyn Scan>, ReadError> {
     let dir = tempfile::tempdir().unwrap();
@@ -18,7 +18,10 @@ fn from_to(from: &str, to: &str) -> Placing {
 
 /// The line of a refusal.
 fn refused(points: &str, placing: Placing) -> String {
-    let error = opened(points, placing).err().unwrap();
+    let error = match opened(points, placing.clone()) {
+        Err(error) => error,
+        Ok(scan) => panic!("{placing:?}: {:?}", scan.info().warnings),
+    };
     assert!(matches!(error.kind(), ErrorKind::Unsupported), "{error}");
     assert!(error.advice().is_some() && !error.to_string().contains('\n'), "{error}");
     error.to_string()
@@ -32,13 +35,22 @@ fn changes_of_datum_that_need_a_grid_or_have_no_parameters_are_refused() {
         ("155000 463000 10\n", "EPSG:28992", "EPSG:25831", "grid nl_nsgi_rdtrans2018.tif"),
         ("500000 4500000 10\n", "EPSG:26710", "EPSG:26910", "grid"),
         ("500000 4500000 10\n", "EPSG:26910", "EPSG:32610", "grid"),
-        // NAD83 of 2011 and of 1986 are a metre apart, though both are "NAD83"
-        ("500000 4500000 10\n", "EPSG:6339", "EPSG:26910", "EPSG:6339"),
         ("637000 853000 10\n", "EPSG:2994", "EPSG:4326", "EPSG:2994"),
-        ("600000 2400000 10\n", "+proj=lcc +lat_1=46.8 +lat_0=46.8 +lon_0=2.3 +k_0=0.99987742 +x_0=600000 \
-          +y_0=2200000 +ellps=clrk80ign +units=m +no_defs", "EPSG:2154", "no exact way"),
+        (
+            "600000 2400000 10\n",
+            "+proj=lcc +lat_1=46.8 +lat_0=46.8 +lon_0=2.3 +k_0=0.99987742 +x_0=600000 \
+          +y_0=2200000 +ellps=clrk80ign +units=m +no_defs",
+            "EPSG:2154",
+            "no exact way",
+        ),
     ];
-    for (points, from, to, words) in table {
+    let meridian = "prime meridian other than Greenwich";
+    let others = [
+        ("600000 2200000 10\n", "EPSG:27572", "EPSG:4326", meridian),
+        ("600000 2200000 10\n", "EPSG:27572", "EPSG:4807", meridian),
+        ("2 46 10\n", "EPSG:4818", "EPSG:5514", meridian),
+    ];
+    for (points, from, to, words) in table.into_iter().chain(others) {
         let line = refused(points, from_to(from, to));
         assert!(line.contains(words), "{from} {to}: {line}");
     }
@@ -53,7 +65,13 @@ fn heights_keep_what_they_are_above_or_the_scan_is_refused() {
     let scan = opened("500000 5400000 100\n", from_to("EPSG:32632", "EPSG:4978")).unwrap();
     let warnings = &scan.info().warnings;
     assert!(matches!(&warnings[..], [ScanWarning::HeightsAboveNothing { .. }]), "{warnings:?}");
-    assert!(opened("500000 5400000 100\n", from_to("EPSG:25832+5783", "EPSG:25833+5783")).unwrap().info().warnings.is_empty());
+    assert!(
+        opened("500000 5400000 100\n", from_to("EPSG:25832+5783", "EPSG:25833+5783"))
+            .unwrap()
+            .info()
+            .warnings
+            .is_empty()
+    );
 }
 
 #[test]
@@ -62,11 +80,20 @@ fn a_change_of_datum_is_named_with_its_accuracy() {
         [ScanWarning::DatumChange { by }] => by.clone(),
         other => panic!("{other:?}"),
     };
-    assert_eq!(said("500000 5400000 1\n", from_to("EPSG:25832", "EPSG:32632")), "ETRS89 to WGS 84 (1), right within 1 m");
-    assert_eq!(said("700000 6600000 1\n", from_to("EPSG:2154", "EPSG:25831")), "RGF93 v1 to ETRS89 (1), right within 0.1 m");
+    assert_eq!(
+        said("500000 5400000 1\n", from_to("EPSG:25832", "EPSG:32632")),
+        "ETRS89 to WGS 84 (1), right within 1 m"
+    );
+    assert_eq!(
+        said("700000 6600000 1\n", from_to("EPSG:2154", "EPSG:25831")),
+        "RGF93 v1 to ETRS89 (1), right within 0.1 m"
+    );
     let declared = "+proj=tmerc +lat_0=0 +lon_0=9 +k=1 +x_0=3500000 +y_0=0 +ellps=bessel \
                     +towgs84=598.1,73.7,418.2,0.202,0.045,-2.455,6.7 +units=m +no_defs";
-    assert_eq!(said("3500000 5300000 1\n", from_to(declared, "EPSG:32632")), "the shift to WGS 84 that the definition declares");
+    assert_eq!(
+        said("3500000 5300000 1\n", from_to(declared, "EPSG:32632")),
+        "the shift to WGS 84 that the definition declares"
+    );
 }
 
 #[test]
@@ -77,8 +104,10 @@ fn a_scan_without_a_system_is_not_reprojected() {
 
 #[test]
 fn points_without_an_image_are_no_positions() {
-    let scan = opened("9 48 0\n9 95 0\n", from_to("EPSG:4326", "EPSG:25832")).err();
-    assert!(scan.is_none(), "{scan:?}");
+    let scan = opened("9 48 0\n9 95 0\n", from_to("EPSG:4326", "EPSG:25832")).unwrap();
+    let batch = scan.batches(Wanted::positions(scan.info())).next().unwrap().unwrap();
+    let Positions::World([x, y, _]) = batch.positions else { panic!() };
+    assert!((x[0] - 500_000.0).abs() < 1e-6 && y[0].is_finite() && x[1].is_nan() && y[1].is_nan());
 }
 
 fn corner(points: &str, placing: Placing) -> [f64; 3] {
@@ -87,7 +116,7 @@ fn corner(points: &str, placing: Placing) -> [f64; 3] {
 
 #[test]
 fn units_become_metres_or_those_of_the_system() {
-    let units = |units| Placing { units: Some(units), ..Placing::default() };
+    let units = |units| Placing::default().with_units(units);
     assert_eq!(corner("1500 2500 3000\n", units(Units::Millimetre)), [1.5, 2.5, 3.0]);
     assert_eq!(corner("1500 2500 3000\n", units(Units::Metre).with_crs("EPSG:2994").unwrap())[0], 1500.0 / 0.3048);
     assert_eq!(corner("1500 2500 3000\n", units(Units::Foot).with_crs("EPSG:2994").unwrap()), [1500.0, 2500.0, 3000.0]);
@@ -95,7 +124,7 @@ fn units_become_metres_or_those_of_the_system() {
     let compound = units(Units::Metre).with_crs("EPSG:26910+6360").unwrap();
     let [x, y, z] = corner("1500 2500 12\n", compound.clone());
     assert!((x, y) == (1500.0, 2500.0) && (z - 12.0 * 3937.0 / 1200.0).abs() < 1e-12, "{z}");
-    let [_, north, up] = corner("1500 12 -2500\n", Placing { y_up: true, ..compound });
+    let [_, north, up] = corner("1500 12 -2500\n", compound.with_y_up());
     assert!(north == 2500.0 && (up - 12.0 * 3937.0 / 1200.0).abs() < 1e-12, "with y up, the height is y");
     let degrees = refused("9 48 100\n", units(Units::Foot).with_crs("EPSG:4326").unwrap());
     assert!(degrees.contains("degrees"), "{degrees}");

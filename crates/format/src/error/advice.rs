@@ -54,9 +54,9 @@ impl fmt::Display for Advice {
                 write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")
             }
             Self::NameCrs => f.write_str("name its coordinate reference system"),
-            Self::OtherCrs => {
-                f.write_str("reproject to a system on the same datum and with the same heights, or reproject it elsewhere")
-            }
+            Self::OtherCrs => f.write_str(
+                "reproject to a system on the same datum and with the same heights, or reproject it elsewhere",
+            ),
             Self::SkipUnreadable => f.write_str("copy the file again, or skip what cannot be read"),
             Self::Other(text) => f.write_str(text),
         }

@@ -60,8 +60,7 @@ impl Affine {
         Self { linear: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
     /// From y up to z up, a quarter turn about x: (x, y, z) becomes (x, −z, y).
-    pub const Y_UP: Self =
-        Self { linear: [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], translation: [0.0; 3] };
+    pub const Y_UP: Self = Self { linear: [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], translation: [0.0; 3] };
 
     /// The map of a 4 × 4 matrix, row by row, for column vectors: the translation is in the last column.
     ///

@@ -161,11 +161,15 @@ impl ScanWarning {
             Self::Bounds => "the header's bounds are inverted or not finite; they are not used".to_owned(),
             Self::NoZ => "there is no z; it is 0 for every point".to_owned(),
             Self::UnitsClash { declared, given } => {
-                format!("its coordinate reference system is in {declared}; the coordinates are taken as {given} and scaled")
+                format!(
+                    "its coordinate reference system is in {declared}; the coordinates are taken as {given} and scaled"
+                )
             }
             Self::DatumChange { by } => format!("the datum is changed by {by}"),
             Self::HeightsAboveNothing { target } => {
-                format!("nothing says what its heights are above; {target} has them above the ellipsoid, and so they are taken")
+                format!(
+                    "nothing says what its heights are above; {target} has them above the ellipsoid, and so they are taken"
+                )
             }
             Self::HeightsWithoutUnit { beside } => {
                 format!("nothing says the unit of its heights; they are left as they are, beside x and y in {beside}")

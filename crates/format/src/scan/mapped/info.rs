@@ -1,8 +1,8 @@
 //! What is known of a mapped scan before its points are decoded.
 
 use super::directions::has_normals;
-use super::positions::{PositionMap, move_all};
 use super::map::{PointMap, ScanMap};
+use super::positions::{PositionMap, move_all};
 use crate::{Aabb, Affine, Resolution, Scan, ScanInfo, ScanPart, ScanWarning};
 
 /// Points per side of the grid whose images stand for those of a box: x, y, z.

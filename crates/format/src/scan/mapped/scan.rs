@@ -69,7 +69,9 @@ impl Scan for MappedScan {
 impl MappedScan {
     /// The least integer has no negative one on the same lattice.
     fn no_negative(&self, point: u64) -> ReadError {
-        let what = format!("point {point} has the coordinate {} on the file's lattice, which cannot be negated", i32::MIN);
-        ReadError::unsupported(&self.info.path, what).advise("leave the point out, or export the scan with another offset")
+        let what =
+            format!("point {point} has the coordinate {} on the file's lattice, which cannot be negated", i32::MIN);
+        ReadError::unsupported(&self.info.path, what)
+            .advise("leave the point out, or export the scan with another offset")
     }
 }

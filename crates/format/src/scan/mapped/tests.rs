@@ -98,7 +98,9 @@ fn any_other_map_makes_world_coordinates_of_the_step_that_the_file_has() {
     assert_eq!(scan.info().lattice, None);
     let Positions::World([x, y, z]) = all(&*scan).positions else { panic!() };
     let (east, north) = (100.01, 200.2);
-    assert!((x[0] - (0.6 * east - 0.8 * north)).abs() < 1e-12 && (y[0] - (0.8 * east + 0.6 * north + 10.0)).abs() < 1e-12);
+    assert!(
+        (x[0] - (0.6 * east - 0.8 * north)).abs() < 1e-12 && (y[0] - (0.8 * east + 0.6 * north + 10.0)).abs() < 1e-12
+    );
     assert_eq!(z[0], 305.0);
     let bounds = scan.info().bounds_declared.unwrap();
     assert!((bounds.min[0] - (0.6 * 99.98 - 0.8 * 200.4)).abs() < 1e-12 && bounds.max[2] == 315.0, "{bounds:?}");
@@ -147,8 +149,10 @@ fn normals_turn_with_the_points_and_none_stays_none() {
 #[test]
 fn normals_of_small_integers_turn_too() {
     let bytes = |v: i8| Column::Int8(vec![v]);
-    let mut fake =
-        Fake::new(Positions::World([vec![1.0], vec![2.0], vec![3.0]]), &[("nx", bytes(127)), ("ny", bytes(0)), ("nz", bytes(0))]);
+    let mut fake = Fake::new(
+        Positions::World([vec![1.0], vec![2.0], vec![3.0]]),
+        &[("nx", bytes(127)), ("ny", bytes(0)), ("nz", bytes(0))],
+    );
     let mut attributes = fake.info.attributes.to_vec();
     attributes.iter_mut().for_each(|a| a.scale = vec![1.0 / 127.0]);
     fake.info.attributes = attributes.into();
