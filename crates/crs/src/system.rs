@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use pointmill_format::Crs;
+use pointmill_format::{Crs, Unit};
 use proj_core::{AxisOrder, CrsDef, VerticalCrsDef, VerticalCrsKind};
 use proj_wkt::parse_crs;
 
@@ -80,20 +80,37 @@ impl System {
 
     /// The system that a scan declares; `None` if it declares none.
     pub(crate) fn of_scan(crs: &Crs) -> Result<Option<Self>, CrsError> {
-        let code = || {
-            let horizontal = crs.epsg?;
-            let pair = crs.vertical_epsg.map(|vertical| format!("EPSG:{horizontal}+{vertical}"));
-            Some(pair.filter(|pair| parse_crs(pair).is_ok()).unwrap_or_else(|| format!("EPSG:{horizontal}")))
+        let wkt = crs.wkt.as_deref().filter(|wkt| !wkt.trim().is_empty());
+        let by_keys = match (wkt, by_keys(crs)) {
+            (Some(wkt), Some(keys)) if !crs.keys_first => Self::parse(wkt).or_else(|error| keys.map_err(|_| error)),
+            (Some(wkt), None) => Self::parse(wkt),
+            (_, Some(keys)) => keys,
+            (None, None) => return Ok(None),
         };
-        match (&crs.wkt, code()) {
-            (Some(wkt), code) if !wkt.trim().is_empty() => Self::parse(wkt).or_else(|error| match code {
-                Some(code) => Self::parse(&code).map_err(|_| error),
-                None => Err(error),
-            }),
-            (_, Some(code)) => Self::parse(&code),
-            (_, None) => return Ok(None),
+        by_keys.map(Some)
+    }
+
+    /// With the units that a file declares beside its code.
+    fn with_units(mut self, unit: Option<Unit>, vertical: Option<Unit>) -> Result<Self, CrsError> {
+        let name = self.name();
+        let refuse = |what: &str, unit: Unit| {
+            Err(CrsError::Unsupported {
+                definition: name.clone(),
+                why: format!("the unit of {what} is declared as {unit}"),
+            })
+        };
+        match unit {
+            Some(Unit::Length(metres)) if self.defined_unit().is_some() => self.unit = Some(metres),
+            Some(Unit::DEGREE) if self.defined_unit().is_none() => {}
+            Some(other) => return refuse("x and y", other),
+            None => {}
         }
-        .map(Some)
+        match vertical {
+            Some(Unit::Length(metres)) => self.vertical_unit = Some(metres),
+            Some(other) => return refuse("heights", other),
+            None => {}
+        }
+        Ok(self)
     }
 
     /// The name, for people.
@@ -158,6 +175,18 @@ impl System {
     pub(crate) fn datum(&self) -> u32 {
         self.def.datum().epsg()
     }
+}
+
+/// What GeoTIFF keys declare: codes, and units beside them.
+fn by_keys(crs: &Crs) -> Option<Result<System, CrsError>> {
+    if crs.is_user_defined {
+        let definition = crs.citation.as_deref().map_or_else(|| "the system of its GeoTIFF keys".to_owned(), quoted);
+        return Some(Err(CrsError::Unsupported { definition, why: "it has no EPSG code".to_owned() }));
+    }
+    let horizontal = crs.epsg?;
+    let pair = crs.vertical_epsg.map(|vertical| format!("EPSG:{horizontal}+{vertical}"));
+    let code = pair.filter(|pair| parse_crs(pair).is_ok()).unwrap_or_else(|| format!("EPSG:{horizontal}"));
+    Some(System::parse(&code).and_then(|system| system.with_units(crs.unit, crs.vertical_unit)))
 }
 
 fn unsupported(text: &str, error: &proj_wkt::ParseError) -> CrsError {

@@ -8,6 +8,7 @@ mod directions;
 mod info;
 mod map;
 mod positions;
+mod resolution;
 mod sample;
 mod scan;
 #[cfg(test)]

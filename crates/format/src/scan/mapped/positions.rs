@@ -54,9 +54,9 @@ impl PositionMap {
             },
             Self::World { lattice, affine, projection } => {
                 let mut world = std::mem::replace(positions, Positions::World(Default::default())).into_world(lattice);
-                move_all(affine, &mut world);
-                if let Some(projection) = projection {
-                    projection.map(world.each_mut().map(Vec::as_mut_slice));
+                match projection {
+                    Some(projection) => project(affine, &**projection, &mut world),
+                    None => move_all(affine, &mut world),
                 }
                 *positions = Positions::World(world);
                 Ok(())
@@ -100,4 +100,10 @@ pub(super) fn move_all(affine: &Affine, points: &mut [Vec<f64>; 3]) {
     for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
         [*x, *y, *z] = affine.apply([*x, *y, *z]);
     }
+}
+
+/// The affine map, then the projection.
+pub(super) fn project(affine: &Affine, projection: &dyn PointMap, points: &mut [Vec<f64>; 3]) {
+    move_all(affine, points);
+    projection.map(points.each_mut().map(Vec::as_mut_slice));
 }

@@ -3,8 +3,8 @@ use std::sync::Arc;
 use super::map::{PointMap, ScanMap};
 use super::scan::mapped;
 use crate::{
-    Aabb, Affine, Attribute, AttributeType, Column, Lattice, Piece, PointBatch, Positions, ReadError, Resolution, Scan,
-    ScanInfo, ScanWarning, Scratch, Sink, Wanted,
+    Aabb, Affine, Attribute, AttributeType, AxisGrid, Column, Lattice, Piece, PointBatch, Positions, ReadError,
+    Resolution, Scan, ScanInfo, ScanWarning, Scratch, Sink, Wanted,
 };
 
 /// One piece with these points.
@@ -104,20 +104,32 @@ fn any_other_map_makes_world_coordinates_of_the_step_that_the_file_has() {
     assert_eq!(z[0], 305.0);
     let bounds = scan.info().bounds_declared.unwrap();
     assert!((bounds.min[0] - (0.6 * 99.98 - 0.8 * 200.4)).abs() < 1e-12 && bounds.max[2] == 315.0, "{bounds:?}");
-    // x has 0.6 of the step in x and 0.8 of that in y
-    let Resolution::Step(step) = scan.info().resolution else { panic!() };
-    assert!((step - 0.006f64.hypot(0.016).min(0.008f64.hypot(0.012))).abs() < 1e-15, "{step}");
+    // x has 0.6 of the step in x and 0.8 of that in y; z is the z of the file
+    let grid = Resolution::Grid(AxisGrid { step: 0.05, offset: 300.0 });
+    let (x, y) = (0.006f64.hypot(0.016), 0.008f64.hypot(0.012));
+    assert_eq!(scan.info().resolution, [Resolution::Step(x), Resolution::Step(y), grid]);
 }
 
 #[test]
 fn what_single_precision_resolves_is_that_of_the_file_not_of_the_place_it_is_moved_to() {
     let shift = matrix([[1.0, 0.0, 0.0, 5e5], [0.0, 1.0, 0.0, 5.4e6], [0.0, 0.0, 1.0, 0.0]]);
     let mut fake = Fake::new(Positions::World([vec![0.0, 8.0], vec![1.0, 9.0], vec![1.0, 15.0]]), &[]);
-    fake.info.resolution = Resolution::Single;
-    assert_eq!(moved(fake, shift).info().resolution, Resolution::Step(2f64.powi(-20)));
+    fake.info.resolution = [Resolution::Single; 3];
+    let step = Resolution::Step(2f64.powi(-20));
+    assert_eq!(moved(fake, shift).info().resolution, [step, step, Resolution::Single], "x and y up to 9, z not moved");
     let mut fake = Fake::new(Positions::World([vec![0.0], vec![1.0], vec![2.0]]), &[]);
-    fake.info.resolution = Resolution::Single;
-    assert_eq!(moved(fake, Affine::Y_UP).info().resolution, Resolution::Single, "the same numbers on other axes");
+    fake.info.resolution = [Resolution::Single; 3];
+    assert_eq!(moved(fake, Affine::Y_UP).info().resolution, [Resolution::Single; 3], "the same numbers on other axes");
+}
+
+#[test]
+fn a_shift_keeps_scaled_integers_of_e57_on_their_own_steps() {
+    let mut fake = Fake::new(Positions::World([vec![0.5], vec![1.0], vec![2.0]]), &[]);
+    fake.info.resolution = [Resolution::Grid(AxisGrid { step: 0.001, offset: 0.5 }); 3];
+    let map =
+        Affine::scaling([2.0; 3]).then(&matrix([[0.0, -1.0, 0.0, 7.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]));
+    let grid = |offset| Resolution::Grid(AxisGrid { step: 0.002, offset });
+    assert_eq!(moved(fake, map).info().resolution, [grid(6.0), grid(1.0), grid(1.0)]);
 }
 
 fn normals() -> Vec<(&'static str, Column)> {
@@ -208,7 +220,7 @@ impl PointMap for Square {
 fn a_projection_comes_last_and_what_it_cannot_map_is_no_position() {
     let mut fake = Fake::new(Positions::World([vec![3.0, 4.0], vec![1.0, -20.0], vec![0.0, 0.0]]), &normals());
     fake.info.bounds_declared = Some(Aabb { min: [3.0, -20.0, 0.0], max: [4.0, 1.0, 0.0] });
-    fake.info.resolution = Resolution::Step(0.001);
+    fake.info.resolution = [Resolution::Step(0.001), Resolution::Double, Resolution::Step(0.5)];
     let map = ScanMap { projection: Some(Arc::new(Square)), ..ScanMap::new(Affine::scaling([10.0, 1.0, 1.0])) };
     let scan = mapped(fake.boxed(), &map).unwrap();
     let Positions::World([x, y, _]) = all(&*scan).positions else { panic!() };
@@ -216,5 +228,7 @@ fn a_projection_comes_last_and_what_it_cannot_map_is_no_position() {
     let bounds = scan.info().bounds_declared.unwrap();
     assert_eq!((bounds.min[0], bounds.max[0]), (900.0, 1600.0));
     assert_eq!((bounds.min[1], bounds.max[1]), (1.0, 1.0), "only what has an image");
+    // in the middle, at y = -9.5, there is no image: nothing is known of x and y
+    assert_eq!(scan.info().resolution, [Resolution::Double; 3]);
     assert_eq!(scan.info().warnings, [ScanWarning::DirectionsProjected]);
 }
