@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 use pointmill_format::{Decimal, OpenOptions};
 
+use super::placing::PlacingArgs;
 use super::values::parse_separator;
 use crate::exit::Failure;
 
@@ -22,7 +23,7 @@ pub(crate) struct InputArgs {
     pub(crate) reading: ReadingArgs,
 }
 
-/// Facts about scans that their files do not state.
+/// Facts about scans that their files do not state, and where their points belong.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct ReadingArgs {
     /// Columns of text scans in file order, for example x,y,z,r,g,b,i. Names: x y z, r g b, i (intensity),
@@ -54,6 +55,8 @@ pub(crate) struct ReadingArgs {
     /// Keeps rowIndex and columnIndex of E57 scans as attributes
     #[arg(long, help_heading = "Reading scans")]
     pub(crate) row_column: bool,
+    #[command(flatten)]
+    pub(crate) placing: PlacingArgs,
 }
 
 impl ReadingArgs {
@@ -67,6 +70,9 @@ impl ReadingArgs {
         (options.columns, options.separator) = (self.columns.clone(), self.separator);
         options.decimal = self.decimal.into();
         options.scans = (!self.scans.is_empty()).then(|| self.scans.clone());
+        if let Some(placing) = self.placing.placing()? {
+            options = options.maps(placing);
+        }
         Ok(options)
     }
 }

@@ -61,9 +61,6 @@ pub(crate) struct ConvertArgs {
     /// scans without a step, one chosen from their extent and precision
     #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale, help_heading = "Output")]
     pub(crate) scale: Scale,
-    /// Coordinate reference system: a proj4 string, EPSG:n or WKT [default: from the inputs]
-    #[arg(long, value_name = "TEXT", help_heading = "Output")]
-    pub(crate) crs: Option<String>,
 
     /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
     /// [default: all for potree2, classification for bintree, colour for batches]

@@ -2,6 +2,7 @@
 
 mod common;
 mod convert;
+mod placing;
 mod values;
 
 use std::num::NonZero;

@@ -158,7 +158,9 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         RgbDepthArg::Eight => RgbDepth::Eight,
         RgbDepthArg::Sixteen => RgbDepth::Sixteen,
     };
-    plan.crs.clone_from(&args.crs);
+    let placing = &args.inputs.reading.placing;
+    // the datasets are in the system that the points end in
+    plan.crs.clone_from(if placing.reproject.is_some() { &placing.reproject } else { &placing.crs });
     plan.overwrite = args.overwrite;
     if let Some(bytes) = args.memory {
         plan.memory_bytes = bytes;

@@ -17,6 +17,7 @@ use crate::scan_choice;
 /// A folder with the outputs of one conversion to several formats is validated one after the other; all are
 /// reported, and the first failure gives the exit code.
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
+    args.reading.placing.refuse_idle_crs()?;
     let datasets = several(&args.dataset);
     if datasets.is_empty() {
         require_dataset(&args.dataset)?;

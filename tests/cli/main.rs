@@ -11,6 +11,7 @@ mod hostile;
 mod inputs;
 mod interrupted;
 mod odd_places;
+mod placing;
 mod precision;
 mod reporting;
 

@@ -38,6 +38,7 @@ fn datasets(path: &Path) -> Vec<Located> {
 
 /// Describes every path; the exit code is that of the first failure.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    args.reading.placing.refuse_idle_crs()?;
     let options = args.reading.options()?;
     check_choice(&args.paths, &options)?;
     let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };

@@ -158,6 +158,9 @@ pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value>
     settings.insert("duplicates".into(), plan.duplicates.name().into());
     settings.insert("outliers".into(), plan.outliers.name().into());
     settings.insert("rgb-depth".into(), plan.rgb_depth.name().into());
+    for (name, value) in plan.open.maps.iter().flat_map(|maps| maps.settings()) {
+        settings.insert(name.into(), value.into());
+    }
     settings
 }
 

@@ -31,6 +31,10 @@ pub enum Advice {
     /// The description of the file is larger than the memory that it may take
     /// ([`crate::OpenOptions::description_bytes`]).
     MoreMemory,
+    /// The coordinate reference system of the scan can be named, in place of what the file declares.
+    NameCrs,
+    /// Choose another coordinate reference system to reproject to, on the same datum, or reproject with other means.
+    OtherCrs,
     /// A conversion can skip what cannot be read and go on with the rest.
     SkipUnreadable,
     /// Anything else, as text.
@@ -59,6 +63,10 @@ impl fmt::Display for Advice {
                 write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")
             }
             Self::MoreMemory => f.write_str("let it take more memory"),
+            Self::NameCrs => f.write_str("name its coordinate reference system"),
+            Self::OtherCrs => f.write_str(
+                "reproject to a system on the same datum and with the same heights, or reproject it elsewhere",
+            ),
             Self::SkipUnreadable => f.write_str("copy the file again, or skip what cannot be read"),
             Self::Other(text) => f.write_str(text),
         }

@@ -9,6 +9,7 @@ mod decimal;
 mod decode;
 mod image;
 mod info;
+mod mapped;
 mod open;
 mod other_kind;
 #[cfg(feature = "text")]
@@ -40,6 +41,7 @@ pub use decimal::Decimal;
 pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub use image::{Blob, ImageEncoding, ImageGeometry, ImageKind, ImagePose, ScanImage};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
+pub use mapped::{PointMap, ScanMap, ScanMaps};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
 pub use other_kind::OtherKind;
 pub use unit::Unit;

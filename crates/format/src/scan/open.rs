@@ -5,8 +5,10 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use super::archive::archive;
+use super::mapped::{ScanMaps, mapped};
 use super::other_kind::OtherKind;
 use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
 
@@ -34,7 +36,7 @@ pub enum ScanKind {
     Text(crate::scan::text::TextKind),
 }
 
-/// What a file does not say of itself, for the kinds that need it.
+/// What a file does not say of itself, for the kinds that need it, and what becomes of its points.
 ///
 /// ```
 /// use pointmill_format::OpenOptions;
@@ -42,7 +44,7 @@ pub enum ScanKind {
 /// let options = OpenOptions::default().columns(["x", "y", "z", "-", "i"]).separator(';');
 /// assert_eq!(options.separator, Some(';'));
 /// ```
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct OpenOptions {
     /// Text: the names of all columns in file order (`text::TextOptions::columns`); `None`: found.
@@ -59,6 +61,8 @@ pub struct OpenOptions {
     /// Bytes of memory that the description of a file's scans may take while it is opened (the XML section of E57);
     /// `None`: 1 GiB.
     pub description_bytes: Option<u64>,
+    /// What becomes of the points; `None`: they stay where they are.
+    pub maps: Option<Arc<dyn ScanMaps>>,
 }
 
 impl OpenOptions {
@@ -101,6 +105,13 @@ impl OpenOptions {
     #[must_use]
     pub fn description_bytes(mut self, bytes: u64) -> Self {
         self.description_bytes = Some(bytes);
+        self
+    }
+
+    /// Sets [`Self::maps`].
+    #[must_use]
+    pub fn maps(mut self, maps: impl ScanMaps + 'static) -> Self {
+        self.maps = Some(Arc::new(maps));
         self
     }
 }
@@ -220,10 +231,18 @@ pub fn supported_scans() -> String {
 /// Opens a scan of any kind that this build reads; the kind is detected from the content, the extension is ignored.
 ///
 /// # Errors
-/// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
-#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+/// A file that is empty, or of no kind that is read here, those of the reader of its kind, and of
+/// [`OpenOptions::maps`].
 pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
-    let path = path.as_ref();
+    let scan = open_as_it_is(path.as_ref(), options)?;
+    match &options.maps {
+        Some(maps) => mapped(scan, &**maps),
+        None => Ok(scan),
+    }
+}
+
+#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,

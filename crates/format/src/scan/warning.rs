@@ -81,6 +81,16 @@ pub enum ScanWarning {
     PlyVersion { version: String },
     /// No z: it is 0 for every point.
     NoZ,
+    /// The unit of its coordinate reference system is `declared`; its coordinates are taken to be in `given`.
+    UnitsClash { declared: String, given: String },
+    /// A reprojection changes the datum, in this way.
+    DatumChange { by: String },
+    /// Nothing says what heights are above; `target`, to which they are reprojected, has them above the ellipsoid.
+    HeightsAboveNothing { target: String },
+    /// Nothing says the unit of heights, and that of x and y has changed to `beside`.
+    HeightsWithoutUnit { beside: String },
+    /// A reprojection moved the points, but turned neither normals nor the poses of scans.
+    DirectionsProjected,
     /// Text: a column without numbers.
     ColumnIgnored { number: usize, name: String },
     /// Text: the first column numbers or names the rows.
@@ -190,6 +200,24 @@ impl ScanWarning {
             }
             Self::Bounds => "the header's bounds are inverted or not finite; they are not used".to_owned(),
             Self::NoZ => "there is no z; it is 0 for every point".to_owned(),
+            Self::UnitsClash { declared, given } => {
+                format!(
+                    "its coordinate reference system is in {declared}; the coordinates are taken as {given} and scaled"
+                )
+            }
+            Self::DatumChange { by } => format!("the datum is changed by {by}"),
+            Self::HeightsAboveNothing { target } => {
+                format!(
+                    "nothing says what its heights are above; {target} has them above the ellipsoid, and so they are taken"
+                )
+            }
+            Self::HeightsWithoutUnit { beside } => {
+                format!("nothing says the unit of its heights; they are left as they are, beside x and y in {beside}")
+            }
+            Self::DirectionsProjected => {
+                "normals and poses are not turned by the reprojection; they keep the directions of the scan's own axes"
+                    .to_owned()
+            }
             Self::ColumnIgnored { number, name } => {
                 format!("column {number} ({name}) holds no numbers; it is omitted")
             }
