@@ -21,3 +21,4 @@ mod scans_within;
 mod several;
 mod support;
 mod text_inputs;
+mod units;

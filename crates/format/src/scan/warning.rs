@@ -33,6 +33,8 @@ pub enum ScanWarning {
     /// LAZ: the chunk table cannot be used. `chunks`: as many were found without it; `None`: points are decoded in
     /// sequence.
     ChunkTable { why: String, chunks: Option<usize> },
+    /// LAZ: the chunk table was wrong (`why`) and is mended (`how`); the mended one was proven.
+    ChunkTableMended { why: String, how: String },
     /// LAZ: a LASzip record, but points that are not compressed.
     LaszipIgnored,
     /// LAS: a record (`kind`: VLR or EVLR) starts outside its place.
@@ -51,8 +53,13 @@ pub enum ScanWarning {
     WktEmpty,
     /// LAS: waveform packets are not read.
     Waveforms { point_format: u8 },
-    /// LAS: more than one Extra Bytes record; the first is taken.
-    ExtraBytesRecords,
+    /// LAS: more than one Extra Bytes record, which describe `widths` bytes of a point, of its `extra` ones. Those with
+    /// the numbers `taken`, from 1, are joined.
+    ExtraBytesRecords { widths: Vec<usize>, taken: Vec<usize>, extra: usize },
+    /// LAS: a record of LASzip's compatibility mode that does not fit the points; they are read as they are.
+    CompatibilityIgnored { version: u16, point_format: u8 },
+    /// LAS: the header declares no points, the record of LASzip's compatibility mode that many.
+    CompatibilityCount { count: u64 },
     /// LAS: the Extra Bytes record is not a multiple of its descriptors.
     ExtraBytesLength { bytes: usize, descriptor: usize },
     /// LAS: extra bytes reach beyond the record.
@@ -259,6 +266,11 @@ impl ScanWarning {
             Self::ChunkTable { why, chunks: None } => {
                 format!("the chunk table is unusable ({why}); the points are decoded one after the other")
             }
+            Self::ChunkTableMended { why, how } => {
+                format!(
+                    "the chunk table is wrong ({why}): {how}; mended, and proven by decoding a sample of the chunks"
+                )
+            }
             Self::LaszipIgnored => {
                 "there is a LASzip record, but the points are not marked as compressed; it is ignored".to_owned()
             }
@@ -284,7 +296,14 @@ impl ScanWarning {
             Self::Waveforms { point_format } => {
                 format!("point format {point_format} carries waveform packets; they are not read, all other values are")
             }
-            Self::ExtraBytesRecords => "there is more than one Extra Bytes record; the first is taken".to_owned(),
+            Self::ExtraBytesRecords { widths, taken, extra } => extra_bytes_records(widths, taken, *extra),
+            Self::CompatibilityIgnored { version, point_format } => format!(
+                "a record of LASzip's compatibility mode (version {version}) does not fit the points (format \
+                 {point_format} and its extra bytes); they are read as they are stored"
+            ),
+            Self::CompatibilityCount { count } => format!(
+                "the header declares no points, the record of LASzip's compatibility mode {count}; these are read"
+            ),
             Self::ExtraBytesLength { bytes, descriptor } => {
                 format!("the Extra Bytes record has {bytes} bytes, not a multiple of {descriptor}")
             }
@@ -358,6 +377,26 @@ impl ScanWarning {
             _ => "",
         };
         fixed.to_owned()
+    }
+}
+
+fn extra_bytes_records(widths: &[usize], taken: &[usize], extra: usize) -> String {
+    let join = |numbers: &[usize]| numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    let (there, numbers) = (widths.len(), join(taken));
+    let width: usize = taken.iter().map(|i| widths[i - 1]).sum();
+    match taken.len() {
+        _ if width != extra => format!(
+            "there are {there} Extra Bytes records, of {} bytes per point, which do not add up to its {extra} extra \
+             bytes; number {numbers} is taken",
+            join(widths)
+        ),
+        1 => format!(
+            "there are {there} Extra Bytes records; number {numbers} describes all {extra} extra bytes of a point"
+        ),
+        _ => format!(
+            "there are {there} Extra Bytes records; joined in order, numbers {numbers} describe all {extra} extra \
+             bytes of a point"
+        ),
     }
 }
 
