@@ -2,13 +2,17 @@
 
 mod crs;
 mod extent;
+mod recast;
 mod schema;
+mod union;
 
 use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
 pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
 pub(crate) use extent::{Extent, far_out, intersection};
-pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
+pub(crate) use recast::{Recast, doubled};
+pub(crate) use schema::{POSITION_BYTES, Schema};
+pub(crate) use union::{Placed, Union};
 
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{OnFault, Plan};
@@ -18,8 +22,8 @@ use crate::warning::{Warning, reason_of};
 /// A scan, and where its columns are among all attributes.
 pub(crate) struct Source {
     pub(crate) scan: Box<dyn Scan>,
-    /// Where each of its columns is in [`Sources::attributes`].
-    pub(crate) columns: Vec<usize>,
+    /// Where each of its columns is in [`Sources::attributes`], and how it gets there.
+    pub(crate) columns: Vec<Placed>,
     /// Where its points are, as far as is known before they are read.
     pub(crate) extent: Option<Extent>,
 }
@@ -64,19 +68,21 @@ impl Sources {
         if scans.is_empty() {
             return Err(InputFault::NoneReadable.into());
         }
-        warnings.iter().for_each(|w| events.warning(w));
-        Ok(Self::combine(scans, points_missing, warnings))
+        let sources = Self::combine(scans, points_missing, warnings);
+        sources.warnings.iter().for_each(|w| events.warning(w));
+        Ok(sources)
     }
 
-    fn combine(scans: Vec<Box<dyn Scan>>, points_missing: u64, warnings: Vec<Warning>) -> Self {
+    fn combine(scans: Vec<Box<dyn Scan>>, points_missing: u64, mut warnings: Vec<Warning>) -> Self {
         let infos: Vec<_> = scans.iter().map(|s| s.info()).collect();
-        let (attributes, columns) = Schema::union(&infos);
+        let union = Union::of(&infos);
+        warnings.extend(union.warnings);
         let points_declared = scans.iter().flat_map(|s| s.pieces()).map(|p| p.points).sum();
-        let sources = scans.into_iter().zip(columns).map(|(scan, columns)| {
+        let sources = scans.into_iter().zip(union.columns).map(|(scan, columns)| {
             let extent = Extent::of(&*scan);
             Source { scan, columns, extent }
         });
-        Self { all: sources.collect(), attributes, points_declared, points_missing, warnings }
+        Self { all: sources.collect(), attributes: union.schema, points_declared, points_missing, warnings }
     }
 
     /// What the headers claim (or a sample shows) of where the points are, cut by the filter; a hint.

@@ -7,6 +7,9 @@ mod decode;
 mod info;
 mod open;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg_attr(not(all(feature = "e57", feature = "las", feature = "text")), allow(dead_code))]
+mod quantities;
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 mod wanted;
 mod warning;
