@@ -55,10 +55,11 @@ pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
     AttributeChoice, Duplicates, Filter, OnFault, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
 };
-pub use reason::{GridReason, LatticeBasis, LatticeReason};
+pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
     AttributeReport, ChangedAttribute, ChangedValues, CoordinateChange, DropReason, DroppedAttribute, Estimate,
     GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport, Report, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
+pub use sources::{ResolvedCrs, resolve_crs};
 pub use warning::{CrsNote, Proj4Fault, Warning};

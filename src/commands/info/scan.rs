@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pointmill_format::{OpenOptions, Resolution, Scan, ScanInfo, ScanPart};
+use pointmill_format::{AxisGrid, OpenOptions, Resolution, Scan, ScanInfo, ScanPart, Unit};
 use serde_json::{Map, Value, json};
 
 use super::description::{Description, attribute_json, corners};
@@ -45,7 +45,11 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
         Some(l) => t.row("lattice", format!("step {}, offset {}", numbers(&l.scale), numbers(&l.offset))),
         None => t.row("resolution", resolution(info, measured)),
     }
-    t.row("CRS", text::crs(&info.crs));
+    let crs = pointmill_converter::resolve_crs(&info.crs);
+    t.row("CRS", text::or_none(&crs.label));
+    if crs.unit.is_some() || crs.vertical_unit.is_some() {
+        t.row("units", text::units(&crs));
+    }
     let pieces = plural(scan.pieces().len() as u64, "piece");
     t.row("size", format!("{}, {pieces} to decode in parallel", bytes(info.file_bytes)));
     for (i, part) in info.parts.iter().take(MAX_PARTS).enumerate() {
@@ -59,23 +63,34 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
         t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, ranges));
     }
     info.warnings.iter().for_each(|w| t.row("warning", w.to_string()));
+    crs.notes.iter().for_each(|note| t.row("warning", note.to_string()));
     t.0
 }
 
-/// The precision of stored coordinates, as the step at the far ends of the bounds.
+/// The precision of stored coordinates: one text where all axes agree, else one per axis.
 fn resolution(info: &ScanInfo, measured: Option<&Measured>) -> String {
-    match info.resolution {
-        Resolution::Step(step) => format!("stored in steps of {}", number(step)),
-        Resolution::Double => "stored in double precision, or as decimal text".to_owned(),
-        Resolution::Single => {
-            let measured = measured.map(|m| m.bounds).filter(|b| !b.is_empty());
-            match measured.or(info.bounds_declared) {
-                None => "stored in single precision; --deep reports the step at the far ends".to_owned(),
-                Some(b) => {
-                    let steps = [0, 1, 2].map(|a| single_step(b.min[a].abs().max(b.max[a].abs())));
-                    format!("stored in single precision: steps of {} at the far ends", numbers(&steps))
-                }
-            }
+    let bounds = measured.map(|m| m.bounds).filter(|b| !b.is_empty()).or(info.bounds_declared);
+    let [x, y, z] = std::array::from_fn(|a| {
+        let far = bounds.map(|b| b.min[a].abs().max(b.max[a].abs()));
+        axis_resolution(info.resolution[a], far)
+    });
+    if x == y && y == z { format!("stored {x}") } else { format!("stored x {x}, y {y}, z {z}") }
+}
+
+/// The precision of an axis; `far`: its largest coordinate.
+fn axis_resolution(resolution: Resolution, far: Option<f64>) -> String {
+    match (resolution, far) {
+        (Resolution::Grid(AxisGrid { step, offset }), _) if offset % step == 0.0 => {
+            format!("in steps of {}", number(step))
+        }
+        (Resolution::Grid(AxisGrid { step, offset }), _) => {
+            format!("in steps of {} from {}", number(step), number(offset))
+        }
+        (Resolution::Step(step), _) => format!("in steps of {}", number(step)),
+        (Resolution::Double, _) => "in double precision, or as decimal text".to_owned(),
+        (Resolution::Single, None) => "in single precision; --deep reports the step at the far ends".to_owned(),
+        (Resolution::Single, Some(far)) => {
+            format!("in single precision, steps of {} at the far ends", number(single_step(far)))
         }
     }
 }
@@ -126,12 +141,13 @@ fn half_turn_axis(m: &[[f64; 3]; 3]) -> [f64; 3] {
 fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
     let info = scan.info();
     let part = |p: &ScanPart| json!({ "name": p.name, "points": p.points, "rotation": p.rotation, "translation": p.translation });
-    let resolution = match info.resolution {
-        _ if info.lattice.is_some() => Value::Null,
+    let of_axis = |resolution: Resolution| match resolution {
+        Resolution::Grid(grid) => json!({ "stored": "steps", "step": grid.step, "offset": grid.offset }),
         Resolution::Step(step) => json!({ "stored": "steps", "step": step }),
         Resolution::Single => json!({ "stored": "single" }),
         Resolution::Double => json!({ "stored": "double or text" }),
     };
+    let resolution = info.lattice.is_none().then(|| info.resolution.map(of_axis));
     let mut object = json!({
         "path": info.path.to_string_lossy(),
         "kind": "scan",
@@ -140,7 +156,7 @@ fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
         "bounds_declared": info.bounds_declared.map(|b| corners(&b)),
         "lattice": info.lattice.map(|l| json!({ "scale": l.scale, "offset": l.offset })),
         "resolution": resolution,
-        "crs": { "wkt": info.crs.wkt, "epsg": info.crs.epsg, "vertical_epsg": info.crs.vertical_epsg },
+        "crs": crs_json(info),
         "scans": info.parts.iter().map(part).collect::<Vec<_>>(),
         "attributes": info.attributes.iter().map(attribute_json).collect::<Vec<_>>(),
         "pieces": scan.pieces().len(),
@@ -161,6 +177,23 @@ fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
         });
     }
     object
+}
+
+/// What the file declares, and what it comes to: name, definition for viewers, units.
+fn crs_json(info: &ScanInfo) -> Value {
+    let crs = pointmill_converter::resolve_crs(&info.crs);
+    let unit = |unit: Option<Unit>| unit.map(|unit| json!({ "name": unit.to_string(), "metres": unit.metres() }));
+    json!({
+        "wkt": info.crs.wkt,
+        "epsg": info.crs.epsg,
+        "vertical_epsg": info.crs.vertical_epsg,
+        "name": crs.label,
+        "projection": crs.projection,
+        "is_geographic": crs.is_geographic(),
+        "unit": unit(crs.unit),
+        "vertical_unit": unit(crs.vertical_unit),
+        "warnings": crs.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
 }
 
 #[cfg(test)]

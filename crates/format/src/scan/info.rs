@@ -4,10 +4,10 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Aabb, Attribute, Lattice, ScanWarning};
+use crate::{Aabb, Attribute, AxisGrid, Lattice, ScanWarning, Unit};
 
 /// The coordinate reference system as the file declares it; nothing is derived.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Crs {
     /// OGC WKT text, as stored, without trailing zero bytes.
@@ -16,13 +16,29 @@ pub struct Crs {
     pub epsg: Option<u32>,
     /// EPSG code of the vertical system from GeoTIFF keys.
     pub vertical_epsg: Option<u32>,
+    /// Unit of x and y that GeoTIFF keys declare beside the code; it goes before the unit of `epsg`.
+    pub unit: Option<Unit>,
+    /// Unit of z that GeoTIFF keys declare beside the code; it goes before the unit of `vertical_epsg`.
+    pub vertical_unit: Option<Unit>,
+    /// What GeoTIFF keys call the system, for people.
+    pub citation: Option<String>,
+    /// GeoTIFF keys define a projected or geographic system of their own, by parameters that are not read.
+    pub is_user_defined: bool,
+    /// There are WKT and GeoTIFF keys, and the file says that the keys count.
+    pub keys_first: bool,
 }
 
 impl Crs {
     /// What is known: WKT text, code of the (projected) system, code of the vertical one.
     #[must_use]
     pub fn new(wkt: Option<String>, epsg: Option<u32>, vertical_epsg: Option<u32>) -> Self {
-        Self { wkt, epsg, vertical_epsg }
+        Self { wkt, epsg, vertical_epsg, ..Self::default() }
+    }
+
+    /// The same with the units that GeoTIFF keys declare, of x and y, and of z.
+    #[must_use]
+    pub fn with_units(self, unit: Option<Unit>, vertical_unit: Option<Unit>) -> Self {
+        Self { unit, vertical_unit, ..self }
     }
 }
 
@@ -40,8 +56,8 @@ pub struct ScanInfo {
     pub bounds_declared: Option<Aabb>,
     /// The lattice of [`crate::Positions::Quantized`] batches; `None` for world coordinates.
     pub lattice: Option<Lattice>,
-    /// How finely the file stores world coordinates; meaningless for scans that have a lattice.
-    pub resolution: Resolution,
+    /// How finely the file stores world coordinates, per axis; meaningless for scans that have a lattice.
+    pub resolution: [Resolution; 3],
     /// The scans within the file, where its format knows such (E57, PTX); else empty.
     pub parts: Vec<ScanPart>,
     /// The columns beside the position, in order.
@@ -64,7 +80,7 @@ impl ScanInfo {
             points_declared,
             bounds_declared: None,
             lattice: None,
-            resolution: Resolution::default(),
+            resolution: [Resolution::default(); 3],
             parts: Vec::new(),
             attributes: [].into(),
             crs: Crs::default(),
@@ -88,7 +104,9 @@ impl ScanInfo {
 /// How finely coordinates are stored: steps below that carry nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Resolution {
-    /// In steps of that many world units (scaled integers, or single precision of a known range).
+    /// As these coordinates and no others (scaled integers), but for the rounding of doubles.
+    Grid(AxisGrid),
+    /// In steps of that many world units, anywhere (scaled integers that are turned, single precision of a known range).
     Step(f64),
     /// In single precision, as world coordinates: 24 bits, so the step grows with the distance from 0.
     Single,
