@@ -71,8 +71,14 @@ pub(crate) struct ConvertArgs {
           help_heading = "Selecting data")]
     pub(crate) bounds: Option<Aabb>,
     /// Keeps only points of these classes, for example 2,6 [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Selecting data")]
-    pub(crate) class: Option<Vec<u8>>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        allow_negative_numbers = true,
+        help_heading = "Selecting data"
+    )]
+    pub(crate) class: Option<Vec<i64>>,
     /// Keeps every Nth point, by index in the file
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..),
           help_heading = "Selecting data")]

@@ -1,6 +1,7 @@
 //! The program as a user meets it: commands, exit codes, what is written and, above all, what is left alone.
 
 mod arguments;
+mod attributes;
 mod bad_input;
 mod bad_output;
 mod batches;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use pointmill_format::{Aabb, Changes, DatasetKind, ReadError, ScanWarning, Unit};
+use pointmill_format::{Aabb, AttributeType, Changes, DatasetKind, ReadError, ScanWarning, Unit};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::advice::Advice;
@@ -109,10 +109,19 @@ pub enum Warning {
     ValuesChanged {
         /// Its name.
         attribute: String,
-        /// The format that cannot hold them; `None`: they changed while they were read.
-        output: Option<DatasetKind>,
+        /// The format that cannot hold them, and the type that it has; `None`: they changed while they were read.
+        output: Option<(DatasetKind, AttributeType)>,
         /// How many, by what became of them.
         changes: Changes,
+    },
+    /// Two attributes of one name cannot be one.
+    AttributesApart {
+        /// The name.
+        name: String,
+        /// Elements of the first and of the second.
+        elements: [usize; 2],
+        /// The name that the second gets.
+        other: String,
     },
     /// Some files, or some scans of a file, have no values of attributes that others have.
     ValuesMissing {
@@ -261,6 +270,7 @@ impl Warning {
             Self::OriginPoints { .. } => "origin_points",
             Self::SharedPlace { .. } => "shared_place",
             Self::ValuesChanged { .. } => "values_changed",
+            Self::AttributesApart { .. } => "attributes_apart",
             Self::ValuesMissing { .. } => "values_missing",
             Self::MixedRgbDepth { .. } => "mixed_rgb_depth",
             Self::Crs(_) => "crs",
@@ -320,9 +330,12 @@ impl Warning {
             ),
             Self::SharedPlace { position, points, of, more, .. } => shared_place(*position, *points, *of, *more),
             Self::ValuesChanged { attribute, output: None, changes } => format!("{attribute}: {changes}"),
-            Self::ValuesChanged { attribute, output: Some(kind), changes } => {
-                format!("{}: {attribute}: {changes}", kind.name())
+            Self::ValuesChanged { attribute, output: Some((kind, ty)), changes } => {
+                format!("{}: {attribute}, stored as {ty}: {changes}", kind.name())
             }
+            Self::AttributesApart { name, elements: [one, two], other } => format!(
+                "the inputs have two attributes {name:?}, of {one} and of {two} elements a point; the second is {other:?}"
+            ),
             Self::ValuesMissing { attributes, points, files } => missing(attributes, *points, *files),
             Self::MixedRgbDepth { eight_bit, coloured, first } => format!(
                 "{eight_bit} of {coloured} inputs with colour have no value above 255 and are taken as 8 bits deep, \

@@ -3,7 +3,7 @@
 use pointmill_format::Wanted;
 
 use crate::plan::Plan;
-use crate::sources::{Schema, Sources};
+use crate::sources::{Recast, Schema, Sources};
 
 /// The attributes that are read, and where each source has them.
 pub(crate) struct Intake {
@@ -19,6 +19,8 @@ pub(crate) struct Intake {
 pub(crate) struct SourceIntake {
     /// Where each of its columns goes in the schema; `None`: no output needs it.
     pub(crate) columns: Vec<Option<usize>>,
+    /// Which columns do not go there as they were read.
+    pub(crate) recasts: Vec<(usize, Recast)>,
     /// The columns to decode: those, and what the filter looks at.
     pub(crate) wanted: Wanted,
 }
@@ -38,11 +40,13 @@ impl Intake {
         let unread = all.attributes.iter().zip(needed).filter(|(_, needed)| !**needed);
         let unread = unread.map(|(a, _)| a.name.clone()).collect();
         let of_source = |source: &crate::sources::Source| {
-            let columns: Vec<Option<usize>> = source.columns.iter().map(|c| places[*c]).collect();
+            let columns: Vec<Option<usize>> = source.columns.iter().map(|c| places[c.attribute]).collect();
+            let read = source.columns.iter().enumerate().filter(|(i, _)| columns[*i].is_some());
+            let recasts = read.filter_map(|(i, c)| Some((i, c.recast.clone()?))).collect();
             let attributes = &source.scan.info().attributes;
             let is_filtered = |i: usize| plan.filter.classes.is_some() && attributes[i].name == "classification";
             let wanted = columns.iter().enumerate().map(|(i, c)| c.is_some() || is_filtered(i)).collect::<Wanted>();
-            SourceIntake { columns, wanted }
+            SourceIntake { columns, recasts, wanted }
         };
         let of_sources = sources.all.iter().map(of_source).collect();
         Self { schema, unread, sources: of_sources }

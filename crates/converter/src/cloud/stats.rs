@@ -14,8 +14,12 @@ pub(crate) struct Stats {
     pub(crate) bounds: JobBounds,
     /// Range of each attribute of the schema.
     pub(crate) ranges: Vec<Range>,
-    /// Points by class.
+    /// Points by class, if classes have 8 bits.
     pub(crate) classes: Vec<u64>,
+    /// Classes that single precision does not hold as whole numbers.
+    pub(crate) odd_classes: Changes,
+    /// 64-bit integers that doubles do not hold: by attribute of the schema, empty where there are none.
+    pub(crate) doubled: Vec<Changes>,
     pub(crate) sources: Vec<SourceStats>,
     /// Of the records as they are stored.
     pub(crate) checksum: Checksum,
@@ -118,11 +122,18 @@ pub(crate) struct SourceStats {
 impl SourceStats {
     /// Adds to what changed of an attribute of the schema.
     pub(crate) fn count_changes(&mut self, attribute: usize, changes: &Changes) {
-        if self.changes.len() <= attribute {
-            self.changes.resize(attribute + 1, Changes::default());
-        }
-        self.changes[attribute].merge(changes);
+        count(&mut self.changes, attribute, changes);
     }
+}
+
+fn count(all: &mut Vec<Changes>, attribute: usize, changes: &Changes) {
+    if changes.is_empty() {
+        return;
+    }
+    if all.len() <= attribute {
+        all.resize(attribute + 1, Changes::default());
+    }
+    all[attribute].merge(changes);
 }
 
 /// Smallest and largest value of each element; NaN and infinities are not values.
@@ -251,6 +262,8 @@ impl Stats {
             bounds: JobBounds::EMPTY,
             ranges: schema.attributes.iter().map(|a| Range::new(a.elements)).collect(),
             classes: vec![0; 256],
+            odd_classes: Changes::default(),
+            doubled: Vec::new(),
             sources: vec![source; sources],
             checksum: Checksum::default(),
             change: Change::default(),
@@ -266,10 +279,17 @@ impl Stats {
         }
     }
 
+    /// Adds to the values of an attribute of the schema that doubles do not hold.
+    pub(crate) fn count_doubled(&mut self, attribute: usize, changes: &Changes) {
+        count(&mut self.doubled, attribute, changes);
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         self.bounds.union(&other.bounds);
         self.ranges.iter_mut().zip(&other.ranges).for_each(|(a, b)| a.merge(b));
         self.classes.iter_mut().zip(&other.classes).for_each(|(a, b)| *a += b);
+        self.odd_classes.merge(&other.odd_classes);
+        other.doubled.iter().enumerate().for_each(|(attribute, changes)| self.count_doubled(attribute, changes));
         for (a, b) in self.sources.iter_mut().zip(&other.sources) {
             a.read += b.read;
             a.kept += b.kept;

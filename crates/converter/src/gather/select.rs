@@ -60,7 +60,7 @@ pub(super) fn select(
         } else if filter
             .classes
             .as_ref()
-            .is_some_and(|c| !c.iter().any(|c| i64::from(*c) == classes.as_ref().map_or(0, |v| v[i])))
+            .is_some_and(|c| !classes.as_ref().map_or(Some(0), |v| v[i]).is_some_and(|class| c.contains(&class)))
         {
             stats.other_class += 1;
         } else {
@@ -70,10 +70,10 @@ pub(super) fn select(
     Ok(selection.len() < batch.len())
 }
 
-/// Classes of any type as whole numbers; what is none is no class, −1.
+/// Classes of any type as whole numbers; `None`: no whole number, and so no class.
 #[allow(clippy::unnecessary_cast)] // one body for every type of column
-fn whole_numbers(column: &Column) -> Vec<i64> {
-    with_column!(column, v => v.iter().map(|v| if (*v as i64) as f64 == *v as f64 { *v as i64 } else { -1 }).collect())
+fn whole_numbers(column: &Column) -> Vec<Option<i64>> {
+    with_column!(column, v => v.iter().map(|v| Some(*v as i64).filter(|class| *class as f64 == *v as f64)).collect())
 }
 
 fn world_bounds(lattice: Option<&Lattice>, positions: &Positions) -> Aabb {

@@ -3,6 +3,7 @@
 mod attributes;
 pub(crate) mod batches;
 pub(crate) mod bintree;
+mod number;
 mod origin;
 mod output;
 pub(crate) mod potree2;

@@ -80,7 +80,7 @@ pub struct Filter {
     /// Keep what lies inside or on the border, world coordinates.
     pub bounds: Option<Aabb>,
     /// Keep these classes; `None`: all.
-    pub classes: Option<Vec<u8>>,
+    pub classes: Option<Vec<i64>>,
     /// Keep points whose index in their file is a multiple of this; 0 and 1: all.
     pub every: u64,
     /// Points exactly at the origin of their scan.

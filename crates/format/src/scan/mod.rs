@@ -15,6 +15,9 @@ mod other_kind;
 #[cfg(feature = "text")]
 mod partial;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg_attr(not(all(feature = "e57", feature = "las", feature = "text")), allow(dead_code))]
+mod quantities;
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 mod unit;
 mod wanted;

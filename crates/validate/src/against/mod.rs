@@ -7,6 +7,7 @@
 
 pub(crate) mod block;
 mod exact;
+mod meaning;
 mod narrow;
 pub(crate) mod rules;
 mod selection;

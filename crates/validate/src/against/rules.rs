@@ -46,6 +46,8 @@ pub(crate) struct Rules {
     pub(crate) attributes: Vec<Attribute>,
     /// One for each of `attributes`.
     pub(crate) conversions: Vec<Conversion>,
+    /// 64-bit integers are stored as doubles, those beyond 2⁵³ rounded.
+    pub(crate) has_no_wide_integers: bool,
     /// Where `rgb` (uint16 × 3) stands among them.
     pub(crate) rgb: Option<usize>,
     /// The dataset has 8 bits a channel: each 16-bit value v of the rules below becomes (v · 255 + 32767) / 65535.
@@ -63,7 +65,7 @@ pub(crate) struct Rules {
     pub(crate) rgb_depth: RgbDepth,
     /// World coordinates, closed.
     pub(crate) bounds: Option<Aabb>,
-    pub(crate) classes: Option<Vec<u8>>,
+    pub(crate) classes: Option<Vec<i64>>,
     /// Indices in the file that are multiples of it; 1: all.
     pub(crate) every: u64,
     /// Points exactly at the origin of their scan are not in the dataset.
@@ -87,10 +89,11 @@ impl Rules {
             Some(&[x0, y0, z0, x1, y1, z1]) => Some(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] }),
             _ => None,
         };
-        let classes = numbers(&own["filter"]["classes"]).map(|c| c.iter().map(|v| *v as u8).collect());
+        let classes = numbers(&own["filter"]["classes"]).map(|c| c.iter().map(|v| *v as i64).collect());
         Self {
             conversions: vec![Conversion::AsStored; attributes.len()],
             attributes,
+            has_no_wide_integers: false,
             rgb,
             rgb_as_bytes: false,
             compare_positions: true,

@@ -61,7 +61,9 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
             let attributes = metadata.attributes.iter().map(|a| a.attribute.clone());
             let attributes = attributes.filter(|a| a.name != "position").collect();
             let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
-            Some(Against::open(paths, &options.open, Rules::new(attributes, metadata.lattice, own))?)
+            let mut rules = Rules::new(attributes, metadata.lattice, own);
+            rules.has_no_wide_integers = true;
+            Some(Against::open(paths, &options.open, rules)?)
         }
     };
 

@@ -1,7 +1,5 @@
 //! What can be chosen of quantised batches.
 
-use pointmill_format::AttributeType;
-
 use crate::sources::Schema;
 
 /// Settings of quantised batches (`docs/formats/batches.md`).
@@ -25,12 +23,6 @@ impl Default for BatchesSettings {
 
 /// What batches are coloured by: the colour, else the intensity.
 pub(super) fn colour_of(schema: &Schema) -> Option<usize> {
-    let intensity = || {
-        let is_usual = |&i: &usize| {
-            let a = &schema.attributes[i];
-            a.elements == 1 && matches!(a.ty, AttributeType::UInt16 | AttributeType::UInt8 | AttributeType::Float32)
-        };
-        schema.find("intensity").filter(is_usual)
-    };
+    let intensity = || schema.find("intensity").filter(|&i| schema.attributes[i].elements == 1);
     schema.rgb().or_else(intensity)
 }

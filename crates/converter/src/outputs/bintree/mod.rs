@@ -21,8 +21,8 @@ mod upper;
 
 use std::io::BufWriter;
 
-use pointmill_format::DatasetKind;
 use pointmill_format::bintree::{CORE_BYTES, Header, INDEX_FILE, IndexWriter, Layout, Node};
+use pointmill_format::{AttributeType, DatasetKind};
 use serde_json::{Map, Value};
 
 pub use self::settings::BintreeSettings;
@@ -33,6 +33,7 @@ use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
 use self::subtree::{Builder, Built};
 use self::upper::Upper;
+use super::attributes::changed;
 use super::origin::own_key;
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
@@ -121,7 +122,13 @@ impl Output for BintreeSettings {
         let index_bytes = write_index(cloud, self, &columns, &nodes, to)?;
         let (tree, details) = figures(&nodes);
         let leaves = nodes.iter().filter(|n| n.is_leaf()).count();
+        let odd = class_of(cloud.schema()).and_then(|class| {
+            let (attribute, changes) = (&cloud.schema().attributes[class], &cloud.stats.odd_classes);
+            changed(self.kind(), attribute, AttributeType::Float32, changes)
+        });
+        let (attributes_changed, mut warnings): (Vec<_>, Vec<_>) = odd.into_iter().unzip();
         let is_many = self.layout == Layout::Files && leaves > MANY_FILES;
+        warnings.extend(is_many.then_some(Warning::ManyFiles { leaves }));
         Ok(OutputReport {
             points: ledger.points(),
             attributes: columns.names(),
@@ -130,7 +137,8 @@ impl Output for BintreeSettings {
             checksum: ledger.unaltered().to_string(),
             tree,
             details,
-            warnings: is_many.then_some(Warning::ManyFiles { leaves }).into_iter().collect(),
+            attributes_changed,
+            warnings,
             ..OutputReport::default()
         })
     }
