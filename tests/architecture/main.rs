@@ -31,7 +31,13 @@ const LAYERS: [(&str, Layers<'static>); 4] = [
     ),
     (
         "pointmill-validate",
-        &[&["check", "place"], &["finding"], &["options", "outcome"], &["against"], &["potree2", "bintree", "batches"]],
+        &[
+            &["check", "place"],
+            &["finding"],
+            &["options", "accuracy", "outcome"],
+            &["against"],
+            &["potree2", "bintree", "batches"],
+        ],
     ),
     (
         "pointmill-converter",

@@ -57,8 +57,8 @@ pub use plan::{
 };
 pub use reason::{GridReason, LatticeBasis, LatticeReason};
 pub use report::{
-    CoordinateChange, DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport,
-    PointsReport, Report, TreeReport,
+    Accuracy, DropReason, DroppedAttribute, Estimate, GridReport, How, InputReport, Integers, Merged, Metres,
+    OutputReport, PhaseReport, PointsReport, PositionErrors, Report, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
 pub use warning::{CrsNote, Proj4Fault, Warning};

@@ -26,6 +26,8 @@ pub(crate) struct Stats {
     pub(crate) thinned: u64,
     pub(crate) invalid: u64,
     pub(crate) unreadable: u64,
+    /// Points whose integers in their scan do not come back from the job lattice.
+    pub(crate) integers_lost: u64,
     /// 64-bit integers that a double does not hold exactly.
     pub(crate) rounded_values: u64,
     pub(crate) warnings: Vec<Warning>,
@@ -35,15 +37,19 @@ pub(crate) struct Stats {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Change {
     pub(crate) max: [f64; 3],
+    pub(crate) sum: [f64; 3],
     pub(crate) sum_of_squares: [f64; 3],
+    pub(crate) max_squared_3d: f64,
 }
 
 impl Change {
     pub(crate) fn merge(&mut self, other: &Self) {
         for a in 0..3 {
             self.max[a] = self.max[a].max(other.max[a]);
+            self.sum[a] += other.sum[a];
             self.sum_of_squares[a] += other.sum_of_squares[a];
         }
+        self.max_squared_3d = self.max_squared_3d.max(other.max_squared_3d);
     }
 }
 
@@ -189,6 +195,7 @@ impl Stats {
             thinned: 0,
             invalid: 0,
             unreadable: 0,
+            integers_lost: 0,
             rounded_values: 0,
             warnings: Vec::new(),
         }
@@ -213,6 +220,7 @@ impl Stats {
         self.thinned += other.thinned;
         self.invalid += other.invalid;
         self.unreadable += other.unreadable;
+        self.integers_lost += other.integers_lost;
         self.rounded_values += other.rounded_values;
         self.warnings.extend_from_slice(&other.warnings);
         self.warnings.sort_by_cached_key(Warning::to_string);

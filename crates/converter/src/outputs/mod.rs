@@ -6,6 +6,7 @@ pub(crate) mod bintree;
 mod origin;
 mod output;
 pub(crate) mod potree2;
+mod recovery;
 mod staging;
 
 pub(crate) use attributes::choose as choose_attributes;

@@ -3,7 +3,7 @@
 use pointmill_format::{Aabb, DatasetKind};
 use serde_json::{Map, Value, json};
 
-use super::types::{CoordinateChange, GridReport, InputReport, OutputReport, PhaseReport, PointsReport, Report};
+use super::types::{GridReport, InputReport, OutputReport, PhaseReport, PointsReport, Report};
 use crate::cloud::{Cloud, Cube, JobLattice};
 use crate::error::ConvertError;
 use crate::memory;
@@ -27,7 +27,6 @@ pub(crate) struct Account {
 /// Points that do not add up.
 pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
     let stats = &cloud.stats;
-    let count = stats.points.max(1) as f64;
     let Account { settings, outputs, phases, seconds } = account;
     let of_outputs = outputs.iter().flat_map(|o| &o.warnings);
     Ok(Report {
@@ -36,10 +35,6 @@ pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, Conv
         inputs: input_reports(cloud.sources, Some(cloud)),
         grid: grid_report(&cloud.lattice, cloud.is_lossless, &cloud.frame.cube),
         points: points_report(cloud, &outputs)?,
-        coordinate_change: CoordinateChange {
-            max: stats.change.max,
-            rms: stats.change.sum_of_squares.map(|s| (s / count).sqrt()),
-        },
         checksum_in: stats.checksum.to_string(),
         temp_bytes: cloud.store.spilled_bytes(),
         output_bytes: outputs.iter().map(|o| o.bytes).sum(),

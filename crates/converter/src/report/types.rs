@@ -6,6 +6,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::accuracy::Accuracy;
 use crate::reason::GridReason;
 use crate::warning::Warning;
 
@@ -23,8 +24,6 @@ pub struct Report {
     pub grid: GridReport,
     /// Every point accounted for.
     pub points: PointsReport,
-    /// Largest and RMS change of a coordinate, per axis, world units.
-    pub coordinate_change: CoordinateChange,
     /// One entry per dataset written, in the order requested.
     pub outputs: Vec<OutputReport>,
     /// Order-independent checksum of the points that passed the filter; that of every output equals it, or the run fails.
@@ -55,6 +54,8 @@ pub struct OutputReport {
     pub points: u64,
     /// Points that were dropped because all of their values repeat.
     pub duplicates_dropped: u64,
+    /// How far the positions that a reader decodes are from those of the sources.
+    pub accuracy: Accuracy,
     /// Attributes that were kept.
     pub attributes: Vec<String>,
     /// Attributes that were omitted, and why.
@@ -136,16 +137,6 @@ pub struct PointsReport {
     pub invalid: u64,
     /// Declared, but in parts of inputs that could not be decoded.
     pub unreadable: u64,
-}
-
-/// Coordinate change by moving to the output lattice.
-#[derive(Debug, Clone, Default, Serialize)]
-#[non_exhaustive]
-pub struct CoordinateChange {
-    /// Largest, world units.
-    pub max: [f64; 3],
-    /// Root of the mean square, world units.
-    pub rms: [f64; 3],
 }
 
 /// An attribute that is not in the dataset. Serialises to its name, why as text, and the constant if there is one.

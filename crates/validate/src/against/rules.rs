@@ -124,6 +124,28 @@ impl Rules {
         let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
         (steps.round() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
     }
+
+    /// The job lattice's point next to a world coordinate.
+    #[inline]
+    pub(crate) fn nearest(&self, axis: usize, world: f64) -> f64 {
+        self.job_world(axis, ((world - self.lattice_offset[axis]) / self.lattice.scale[axis]).round())
+    }
+
+    /// The dataset's integer next to a decoded coordinate.
+    pub(crate) fn steps(&self, axis: usize, decoded: f64) -> i64 {
+        ((decoded - self.lattice.offset[axis]) / self.lattice.scale[axis]).round() as i64
+    }
+
+    /// World coordinate of a point of the job lattice.
+    #[inline]
+    pub(crate) fn job_world(&self, axis: usize, steps: f64) -> f64 {
+        steps * self.lattice.scale[axis] + self.lattice_offset[axis]
+    }
+
+    /// World coordinates, on the job lattice, of the dataset's integers.
+    pub(crate) fn meant(&self, stored: [i64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|a| self.job_world(a, (stored[a] + self.shift[a]) as f64))
+    }
 }
 
 /// The grey of `v` among values from `lo` to `hi`.

@@ -144,12 +144,16 @@ impl Source {
     fn fill(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
         block.reset(rules.attributes.len());
         block.keep.resize(points, true);
+        block.moved.lost.resize(points, false);
+        block.moved.first = batch.first_point + start as u64;
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
         if let Some(stored) = &rules.stored {
             for i in 0..points {
-                let words = stored.stored(block.position(i));
+                let step = block.position(i);
+                let words = stored.stored(step);
+                block.moved.steps.push(step);
                 words.into_iter().enumerate().for_each(|(axis, word)| block.positions[axis][i] = word);
             }
         }
@@ -194,7 +198,16 @@ impl Source {
         block: &mut Block,
     ) {
         let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
+        let lattice = self.scan.info().lattice;
         let mut take = |i: usize, world: f64| {
+            let moved = &mut block.moved;
+            let nearest = rules.nearest(axis, world);
+            moved.world[axis].push(world);
+            moved.lattice[axis].push(nearest - world);
+            if let Some(own) = &lattice {
+                let steps = |v: f64| ((v - own.offset[axis]) / own.scale[axis]).round();
+                moved.lost[i] |= steps(nearest) != steps(world);
+            }
             let (rounded, truncated) = rules.quantize(axis, world);
             block.positions[axis].push(rounded);
             if rules.foreign {
@@ -203,7 +216,7 @@ impl Source {
             // a point without a finite position is none
             block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
         };
-        match (&batch.positions, self.scan.info().lattice) {
+        match (&batch.positions, lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();

@@ -1,0 +1,89 @@
+//! The accuracy of an output in one line.
+
+use pointmill_converter::{Accuracy, OutputReport, PositionErrors, Report};
+
+use super::quantities::{at_most, count, number, plural};
+
+/// What a reader of the output decodes, against the sources.
+pub(crate) fn line(output: &OutputReport, report: &Report) -> String {
+    let accuracy = &output.accuracy;
+    let mut parts = vec![positions(accuracy, report)];
+    parts.extend(metres(accuracy));
+    parts.extend(integers(accuracy));
+    parts.extend(merged(accuracy));
+    parts.push(format!("step {}", steps(&report.grid.scale)));
+    format!("{}: {}", output.format, parts.join("; "))
+}
+
+/// How far decoded positions are from those of the sources. Only what is the same is called unchanged.
+fn positions(accuracy: &Accuracy, report: &Report) -> String {
+    let total = &accuracy.total;
+    let all_there = accuracy.integers.same == accuracy.integers.points && accuracy.merged.lattice.unwrap_or(0) == 0;
+    if total.is_zero() && all_there {
+        return "coordinates are unchanged".to_owned();
+    }
+    if is_rounding(total, report) && all_there {
+        return format!("coordinates are unchanged to the rounding of doubles, at most {}", at_most(total.max_3d));
+    }
+    let by_axis = |v: [f64; 3]| v.map(at_most).join(" ");
+    let mut text = format!(
+        "decoded coordinates are off by at most {} (by axis {}), root mean square {}, mean {}",
+        at_most(total.max_3d),
+        by_axis(total.max),
+        at_most(total.rms_3d),
+        total.mean.map(three_digits).join(" "),
+    );
+    let (lattice, format) = (&accuracy.lattice, &accuracy.format);
+    let parts = [(lattice, "by the lattice"), (format, "by the format")];
+    let large: Vec<_> = parts.iter().filter(|(errors, _)| !is_rounding(errors, report)).collect();
+    match large.as_slice() {
+        [(_, by)] => text += &format!(", {by}"),
+        _ => text += &format!(": {} by the lattice, {} by the format", at_most(lattice.max_3d), at_most(format.max_3d)),
+    }
+    text
+}
+
+/// True if no coordinate differs by more than doubles of its size are rounded: 0.07 as a double and 7 steps of 0.01
+/// differ in the last bits.
+fn is_rounding(errors: &PositionErrors, report: &Report) -> bool {
+    let bounds = || report.inputs.iter().filter_map(|input| input.bounds_measured);
+    (0..3).all(|a| {
+        let farthest = bounds().map(|b| b[a].abs().max(b[a + 3].abs())).fold(0.0, f64::max);
+        errors.max[a] <= (report.grid.scale[a] * 1e-3).min(farthest * 4.0 * f64::EPSILON)
+    })
+}
+
+fn metres(accuracy: &Accuracy) -> Option<String> {
+    let total = accuracy.metres?.total;
+    (!total.is_zero())
+        .then(|| format!("in metres at most {} ({})", at_most(total.max_3d), total.max.map(at_most).join(" ")))
+}
+
+fn integers(accuracy: &Accuracy) -> Option<String> {
+    let integers = accuracy.integers;
+    if accuracy.total.is_zero() && integers.same == integers.points {
+        return None;
+    }
+    Some(match integers.points - integers.same {
+        0 => "all integers come back".to_owned(),
+        lost => format!("integers of {} of {} do not come back", count(lost), plural(integers.points, "point")),
+    })
+}
+
+fn merged(accuracy: &Accuracy) -> Option<String> {
+    let points = accuracy.merged.lattice.unwrap_or(0) + accuracy.merged.format.unwrap_or(0);
+    (points > 0).then(|| format!("{} fell together with others", plural(points, "point")))
+}
+
+/// One step if all axes have the same.
+fn steps(scale: &[f64; 3]) -> String {
+    match scale {
+        [x, y, z] if x == y && y == z => number(*x),
+        _ => scale.map(number).join(" "),
+    }
+}
+
+/// To the nearest, with three digits.
+fn three_digits(v: f64) -> String {
+    format!("{v:.2e}").parse().map_or_else(|_| v.to_string(), number)
+}
