@@ -1,13 +1,13 @@
 //! The accuracy of an output in one line.
 
-use pointmill_converter::{Accuracy, OutputReport, PositionErrors, Report};
+use pointmill_converter::{Accuracy, OutputReport, Report};
 
 use super::quantities::{at_most, count, number, plural};
 
 /// What a reader of the output decodes, against the sources.
 pub(crate) fn line(output: &OutputReport, report: &Report) -> String {
     let accuracy = &output.accuracy;
-    let mut parts = vec![positions(accuracy, report)];
+    let mut parts = vec![positions(accuracy)];
     parts.extend(metres(accuracy));
     parts.extend(integers(accuracy));
     parts.extend(merged(accuracy));
@@ -16,13 +16,13 @@ pub(crate) fn line(output: &OutputReport, report: &Report) -> String {
 }
 
 /// How far decoded positions are from those of the sources. Only what is the same is called unchanged.
-fn positions(accuracy: &Accuracy, report: &Report) -> String {
+fn positions(accuracy: &Accuracy) -> String {
     let total = &accuracy.total;
-    let all_there = accuracy.integers.same == accuracy.integers.points && accuracy.merged.lattice.unwrap_or(0) == 0;
+    let all_there = accuracy.integers.same == accuracy.integers.points && accuracy.merged.lattice == Some(0);
     if total.is_zero() && all_there {
         return "coordinates are unchanged".to_owned();
     }
-    if is_rounding(total, report) && all_there {
+    if total.is_rounding() && all_there {
         return format!("coordinates are unchanged to the rounding of doubles, at most {}", at_most(total.max_3d));
     }
     let by_axis = |v: [f64; 3]| v.map(at_most).join(" ");
@@ -35,22 +35,12 @@ fn positions(accuracy: &Accuracy, report: &Report) -> String {
     );
     let (lattice, format) = (&accuracy.lattice, &accuracy.format);
     let parts = [(lattice, "by the lattice"), (format, "by the format")];
-    let large: Vec<_> = parts.iter().filter(|(errors, _)| !is_rounding(errors, report)).collect();
+    let large: Vec<_> = parts.iter().filter(|(errors, _)| !errors.is_rounding()).collect();
     match large.as_slice() {
         [(_, by)] => text += &format!(", {by}"),
         _ => text += &format!(": {} by the lattice, {} by the format", at_most(lattice.max_3d), at_most(format.max_3d)),
     }
     text
-}
-
-/// True if no coordinate differs by more than doubles of its size are rounded: 0.07 as a double and 7 steps of 0.01
-/// differ in the last bits.
-fn is_rounding(errors: &PositionErrors, report: &Report) -> bool {
-    let bounds = || report.inputs.iter().filter_map(|input| input.bounds_measured);
-    (0..3).all(|a| {
-        let farthest = bounds().map(|b| b[a].abs().max(b[a + 3].abs())).fold(0.0, f64::max);
-        errors.max[a] <= (report.grid.scale[a] * 1e-3).min(farthest * 4.0 * f64::EPSILON)
-    })
 }
 
 fn metres(accuracy: &Accuracy) -> Option<String> {

@@ -55,10 +55,11 @@ pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
     AttributeChoice, Duplicates, Filter, OnFault, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
 };
-pub use reason::{GridReason, LatticeBasis, LatticeReason};
+pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
-    Accuracy, DropReason, DroppedAttribute, Estimate, GridReport, How, InputReport, Integers, Merged, Metres,
-    OutputReport, PhaseReport, PointsReport, PositionErrors, Report, TreeReport,
+    Accuracy, AttributeReport, ChangedAttribute, ChangedValues, DropReason, DroppedAttribute, Estimate, GridReport,
+    How, InputReport, Integers, Merged, Metres, MissingValues, OutputReport, PhaseReport, PointsReport, PositionErrors,
+    Report, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
 pub use warning::{CrsNote, Proj4Fault, Warning};

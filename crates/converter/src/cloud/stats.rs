@@ -1,6 +1,6 @@
 //! What the pass over the points learns: bounds, ranges, counts and the checksum.
 
-use pointmill_format::{Aabb, Column, with_column};
+use pointmill_format::{Aabb, Changes, Column, with_column};
 
 use super::checksum::Checksum;
 use super::frames::JobBounds;
@@ -28,21 +28,61 @@ pub(crate) struct Stats {
     pub(crate) unreadable: u64,
     /// Points whose integers in their scan do not come back from the job lattice.
     pub(crate) integers_lost: u64,
-    /// 64-bit integers that a double does not hold exactly.
-    pub(crate) rounded_values: u64,
+    /// Some point moved to the job lattice by more than doubles of its coordinates are rounded.
+    pub(crate) moves: bool,
     pub(crate) warnings: Vec<Warning>,
 }
 
-/// Coordinate change by moving to the job lattice, world units: sums over points.
+/// Coordinate change by moving to the job lattice (job minus source), world units, over the points that go in.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Change {
+    /// Largest magnitude.
     pub(crate) max: [f64; 3],
+    /// Signed: the bias, once divided by the number of points.
     pub(crate) sum: [f64; 3],
     pub(crate) sum_of_squares: [f64; 3],
+    /// Largest square of the distance that a point moved.
     pub(crate) max_squared_3d: f64,
 }
 
 impl Change {
+    /// Adds `points` points, with the change of each axis: the same for all, or a column of it.
+    pub(crate) fn add(&mut self, points: usize, axes: [Result<f64, &[f64]>; 3]) {
+        for (a, axis) in axes.iter().enumerate() {
+            match axis {
+                Ok(by) => {
+                    self.max[a] = self.max[a].max(by.abs());
+                    self.sum[a] += by * points as f64;
+                    self.sum_of_squares[a] += by * by * points as f64;
+                }
+                Err(column) => {
+                    let (mut max, mut sum, mut squares) = (0.0f64, 0.0, 0.0);
+                    for v in *column {
+                        max = max.max(v.abs());
+                        sum += v;
+                        squares += v * v;
+                    }
+                    self.max[a] = self.max[a].max(max);
+                    self.sum[a] += sum;
+                    self.sum_of_squares[a] += squares;
+                }
+            }
+        }
+        if axes.iter().all(Result::is_ok) {
+            let squared = axes.iter().map(|a| a.unwrap_or_default().powi(2)).sum();
+            self.max_squared_3d = self.max_squared_3d.max(squared);
+            return;
+        }
+        let at = |axis: &Result<f64, &[f64]>, i: usize| match axis {
+            Ok(by) => *by,
+            Err(column) => column[i],
+        };
+        for i in 0..points {
+            let squared = axes.iter().map(|axis| at(axis, i).powi(2)).sum();
+            self.max_squared_3d = self.max_squared_3d.max(squared);
+        }
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         for a in 0..3 {
             self.max[a] = self.max[a].max(other.max[a]);
@@ -62,10 +102,25 @@ pub(crate) struct SourceStats {
     pub(crate) kept: u64,
     /// World coordinates, before any filter.
     pub(crate) bounds: Aabb,
+    /// Axes on which a point contradicts the grid that the file, or a sample, claims.
+    pub(crate) off_grid: [bool; 3],
     /// Range of the colour of the points that go in.
     pub(crate) rgb: Range,
     /// Range of the colour of batches that the filter cut, points that it omitted included.
     pub(crate) rgb_unfiltered: Range,
+    /// Values that could not stay as they were, of all points that were read: by attribute of the schema, empty where
+    /// there are none.
+    pub(crate) changes: Vec<Changes>,
+}
+
+impl SourceStats {
+    /// Adds to what changed of an attribute of the schema.
+    pub(crate) fn count_changes(&mut self, attribute: usize, changes: &Changes) {
+        if self.changes.len() <= attribute {
+            self.changes.resize(attribute + 1, Changes::default());
+        }
+        self.changes[attribute].merge(changes);
+    }
 }
 
 /// Smallest and largest value of each element; NaN and infinities are not values.
@@ -180,8 +235,15 @@ floats!(f32, f64);
 
 impl Stats {
     pub(crate) fn new(schema: &Schema, sources: usize) -> Self {
-        let source =
-            SourceStats { read: 0, kept: 0, bounds: Aabb::EMPTY, rgb: Range::new(3), rgb_unfiltered: Range::new(3) };
+        let source = SourceStats {
+            read: 0,
+            kept: 0,
+            bounds: Aabb::EMPTY,
+            off_grid: [false; 3],
+            rgb: Range::new(3),
+            rgb_unfiltered: Range::new(3),
+            changes: Vec::new(),
+        };
         Self {
             bounds: JobBounds::EMPTY,
             ranges: schema.attributes.iter().map(|a| Range::new(a.elements)).collect(),
@@ -196,7 +258,7 @@ impl Stats {
             invalid: 0,
             unreadable: 0,
             integers_lost: 0,
-            rounded_values: 0,
+            moves: false,
             warnings: Vec::new(),
         }
     }
@@ -209,8 +271,10 @@ impl Stats {
             a.read += b.read;
             a.kept += b.kept;
             a.bounds = a.bounds.union(&b.bounds);
+            a.off_grid = std::array::from_fn(|axis| a.off_grid[axis] || b.off_grid[axis]);
             a.rgb.merge(&b.rgb);
             a.rgb_unfiltered.merge(&b.rgb_unfiltered);
+            b.changes.iter().enumerate().for_each(|(attribute, changes)| a.count_changes(attribute, changes));
         }
         self.checksum.merge(&other.checksum);
         self.change.merge(&other.change);
@@ -221,7 +285,7 @@ impl Stats {
         self.invalid += other.invalid;
         self.unreadable += other.unreadable;
         self.integers_lost += other.integers_lost;
-        self.rounded_values += other.rounded_values;
+        self.moves |= other.moves;
         self.warnings.extend_from_slice(&other.warnings);
         self.warnings.sort_by_cached_key(Warning::to_string);
     }
@@ -230,6 +294,19 @@ impl Stats {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn changes_add_up_by_axis_and_in_space() {
+        let mut change = Change::default();
+        change.add(2, [Ok(0.5), Err(&[3.0, -1.0]), Err(&[4.0, 0.0])]);
+        let mut other = Change::default();
+        other.add(1, [Ok(-1.0), Ok(0.0), Ok(0.0)]);
+        change.merge(&other);
+        assert_eq!(change.max, [1.0, 3.0, 4.0]);
+        assert_eq!(change.sum, [0.0, 2.0, 4.0]);
+        assert_eq!(change.sum_of_squares, [1.5, 10.0, 16.0]);
+        assert_eq!(change.max_squared_3d, 25.25);
+    }
 
     #[test]
     fn ranges_skip_what_is_not_a_number_and_say_so() {

@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-use pointmill_format::{PointBatch, Positions};
+use pointmill_format::{Changes, PointBatch, Positions};
 
-use super::axis::SourceMap;
+use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{CellParts, Context};
-use super::{partition, ranges, select};
+use super::{moved, partition, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
 use crate::runtime::os_hints;
@@ -31,6 +31,7 @@ pub(super) struct Worker<'a> {
     pub(super) stats: Stats,
     parts: CellParts,
     q: JobColumns,
+    change: [Vec<f64>; 3],
     selection: Vec<u32>,
     cells: Vec<u64>,
     grouping: Grouping,
@@ -51,6 +52,7 @@ impl<'a> Worker<'a> {
             stats: Stats::new(&pass.intake.schema, pass.sources.all.len()),
             parts: CellParts::default(),
             q: JobColumns::default(),
+            change: Default::default(),
             selection: Vec::new(),
             cells: Vec::new(),
             grouping: Grouping::default(),
@@ -69,8 +71,9 @@ impl<'a> Worker<'a> {
     pub(super) fn take(&mut self, source: usize, batch: &PointBatch) -> Result<(), ConvertError> {
         let filtered = select::select(self.pass, source, batch, &mut self.stats, &mut self.selection)?;
         self.stats.sources[source].read += batch.len() as u64;
+        self.note_changes(source, batch);
         let stored;
-        let batch = match self.as_stored(batch) {
+        let batch = match self.as_stored(source, batch) {
             Some(other) => {
                 stored = other;
                 &stored
@@ -106,20 +109,32 @@ impl<'a> Worker<'a> {
         outcome
     }
 
+    /// Adds what the reader could not keep.
+    fn note_changes(&mut self, source: usize, batch: &PointBatch) {
+        for (column, changes) in batch.changes() {
+            if let Some(place) = self.pass.intake.sources[source].columns[column] {
+                self.stats.sources[source].count_changes(place, changes);
+            }
+        }
+    }
+
     /// The batch with columns of the types that are stored, if these differ from what was read.
-    fn as_stored(&mut self, batch: &PointBatch) -> Option<PointBatch> {
+    fn as_stored(&mut self, source: usize, batch: &PointBatch) -> Option<PointBatch> {
         let mut stored: Option<PointBatch> = None;
         for (i, column) in batch.columns.iter().enumerate() {
             if let Some((doubles, rounded)) = as_doubles(column) {
                 stored.get_or_insert_with(|| batch.clone()).columns[i] = doubles;
-                self.stats.rounded_values += rounded;
+                if let Some(place) = self.pass.intake.sources[source].columns[i] {
+                    let changes = Changes { rounded, ..Changes::default() };
+                    self.stats.sources[source].count_changes(place, &changes);
+                }
             }
         }
         stored
     }
 
     fn take_slice(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> Result<(), ConvertError> {
-        let bounds = quantize(&self.pass.maps[source], batch, rows, &mut self.q, &mut self.stats);
+        let bounds = self.quantize(source, batch, rows);
         self.stats.bounds.union(&bounds);
         if !self.pass.partition.holds(&bounds) {
             self.pass.misled.store(true, Ordering::Relaxed);
@@ -201,6 +216,40 @@ impl<'a> Worker<'a> {
         }
     }
 
+    /// Puts the positions of some rows on the job lattice, measures how far they move, and returns their bounds there.
+    fn quantize(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> JobBounds {
+        let map = &self.pass.maps[source];
+        let mut bounds = JobBounds::EMPTY;
+        let mut moved = [Moved::By(0.0); 3];
+        for a in 0..3 {
+            let (q, change) = (&mut self.q.0[a], &mut self.change[a]);
+            q.clear();
+            change.clear();
+            moved[a] = quantize_axis(map, a, &batch.positions, rows, q, change);
+            bounds.min[a] = q.iter().copied().min().unwrap_or(i64::MAX);
+            bounds.max[a] = q.iter().copied().max().unwrap_or(i64::MIN);
+        }
+        let points = self.q.len();
+        let axes = std::array::from_fn(|a| match moved[a] {
+            Moved::By(by) => Ok(by),
+            Moved::Each => Err(&self.change[a][..]),
+        });
+        self.stats.change.add(points, axes);
+        if let Some(own) = &self.pass.sources.all[source].scan.info().lattice {
+            self.stats.integers_lost += moved::integers_lost(&axes, own, points);
+        }
+        if !self.stats.moves {
+            self.stats.moves = moved::is_more_than_rounding(&axes, &self.q, &bounds, &self.pass.lattice);
+        }
+        for (a, by) in axes.iter().enumerate().filter(|(a, _)| self.pass.claims[source][*a]) {
+            let rounding = self.pass.rounding(source, a, &bounds);
+            if by.is_err_and(|column| column.iter().any(|v| v.abs() > rounding)) {
+                self.stats.sources[source].off_grid[a] = true;
+            }
+        }
+        bounds
+    }
+
     fn note_segments(&mut self, block: u32, mut start: u32) {
         let mut first = 0;
         for &(cell, count) in &self.grouping.groups {
@@ -221,28 +270,24 @@ enum Rows<'a> {
     Selected(&'a [u32]),
 }
 
-/// Puts the positions of some rows on the job lattice and returns their bounds there.
-fn quantize(map: &SourceMap, batch: &PointBatch, rows: &Rows<'_>, q: &mut JobColumns, stats: &mut Stats) -> JobBounds {
-    let mut bounds = JobBounds::EMPTY;
-    for a in 0..3 {
-        let q = &mut q.0[a];
-        q.clear();
-        let (max, squares) = match (&batch.positions, rows) {
-            (Positions::Quantized(p), Rows::Consecutive(r)) => map.axes[a].map_integers(&p[a][r.clone()], q),
-            (Positions::World(p), Rows::Consecutive(r)) => map.axes[a].map_world(&p[a][r.clone()], q),
-            (Positions::Quantized(p), Rows::Selected(s)) => {
-                let chosen: Vec<i32> = s.iter().map(|i| p[a][*i as usize]).collect();
-                map.axes[a].map_integers(&chosen, q)
-            }
-            (Positions::World(p), Rows::Selected(s)) => {
-                let chosen: Vec<f64> = s.iter().map(|i| p[a][*i as usize]).collect();
-                map.axes[a].map_world(&chosen, q)
-            }
-        };
-        stats.change.max[a] = stats.change.max[a].max(max);
-        stats.change.sum_of_squares[a] += squares;
-        bounds.min[a] = q.iter().copied().min().unwrap_or(i64::MAX);
-        bounds.max[a] = q.iter().copied().max().unwrap_or(i64::MIN);
+fn quantize_axis(
+    map: &SourceMap,
+    a: usize,
+    positions: &Positions,
+    rows: &Rows<'_>,
+    q: &mut Vec<i64>,
+    change: &mut Vec<f64>,
+) -> Moved {
+    match (positions, rows) {
+        (Positions::Quantized(p), Rows::Consecutive(r)) => map.axes[a].map_integers(&p[a][r.clone()], q, change),
+        (Positions::World(p), Rows::Consecutive(r)) => map.axes[a].map_world(&p[a][r.clone()], q, change),
+        (Positions::Quantized(p), Rows::Selected(s)) => {
+            let chosen: Vec<i32> = s.iter().map(|i| p[a][*i as usize]).collect();
+            map.axes[a].map_integers(&chosen, q, change)
+        }
+        (Positions::World(p), Rows::Selected(s)) => {
+            let chosen: Vec<f64> = s.iter().map(|i| p[a][*i as usize]).collect();
+            map.axes[a].map_world(&chosen, q, change)
+        }
     }
-    bounds
 }

@@ -3,9 +3,12 @@
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
+use pointmill_format::Lattice;
+
 use super::axis::SourceMap;
+use super::lattice::ulp;
 use super::partition::Partition;
-use crate::cloud::{CellHash, Intake, Moments, Segments, Store};
+use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segments, Store};
 use crate::plan::Plan;
 use crate::sources::Sources;
 
@@ -25,11 +28,27 @@ pub(super) struct Context<'a> {
     pub(super) intake: &'a Intake,
     /// From the coordinates of each source to the lattice of the pass.
     pub(super) maps: Vec<SourceMap>,
+    /// Axes of each source on which every point has to prove the claim that a grid holds it.
+    pub(super) claims: Vec<[bool; 3]>,
+    /// The lattice of the pass.
+    pub(super) lattice: Lattice,
     pub(super) partition: Partition,
     pub(super) store: Store,
     pub(super) wants_moments: bool,
     /// True once a point did not fit the partition: from then on only bounds are wanted.
     pub(super) misled: AtomicBool,
+}
+
+impl Context<'_> {
+    /// What the arithmetic of doubles may move coordinates of a source within `bounds` by.
+    pub(super) fn rounding(&self, source: usize, axis: usize, bounds: &JobBounds) -> f64 {
+        if self.sources.all[source].scan.info().lattice.is_some() {
+            return 0.0; // in integers
+        }
+        let world = |q: i64| (q as f64 * self.lattice.scale[axis] + self.lattice.offset[axis]).abs();
+        let far = world(bounds.min[axis]).max(world(bounds.max[axis])).max(self.lattice.offset[axis].abs());
+        4.0 * ulp(far)
+    }
 }
 
 /// The parts of cells that were seen, by packed cell.

@@ -47,6 +47,8 @@ pub enum How {
     /// There is no error, and it is known why.
     #[default]
     Exact,
+    /// No error is larger, and all are the rounding of doubles.
+    Rounding,
     /// Every point was looked at.
     Measured,
     /// No error is larger; of `mean`: it is not farther from zero.
@@ -93,6 +95,7 @@ impl How {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact",
+            Self::Rounding => "rounding",
             Self::Measured => "measured",
             Self::Bound => "bound",
         }
@@ -122,17 +125,31 @@ impl PositionErrors {
         }
     }
 
-    /// No error on an axis is above `max`.
-    pub(crate) fn bound(max: [f64; 3]) -> Self {
+    /// No error on an axis is above `max`, which is what doubles of that size are rounded by.
+    pub(crate) fn rounding(max: [f64; 3]) -> Self {
         if max == [0.0; 3] {
             return Self::default();
         }
-        Self { max, max_3d: length(max), rms: max, rms_3d: length(max), mean: max, how: How::Bound }
+        Self { max, max_3d: length(max), rms: max, rms_3d: length(max), mean: max, how: How::Rounding }
     }
 
     /// True if no position differs.
     pub fn is_zero(&self) -> bool {
         self.max == [0.0; 3]
+    }
+
+    /// True if no position differs by more than doubles of its size are rounded: 0.07 as a double and 7 steps of 0.01
+    /// have other last bits.
+    pub fn is_rounding(&self) -> bool {
+        matches!(self.how, How::Exact | How::Rounding)
+    }
+
+    /// The same figures, of which it is known that they are rounding.
+    pub(crate) fn as_rounding(mut self) -> Self {
+        if !self.is_zero() {
+            self.how = How::Rounding;
+        }
+        self
     }
 
     /// These errors after `first`: sums, which no error exceeds. If there is one kind only, its figures are exact.
@@ -147,7 +164,7 @@ impl PositionErrors {
         let sum = |a: f64, b: f64| above(a + b);
         let by_axis = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| sum(a[i], b[i]));
         let bias = |a: f64, b: f64| {
-            let is_known = first.how != How::Bound && self.how != How::Bound;
+            let is_known = first.how == How::Measured && self.how == How::Measured;
             if is_known { a + b } else { sum(a.abs(), b.abs()).copysign(a) }
         };
         let max = by_axis(first.max, self.max);
@@ -157,7 +174,7 @@ impl PositionErrors {
             rms: by_axis(first.rms, self.rms),
             rms_3d: sum(first.rms_3d, self.rms_3d),
             mean: std::array::from_fn(|a| bias(first.mean[a], self.mean[a])),
-            how: How::Bound,
+            how: if first.is_rounding() && self.is_rounding() { How::Rounding } else { How::Bound },
         }
     }
 
@@ -169,7 +186,8 @@ impl PositionErrors {
         }
         let times = |v: [f64; 3]| std::array::from_fn(|a| v[a] * factors[a]);
         let (max, rms) = (times(self.max), times(self.rms));
-        Self { max, max_3d: length(max), rms, rms_3d: length(rms), mean: times(self.mean), how: How::Bound }
+        let how = if self.is_rounding() { How::Rounding } else { How::Bound };
+        Self { max, max_3d: length(max), rms, rms_3d: length(rms), mean: times(self.mean), how }
     }
 }
 
@@ -224,7 +242,7 @@ mod tests {
     #[test]
     fn a_bound_is_a_bound_of_the_mean_too() {
         let first = PositionErrors::measured(&of(&[[-0.5, 0.0, 0.0]]));
-        let total = PositionErrors::bound([1e-9, 1e-9, 0.0]).after(&first);
+        let total = PositionErrors::rounding([1e-9, 1e-9, 0.0]).after(&first);
         assert!(total.mean[0] <= -0.500_000_001 && total.mean[1] >= 1e-9);
     }
 }

@@ -29,6 +29,7 @@ const DEGREE: f64 = 111_319.49;
 pub(crate) fn accuracy(cloud: &Cloud<'_>, points: u64, format: FormatErrors) -> Accuracy {
     let stats = &cloud.stats;
     let lattice = PositionErrors::measured(&deviations(&stats.change, stats.points));
+    let lattice = if stats.moves { lattice } else { lattice.as_rounding() };
     let total = format.errors.after(&lattice);
     let lost = stats.integers_lost.saturating_add(format.lost);
     let metres = metres_per_unit(cloud).map(|factors| Metres {
@@ -41,7 +42,7 @@ pub(crate) fn accuracy(cloud: &Cloud<'_>, points: u64, format: FormatErrors) -> 
         format: format.errors,
         total,
         integers: Integers { points, same: points.saturating_sub(lost) },
-        merged: Merged { lattice: lattice.is_zero().then_some(0), format: format.merged },
+        merged: Merged { lattice: lattice.is_rounding().then_some(0), format: format.merged },
         metres,
     }
 }

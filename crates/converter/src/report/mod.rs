@@ -9,6 +9,6 @@ pub use accuracy::{Accuracy, How, Integers, Merged, Metres, PositionErrors};
 pub(crate) use assess::{FormatErrors, accuracy};
 pub(crate) use build::{Account, filter_settings, grid_report, input_reports, report, settings};
 pub use types::{
-    DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport, PointsReport, Report,
-    TreeReport,
+    AttributeReport, ChangedAttribute, ChangedValues, DropReason, DroppedAttribute, Estimate, GridReport, InputReport,
+    MissingValues, OutputReport, PhaseReport, PointsReport, Report, TreeReport,
 };

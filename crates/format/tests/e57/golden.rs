@@ -108,6 +108,28 @@ fn a_selection_of_columns_leaves_the_others_empty_and_changes_no_value() {
 }
 
 #[test]
+fn each_scan_has_its_points_its_place_and_its_box() {
+    let parts = |file: &str| e57::open(files::fixture("e57").join(file)).unwrap().info().parts.clone();
+    let scans = parts("scans.e57");
+    assert_eq!(scans.iter().map(|p| p.number).collect::<Vec<_>>(), [1, 2, 3]);
+    assert_eq!(scans.iter().map(|p| p.range.clone()).collect::<Vec<_>>(), [0..200, 200..400, 400..600]);
+    let places = [[500_000.25, -4_000_000.5, 100.0], [0.0; 3], [1.0, 2.0, 3.0]];
+    assert_eq!(scans.iter().map(|p| p.translation).collect::<Vec<_>>(), places);
+    let cloud = read("scans.e57");
+    let bounds = scans[0].bounds.unwrap();
+    for i in (0..200).filter(|i| cloud.xyz[0][*i].is_finite()) {
+        assert!((0..3).all(|a| cloud.xyz[a][i] > bounds.min[a] - 1e-6 && cloud.xyz[a][i] < bounds.max[a] + 1e-6));
+    }
+    assert!(bounds.extent().iter().all(|e| *e < 120.0), "the first scan's own box, turned: {bounds:?}");
+    assert_eq!([scans[1].bounds, scans[2].bounds], [None; 2]);
+    let empty: Vec<_> = parts("empty_scans.e57").into_iter().map(|p| p.range).collect();
+    assert_eq!(empty, [0..0, 0..10, 10..10]);
+    let info = cloud.info;
+    assert_eq!([0, 199, 200, 599].map(|i| info.part_of(i).map(|p| p.number)), [Some(1), Some(1), Some(2), Some(3)]);
+    assert_eq!(info.part_of(600), None);
+}
+
+#[test]
 fn what_stands_around_the_points_is_told() {
     let info = |file: &str| e57::open(files::fixture("e57").join(file)).unwrap().info().clone();
     let scans = info("scans.e57");

@@ -84,3 +84,12 @@ fn attributes_have_the_names_and_types_of_the_field() {
     assert_eq!(attributes("two_scans.ptx"), "rgb uint16x3, intensity floatx1, point source id uint16x1");
     assert_eq!(attributes("two_counts.pts"), "intensity uint16x1");
 }
+
+#[test]
+fn each_scan_of_a_ptx_has_its_points_and_its_place() {
+    let parts = read("two_scans.ptx").info.parts;
+    assert_eq!(parts.iter().map(|p| p.number).collect::<Vec<_>>(), [1, 2]);
+    assert_eq!((parts[0].range.start, parts[0].range.end), (0, parts[1].range.start));
+    assert_eq!((parts[1].range.end, parts[0].points + parts[1].points), (55, 55));
+    assert_eq!(parts[0].translation, [500_000.0, 4_000_000.25, 100.0]);
+}

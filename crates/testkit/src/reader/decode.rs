@@ -64,10 +64,30 @@ pub(super) fn check_description(scan: &dyn Scan) -> u64 {
         let end = piece.byte_offset.checked_add(piece.byte_len);
         assert!(end.is_some_and(|end| end <= info.file_bytes), "piece {i} ends outside the file");
     }
+    check_parts(scan, next);
     let warnings = &info.warnings;
     assert!(warnings.len() < MAX_WARNINGS, "{} warnings", warnings.len());
     warnings
         .iter()
         .for_each(|w| assert!(!w.to_string().contains(char::is_control), "a warning is not one line: {w:?}"));
     next
+}
+
+/// The parts share all points, in order; no piece has points of two.
+fn check_parts(scan: &dyn Scan, points: u64) {
+    let (parts, pieces) = (&scan.info().parts, scan.pieces());
+    let mut next = 0;
+    for part in parts {
+        assert_eq!(part.range.start, next, "parts are consecutive");
+        next = part.range.end;
+        let inside = |at: u64| part.range.contains(&at);
+        let is_split = |first: u64, last: u64| inside(first) != inside(last);
+        assert!(
+            !pieces.iter().any(|p| is_split(p.first_point, p.first_point + p.points - 1)),
+            "a piece is split by part {}",
+            part.number
+        );
+    }
+    assert!(parts.is_empty() || next == points, "the parts have {next} points, the pieces {points}");
+    assert!(parts.windows(2).all(|two| two[0].number < two[1].number), "the numbers of parts rise");
 }

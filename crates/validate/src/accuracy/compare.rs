@@ -50,7 +50,7 @@ struct Part<'a> {
 
 impl Part<'_> {
     fn check(&self, findings: &Findings) {
-        let Figures { errors: stated, is_bound } = self.stated;
+        let Figures { errors: stated, is_bound, is_rounding } = self.stated;
         let (truth, noise) = (self.truth, self.noise);
         let noise_3d = length(noise);
         let near = |stated: f64, truth: f64, size: f64, noise: f64| {
@@ -75,6 +75,8 @@ impl Part<'_> {
                 findings.push(Finding::new(Check::Accuracy, subject, truth, stated));
             }
         };
+        let is_more = *is_rounding && (0..3).any(|a| truth.max[a] > noise[a]);
+        report(is_more, "how", "more than the rounding of doubles".into(), "rounding".into());
         report(wrong_max, "max", json!(truth.max), json!(stated.max));
         report(wrong_rms, "rms", json!(truth.rms), json!(stated.rms));
         report(wrong_mean, "mean", json!(truth.mean), json!(stated.mean));
@@ -175,7 +177,7 @@ mod tests {
         deviation.add([0.25, -0.5, 0.0], [1e6; 3]);
         deviation.add([0.25, 0.0, 0.0], [1e6; 3]);
         let truth = PositionErrors::of(&deviation);
-        let mut stated = Figures { errors: truth, is_bound: false };
+        let mut stated = Figures { errors: truth, ..Figures::default() };
         change(&mut stated);
         let findings = Findings::new(DatasetKind::Bintree, 20);
         let noise = noise(&Side { deviation, ..Side::default() });
@@ -192,6 +194,8 @@ mod tests {
         assert_eq!(found(|f| f.errors.rms[0] *= 1.00001), ["rms of the format in the report"]);
         assert_eq!(found(|f| f.errors.mean[1] = 0.25), ["mean of the format in the report"], "the sign counts");
         assert_eq!(found(|f| f.errors.max_3d = 0.5), ["max_3d of the format in the report"]);
+        let rounding = |f: &mut Figures| (f.is_bound, f.is_rounding) = (true, true);
+        assert_eq!(found(rounding), ["how of the format in the report"]);
         assert_eq!(found(|f| *f = Figures::default()).len(), 5, "nothing is said to be unchanged that is not");
     }
 
@@ -200,7 +204,8 @@ mod tests {
         let bound = |by: f64| {
             found(move |f| {
                 let max = f.errors.max.map(|v| v * by);
-                *f = Figures { errors: PositionErrors { max, rms: max, mean: max, ..f.errors }, is_bound: true };
+                f.errors = PositionErrors { max, rms: max, mean: max, ..f.errors };
+                f.is_bound = true;
                 (f.errors.max_3d, f.errors.rms_3d) = (length(max), length(max));
             })
         };

@@ -29,6 +29,8 @@ pub(super) struct Figures {
     pub(super) errors: PositionErrors,
     /// No error is larger, but it need not be attained.
     pub(super) is_bound: bool,
+    /// It is said to be the rounding of doubles.
+    pub(super) is_rounding: bool,
 }
 
 /// The statement on the dataset at `path`, from the report beside it or in the folder above.
@@ -85,6 +87,7 @@ impl Figures {
             rms_3d: value["rms_3d"].as_f64()?,
             mean: vector("mean")?,
         };
-        Some(Self { errors, is_bound: value["how"] == "bound" })
+        let is_rounding = value["how"] == "rounding";
+        Some(Self { errors, is_bound: is_rounding || value["how"] == "bound", is_rounding })
     }
 }

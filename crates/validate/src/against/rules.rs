@@ -115,25 +115,26 @@ impl Rules {
         self.stored.as_ref().map_or_else(|| self.lattice.world(position), |stored| stored.world(position))
     }
 
-    /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
+    /// Steps of the job lattice to a world coordinate.
     #[inline]
-    pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
-        if !self.compare_positions {
-            return (0, 0);
-        }
-        let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
-        (steps.round() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
+    pub(crate) fn job_steps(&self, axis: usize, world: f64) -> f64 {
+        (world - self.lattice_offset[axis]) / self.lattice.scale[axis]
     }
 
-    /// The job lattice's point next to a world coordinate.
+    /// The dataset's coordinate of a point of the job lattice.
     #[inline]
-    pub(crate) fn nearest(&self, axis: usize, world: f64) -> f64 {
-        self.job_world(axis, ((world - self.lattice_offset[axis]) / self.lattice.scale[axis]).round())
+    pub(crate) fn stored_steps(&self, axis: usize, job: i64) -> i64 {
+        if self.compare_positions { job.wrapping_sub(self.shift[axis]) } else { 0 }
+    }
+
+    /// The job lattice.
+    pub(crate) fn job_lattice(&self) -> Lattice {
+        Lattice { scale: self.lattice.scale, offset: self.lattice_offset }
     }
 
     /// The dataset's integer next to a decoded coordinate.
     pub(crate) fn steps(&self, axis: usize, decoded: f64) -> i64 {
-        ((decoded - self.lattice.offset[axis]) / self.lattice.scale[axis]).round() as i64
+        ((decoded - self.lattice.offset[axis]) / self.lattice.scale[axis]).round_ties_even() as i64
     }
 
     /// World coordinate of a point of the job lattice.

@@ -16,6 +16,9 @@ use super::rules::Conversion::{AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
 use crate::options::{Progress, ProgressFn};
 
+/// A position moved by this part of a step of its scan is neither's: its integer does not come back.
+const HALF: f64 = 0.499_999;
+
 /// A scan, and where its columns go.
 pub(crate) struct Source {
     scan: Box<dyn Scan>,
@@ -199,19 +202,18 @@ impl Source {
     ) {
         let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
         let lattice = self.scan.info().lattice;
-        let mut take = |i: usize, world: f64| {
+        let exact = lattice.and_then(|own| Steps::new(&own, &rules.job_lattice(), axis));
+        let mut take = |i: usize, world: f64, exact: Option<i64>| {
+            let steps = rules.job_steps(axis, world);
+            let job = exact.unwrap_or(steps.round_ties_even() as i64);
             let moved = &mut block.moved;
-            let nearest = rules.nearest(axis, world);
+            let change = rules.job_world(axis, job as f64) - world;
             moved.world[axis].push(world);
-            moved.lattice[axis].push(nearest - world);
-            if let Some(own) = &lattice {
-                let steps = |v: f64| ((v - own.offset[axis]) / own.scale[axis]).round();
-                moved.lost[i] |= steps(nearest) != steps(world);
-            }
-            let (rounded, truncated) = rules.quantize(axis, world);
-            block.positions[axis].push(rounded);
+            moved.lattice[axis].push(change);
+            moved.lost[i] |= lattice.is_some_and(|own| change.abs() >= HALF * own.scale[axis]);
+            block.positions[axis].push(rules.stored_steps(axis, job));
             if rules.foreign {
-                block.truncated[axis].push(truncated);
+                block.truncated[axis].push(rules.stored_steps(axis, steps as i64));
             }
             // a point without a finite position is none
             block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
@@ -220,14 +222,14 @@ impl Source {
             (Positions::Quantized(values), Some(lattice)) => {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();
-                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset));
+                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, exact.map(|steps| steps.at(*v))));
             }
             (Positions::World(values), _) => {
-                values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v));
+                values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v, None));
             }
             (Positions::Quantized(values), None) => {
                 let values = values[axis][start..start + points].iter().enumerate();
-                values.for_each(|(i, v)| take(i, f64::from(*v)));
+                values.for_each(|(i, v)| take(i, f64::from(*v), None));
             }
         }
     }

@@ -30,7 +30,7 @@ pub(super) fn errors(cloud: &Cloud<'_>, offset: [f64; 3]) -> FormatErrors {
         min: bounds.min[a],
         max: bounds.max[a],
     };
-    let errors = PositionErrors::bound(std::array::from_fn(|a| axis(a).bound()));
+    let errors = PositionErrors::rounding(std::array::from_fn(|a| axis(a).bound()));
     FormatErrors { errors, lost: 0, merged: Some(0) }
 }
 

@@ -71,12 +71,14 @@ impl Grids {
     /// The descriptions of the scans.
     fn parts(&self) -> Vec<ScanPart> {
         let ends = self.poses.iter().skip(1).map(|p| p.first_point).chain([self.points]);
-        let part = |(pose, end): (&Pose, u64)| {
+        let part = |((i, pose), end): ((usize, &Pose), u64)| {
             let [x, y, z, translation] = pose.rows;
             let rotation = std::array::from_fn(|a| [x[a], y[a], z[a]]);
-            ScanPart { name: String::new(), points: end.saturating_sub(pose.first_point), rotation, translation }
+            let range = pose.first_point..end;
+            let points = end.saturating_sub(pose.first_point);
+            ScanPart { number: i + 1, name: String::new(), points, range, bounds: None, rotation, translation }
         };
-        self.poses.iter().zip(ends).map(part).collect()
+        self.poses.iter().enumerate().zip(ends).map(part).collect()
     }
 
     /// Reads the header at `at` and passes over its cells; returns where they end.
