@@ -180,13 +180,17 @@ fn info_tells_the_scans_of_an_e57_and_their_poses() {
 #[test]
 fn info_tells_how_finely_coordinates_are_stored() {
     let dir = Dir::new();
-    assert_eq!(info(&dir, "rows/open3d_f4_binary.pcd", &[])["resolution"], json!({ "stored": "single" }));
-    assert_eq!(info(&dir, "rows/open3d_f8_binary.pcd", &[])["resolution"]["stored"], "double or text");
-    assert_eq!(info(&dir, "e57/widths.e57", &[])["resolution"], json!({ "stored": "steps", "step": 0.5 }));
+    assert_eq!(
+        info(&dir, "rows/open3d_f4_binary.pcd", &[])["resolution"],
+        json!([{ "stored": "single" }, { "stored": "single" }, { "stored": "single" }])
+    );
+    assert_eq!(info(&dir, "rows/open3d_f8_binary.pcd", &[])["resolution"][2]["stored"], "double or text");
+    let steps = info(&dir, "e57/widths.e57", &[])["resolution"].clone();
+    assert_eq!(steps[0], json!({ "stored": "steps", "step": 0.5, "offset": 0.0 }), "{steps}");
     assert_eq!(info(&dir, "las/format3.las", &[])["resolution"], Value::Null);
     let path = fixture("rows/open3d_f4_binary.pcd");
     let text = dir.succeed(["info", path.to_str().unwrap(), "--deep"]).stdout();
-    assert!(text.contains("single precision: steps of"), "{text}");
+    assert!(text.contains("stored x in single precision, steps of"), "{text}");
 }
 
 #[test]

@@ -69,7 +69,7 @@ fn resolution(info: &ScanInfo, measured: Option<&Measured>) -> String {
         let far = bounds.map(|b| b.min[a].abs().max(b.max[a].abs()));
         axis_resolution(info.resolution[a], far)
     });
-    if x == y && y == z { format!("stored {x}") } else { format!("x {x}, y {y}, z {z}") }
+    if x == y && y == z { format!("stored {x}") } else { format!("stored x {x}, y {y}, z {z}") }
 }
 
 /// The precision of an axis; `far`: its largest coordinate.

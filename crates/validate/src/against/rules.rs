@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use pointmill_format::{Aabb, Attribute, Lattice};
+use pointmill_format::{Aabb, Attribute, AxisGrid, Lattice};
 use serde_json::Value;
 
 /// Meaning of 16-bit colours of the sources.
@@ -115,6 +115,11 @@ impl Rules {
         self.stored.as_ref().map_or_else(|| self.lattice.world(position), |stored| stored.world(position))
     }
 
+    /// The job lattice's coordinates on an axis.
+    pub(crate) fn job_grid(&self, axis: usize) -> AxisGrid {
+        AxisGrid { step: self.lattice.scale[axis], offset: self.lattice_offset[axis] }
+    }
+
     /// Steps of the job lattice to a world coordinate.
     #[inline]
     pub(crate) fn job_steps(&self, axis: usize, world: f64) -> f64 {
@@ -125,11 +130,6 @@ impl Rules {
     #[inline]
     pub(crate) fn stored_steps(&self, axis: usize, job: i64) -> i64 {
         if self.compare_positions { job.wrapping_sub(self.shift[axis]) } else { 0 }
-    }
-
-    /// The job lattice.
-    pub(crate) fn job_lattice(&self) -> Lattice {
-        Lattice { scale: self.lattice.scale, offset: self.lattice_offset }
     }
 
     /// The dataset's integer next to a decoded coordinate.

@@ -6,12 +6,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 use pointmill_format::{
-    Attribute, AttributeType, Column, OpenOptions, PointBatch, Positions, ReadError, Scan, Scratch, Wanted, open_scan,
-    with_column,
+    Attribute, AttributeType, AxisGrid, Column, OpenOptions, PointBatch, Positions, ReadError, Scan, Scratch, Wanted,
+    open_scan, with_column,
 };
 use rayon::prelude::*;
 
 use super::block::{BLOCK_POINTS, Block, append_words};
+use super::exact::Exact;
 use super::rules::Conversion::{AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
 use crate::options::{Progress, ProgressFn};
@@ -22,6 +23,8 @@ const HALF: f64 = 0.499_999;
 /// A scan, and where its columns go.
 pub(crate) struct Source {
     scan: Box<dyn Scan>,
+    /// From its integers to the dataset's lattice, by axis.
+    exact: [Option<Exact>; 3],
     /// For each attribute of the dataset: the column of the scan with its name, and its elements.
     columns: Vec<Option<(usize, usize)>>,
     /// The column that the filter by class looks at.
@@ -130,7 +133,11 @@ impl Source {
         let constants: Vec<_> =
             rules.constants.iter().filter_map(|(name, value)| Some((find(name)?, value.clone()))).collect();
         let deviating = constants.iter().map(|_| AtomicU64::new(0)).collect();
-        Self { columns, classification, constants, deviating, scan }
+        let exact = std::array::from_fn(|a| {
+            let own = info.lattice.map(|l| AxisGrid { step: l.scale[a], offset: l.offset[a] });
+            own.and_then(|own| Exact::new(own, rules.job_grid(a)))
+        });
+        Self { exact, columns, classification, constants, deviating, scan }
     }
 
     fn wanted(&self) -> Wanted {
@@ -202,7 +209,6 @@ impl Source {
     ) {
         let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
         let lattice = self.scan.info().lattice;
-        let exact = lattice.and_then(|own| Steps::new(&own, &rules.job_lattice(), axis));
         let mut take = |i: usize, world: f64, exact: Option<i64>| {
             let steps = rules.job_steps(axis, world);
             let job = exact.unwrap_or(steps.round_ties_even() as i64);
@@ -222,7 +228,9 @@ impl Source {
             (Positions::Quantized(values), Some(lattice)) => {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();
-                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, exact.map(|steps| steps.at(*v))));
+                let exact = self.exact[axis];
+                let on_job = |v| exact.map(|e| e.nearest(v));
+                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_job(*v)));
             }
             (Positions::World(values), _) => {
                 values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v, None));

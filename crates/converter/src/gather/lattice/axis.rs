@@ -1,6 +1,6 @@
 //! The step of one axis.
 
-use pointmill_format::AxisGrid;
+use pointmill_format::{Aabb, AxisGrid};
 
 use super::steps::{least, one_two_five, power_of_two, tidy_product, times_coarser};
 use crate::cloud::MOST_STEPS;
@@ -56,6 +56,17 @@ pub(super) struct Room {
 pub(super) struct Reach {
     pub(super) extent: f64,
     pub(super) farthest: f64,
+}
+
+impl Reach {
+    /// Of the points in a box; nothing if it is empty.
+    pub(super) fn of(bounds: &Aabb, axis: usize) -> Self {
+        if bounds.is_empty() {
+            return Self::default();
+        }
+        let (min, max) = (bounds.min[axis], bounds.max[axis]);
+        Self { extent: max - min, farthest: min.abs().max(max.abs()) }
+    }
 }
 
 impl Room {

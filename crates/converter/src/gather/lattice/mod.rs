@@ -8,7 +8,7 @@ mod steps;
 
 use pointmill_format::{Aabb, Lattice};
 
-use self::axis::{AxisChoice, Reach, Room, choose};
+use self::axis::{AxisChoice, Room, choose};
 use self::needs::{Knowledge, finest_of_sources, fixed_offset, needs};
 use crate::cloud::{JobLattice, Stats};
 use crate::error::{ConvertError, InputFault};
@@ -130,14 +130,6 @@ fn equal_where_possible(mut choices: [AxisChoice; 3], rooms: [Room; 3]) -> [Axis
         choices.iter_mut().for_each(|c| c.grid.step = common.step);
     }
     choices
-}
-
-fn reach(bounds: &Aabb, axis: usize) -> Reach {
-    if bounds.is_empty() {
-        return Reach::default();
-    }
-    let (min, max) = (bounds.min[axis], bounds.max[axis]);
-    Reach { extent: max - min, farthest: min.abs().max(max.abs()) }
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 use pointmill_format::{Aabb, AxisGrid, Lattice};
 
 use super::axis::{GridOrigin, Need, Reach, Room};
-use super::reach;
 use super::steps::single;
 use crate::cloud::{JobLattice, Stats};
 use crate::plan::Plan;
@@ -49,11 +48,11 @@ impl Knowledge {
             }
         }
         for (a, certain) in certain.iter_mut().enumerate() {
-            let own = reach(&seen, a);
+            let own = Reach::of(&seen, a);
             *certain = Reach { extent: own.extent, farthest: certain.farthest.max(own.farthest) };
         }
         let margin = if is_sampled { SAMPLE_MARGIN } else { 1.0 };
-        let all = [0, 1, 2].map(|a| reach(&all, a)).map(|r| Reach { extent: margin * r.extent, ..r });
+        let all = [0, 1, 2].map(|a| Reach::of(&all, a)).map(|r| Reach { extent: margin * r.extent, ..r });
         Self { broken: vec![[false; 3]; bounds.len()], bounds, all, certain }
     }
 
@@ -62,7 +61,7 @@ impl Knowledge {
         let cut = |b: Aabb| plan.filter.bounds.as_ref().map_or(b, |c| intersection(&b, c));
         let lattice = &present.lattice;
         let (min, max) = (lattice.world(stats.bounds.min.0), lattice.world(stats.bounds.max.0));
-        let mut all = [0, 1, 2].map(|a| reach(&Aabb { min, max }, a));
+        let mut all = [0, 1, 2].map(|a| Reach::of(&Aabb { min, max }, a));
         // decoding adds the offset, however near 0 the sum is
         for source in &sources.all {
             if let Some(own) = source.scan.info().lattice {
@@ -88,7 +87,7 @@ impl Knowledge {
     }
 
     fn farthest(&self, source: usize, axis: usize) -> f64 {
-        reach(&self.bounds[source], axis).farthest
+        Reach::of(&self.bounds[source], axis).farthest
     }
 }
 
