@@ -62,4 +62,5 @@ pub use report::{
     Report, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
+pub use sources::{ResolvedCrs, resolve_crs};
 pub use warning::{CrsNote, Proj4Fault, Warning};

@@ -77,6 +77,11 @@ pub(crate) fn gather<'a>(
                 if let Some(outliers) = outliers::find(&gathered) {
                     warn(outliers.warning(gathered.lattice.is_held_back()));
                 }
+                for (source, stats) in sources.all.iter().zip(&gathered.stats.sources) {
+                    if let Some(resolution) = source.survey.coarse_single(&stats.bounds) {
+                        warn(Warning::CoarseSingle { path: source.scan.info().path.clone(), resolution });
+                    }
+                }
                 let known = warnings.len() + gathered.stats.warnings.len();
                 let cloud = Cloud::new(plan, sources, intake, *gathered, warnings)?;
                 cloud.warnings[known..].iter().for_each(|w| rt.warn(w));

@@ -12,7 +12,7 @@ use crate::memory;
 use crate::plan::{AttributeChoice, Filter, Plan};
 use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
-use crate::sources::{Sources, resolve_scan};
+use crate::sources::{Sources, resolve_crs};
 
 /// What a run has to show for itself, beside the cloud.
 pub(crate) struct Account {
@@ -89,7 +89,10 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
             points_read: seen.map_or(0, |s| s.read),
             bounds_declared: info.bounds_declared.map(flat),
             bounds_measured: seen.map(|s| s.bounds).filter(|b| !b.is_empty()).map(flat),
-            crs: resolve_scan(&info.crs).label,
+            resolution: source
+                .survey
+                .resolution(&seen.map(|s| s.bounds).or(info.bounds_declared).unwrap_or(Aabb::EMPTY)),
+            crs: resolve_crs(&info.crs).label,
             rgb_depth: coloured.map(|c| if c.facts.widen_rgb[i].is_some() { 8 } else { 16 }),
         }
     };

@@ -45,6 +45,10 @@ pub enum ScanWarning {
     RecordsIgnored { kind: &'static str, count: u32, read: u32 },
     /// LAS: malformed GeoTIFF keys.
     GeoTiffKeys { version: u16, declared: usize, room: usize },
+    /// LAS: a GeoTIFF key for a unit whose code is none, or a user-defined one without its size.
+    GeoTiffUnit { key: u16, code: u16 },
+    /// LAS: a WKT record without text.
+    WktEmpty,
     /// LAS: waveform packets are not read.
     Waveforms { point_format: u8 },
     /// LAS: more than one Extra Bytes record; the first is taken.
@@ -189,6 +193,10 @@ impl ScanWarning {
             Self::GeoTiffKeys { version, declared, room } => {
                 format!("the GeoTIFF keys are malformed (version {version}, {declared} keys declared, room for {room})")
             }
+            Self::GeoTiffUnit { key, code } => {
+                format!("the GeoTIFF key {key} declares the unit {code}, which has no known size")
+            }
+            Self::WktEmpty => "the WKT of the coordinate reference system is empty".to_owned(),
             Self::Waveforms { point_format } => {
                 format!("point format {point_format} carries waveform packets; they are not read, all other values are")
             }

@@ -3,10 +3,9 @@
 use pointmill_format::{Aabb, AxisGrid, Lattice};
 
 use super::axis::{GridOrigin, Need, Reach, Room};
-use super::steps::single;
 use crate::cloud::{JobLattice, Stats};
 use crate::plan::Plan;
-use crate::sources::{Fineness, Source, Sources, intersection};
+use crate::sources::{Fineness, Source, Sources, intersection, single_step};
 
 /// The true box of a sampled scan is larger, though hardly twice as large.
 const SAMPLE_MARGIN: f64 = 2.0;
@@ -114,7 +113,7 @@ fn need(source: &Source, known: &Knowledge, i: usize, axis: usize) -> Need {
         (Fineness::Step(step), _) => Need::Step(step),
         (Fineness::Single, _) => {
             let farthest = known.farthest(i, axis);
-            single(farthest).map_or(Need::Nothing, |step| Need::Single { step, farthest })
+            single_step(farthest).map_or(Need::Nothing, |step| Need::Single { step, farthest })
         }
         (Fineness::Double, _) if known.bounds[i].is_empty() => Need::Nothing,
         (Fineness::Double, _) => Need::Finest,
