@@ -2,7 +2,7 @@
 
 use pointmill_converter::{Accuracy, OutputReport, Report};
 
-use super::quantities::{at_most, count, number, plural};
+use super::quantities::{at_most, count, number, plural, three_digits};
 
 /// What a reader of the output decodes, against the sources.
 pub(crate) fn line(output: &OutputReport, report: &Report) -> String {
@@ -71,9 +71,4 @@ fn steps(scale: &[f64; 3]) -> String {
         [x, y, z] if x == y && y == z => number(*x),
         _ => scale.map(number).join(" "),
     }
-}
-
-/// To the nearest, with three digits.
-fn three_digits(v: f64) -> String {
-    format!("{v:.2e}").parse().map_or_else(|_| v.to_string(), number)
 }

@@ -74,6 +74,11 @@ pub(crate) fn at_most(v: f64) -> String {
     number(format!("{up:.2e}").parse().unwrap_or(up))
 }
 
+/// A number to the nearest, with three digits.
+pub(crate) fn three_digits(v: f64) -> String {
+    format!("{v:.2e}").parse().map_or_else(|_| v.to_string(), number)
+}
+
 /// Numbers side by side.
 pub(crate) fn numbers(values: &[f64]) -> String {
     values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(" ")

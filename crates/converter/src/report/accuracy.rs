@@ -17,7 +17,7 @@ pub struct Accuracy {
     pub integers: Integers,
     /// Different positions that became one.
     pub merged: Merged,
-    /// The same figures in metres, where the coordinates are degrees.
+    /// The same figures in metres, where x and y are longitude and latitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metres: Option<Metres>,
 }
@@ -77,8 +77,8 @@ pub struct Merged {
     pub format: Option<u64>,
 }
 
-/// Figures in metres. A degree of latitude counts as 111,319.49 m, one of longitude as that times the cosine of the
-/// latitude nearest to the equator: both are at least what they are on the ellipsoid, so that these are bounds.
+/// Figures in metres on WGS 84, as bounds: a degree of longitude counts as at the latitude of the cloud nearest to the
+/// equator, one of latitude as at the farthest.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Metres {

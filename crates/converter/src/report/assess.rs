@@ -1,6 +1,6 @@
 //! The accuracy of a dataset from what lattice and format did.
 
-use pointmill_format::Deviations;
+use pointmill_format::{Deviations, Unit};
 
 use super::accuracy::{Accuracy, Integers, Merged, Metres, PositionErrors, above};
 use crate::cloud::{Change, Cloud};
@@ -22,8 +22,9 @@ impl FormatErrors {
     }
 }
 
-/// Metres in a degree of a great circle of WGS 84.
-const DEGREE: f64 = 111_319.49;
+/// WGS 84: the equator's radius, metres, and the square of the eccentricity.
+const RADIUS: f64 = 6_378_137.0;
+const ECCENTRICITY: f64 = 0.006_694_379_990_141_3;
 
 /// The accuracy of a dataset of `points` points.
 pub(crate) fn accuracy(cloud: &Cloud<'_>, points: u64, format: FormatErrors) -> Accuracy {
@@ -55,27 +56,25 @@ fn deviations(change: &Change, points: u64) -> Deviations {
     d
 }
 
-/// Metres in a unit of each axis, at most, if coordinates are degrees.
+/// Metres in a unit of each axis, at most, if coordinates are angles.
 fn metres_per_unit(cloud: &Cloud<'_>) -> Option<[f64; 3]> {
-    let bounds = &cloud.stats.bounds;
-    if !is_in_degrees(&cloud.facts.crs.projection) || bounds.is_empty() {
-        return None;
-    }
+    let (bounds, crs) = (&cloud.stats.bounds, &cloud.facts.crs);
+    let Some(Unit::Angle(radians)) = crs.unit.filter(|_| !bounds.is_empty()) else { return None };
     let lattice = &cloud.lattice.lattice;
-    let [south, north] = [bounds.min[1], bounds.max[1]].map(|q| q as f64 * lattice.scale[1] + lattice.offset[1]);
-    Some([DEGREE * widest_parallel(south, north), DEGREE, 1.0])
+    let latitudes = [bounds.min[1], bounds.max[1]].map(|q| q as f64 * lattice.scale[1] + lattice.offset[1]);
+    let [east, north] = metres_per_radian(latitudes.map(|v| v * radians));
+    Some([east * radians, north * radians, crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0)])
 }
 
-/// The cosine of the latitude nearest to the equator.
-fn widest_parallel(south: f64, north: f64) -> f64 {
+/// Metres in a radian of longitude at the latitude nearest to the equator, and in one of latitude at the one farthest
+/// from it: no other latitude between the two has longer ones.
+fn metres_per_radian([south, north]: [f64; 2]) -> [f64; 2] {
     let nearest = if south <= 0.0 && north >= 0.0 { 0.0 } else { south.abs().min(north.abs()) };
-    above(nearest.to_radians().cos().max(0.0))
-}
-
-/// True for longitudes and latitudes in degrees.
-fn is_in_degrees(projection: &str) -> bool {
-    let has = |words: &[&str]| projection.split_whitespace().any(|w| words.contains(&w));
-    projection == "EPSG:4326" || has(&["+proj=longlat", "+proj=latlong", "+proj=lonlat", "+proj=latlon"])
+    let farthest = south.abs().max(north.abs());
+    let flattened = |latitude: f64| 1.0 - ECCENTRICITY * latitude.sin().powi(2);
+    let parallel = RADIUS * nearest.cos().max(0.0) / flattened(nearest).sqrt();
+    let meridian = RADIUS * (1.0 - ECCENTRICITY) / flattened(farthest).powf(1.5);
+    [parallel, meridian].map(above)
 }
 
 #[cfg(test)]
@@ -83,9 +82,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_degree_of_longitude_counts_as_at_the_latitude_nearest_to_the_equator() {
-        assert!((widest_parallel(-60.0, -70.0) - 0.5).abs() < 1e-12 && widest_parallel(-1.0, 60.0) >= 1.0);
-        assert!((widest_parallel(47.0, 48.0) - 47f64.to_radians().cos()).abs() < 1e-12);
-        assert!(is_in_degrees("+proj=longlat +datum=WGS84 +no_defs") && !is_in_degrees("+proj=utm +zone=33"));
+    fn degrees_are_as_long_as_on_the_ellipsoid() {
+        // lengths of a degree as tables have them
+        let degrees = |south: f64, north: f64| {
+            metres_per_radian([south, north].map(f64::to_radians)).map(|m| (m * 1f64.to_radians()).round())
+        };
+        assert_eq!(degrees(0.0, 0.0), [111_319.0, 110_574.0]);
+        assert_eq!(degrees(-45.0, -45.0), [78_847.0, 111_132.0]);
+        assert_eq!(degrees(60.0, 90.0), [55_800.0, 111_694.0]);
+        assert_eq!(degrees(-10.0, 15.0)[0], 111_319.0);
     }
 }

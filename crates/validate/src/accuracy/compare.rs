@@ -14,8 +14,6 @@ const RELATIVE: f64 = 1e-6;
 /// Units in the last place of the coordinates: of decoded, meant and source positions.
 const ULPS: f64 = 16.0;
 
-const DEGREE: f64 = 111_319.49;
-
 /// Reports what the report states else than what was found.
 pub(super) fn check(report: &Reported, found: &Accuracy, known: &Known<'_>, findings: &Findings) {
     let parts = [
@@ -129,29 +127,35 @@ fn check_counts(report: &Reported, found: &Accuracy, known: &Known<'_>, findings
     compare("points merged by the format, in the report", found.merged.format, report.merged.format);
 }
 
-/// Metres are stated exactly of degrees, and are those of the page.
+/// Metres are stated of degrees, and are those of the page. Other angles, and units of heights, a dataset does not tell.
 fn check_metres(report: &Reported, known: &Known<'_>, findings: &Findings) {
     let (Some(total), Some(bounds)) = (&report.total, known.bounds) else { return };
-    let degrees = is_in_degrees(known.projection);
-    match (&report.metres, degrees) {
-        (None, false) => {}
-        (None, true) => findings.push(Finding::new(Check::Accuracy, "metres in the report", "figures", "none")),
-        (Some(_), false) => {
-            findings.push(Finding::new(Check::Accuracy, "metres in the report", "none, no degrees", "figures"));
-        }
-        (Some(metres), true) => {
-            findings.checked(Check::Accuracy, 3);
-            let [south, north] = bounds[1];
-            let nearest = if south * north <= 0.0 { 0.0 } else { south.abs().min(north.abs()) };
-            let factors = [DEGREE * nearest.to_radians().cos(), DEGREE, 1.0];
-            let expected = [0, 1, 2].map(|a| total.errors.max[a] * factors[a]);
-            // the box may be that of decoded positions
-            if (0..3).any(|a| (metres.errors.max[a] - expected[a]).abs() > 1e-6 * expected[a]) {
-                let found = json!(metres.errors.max);
-                findings.push(Finding::new(Check::Accuracy, "max in metres in the report", json!(expected), found));
-            }
-        }
+    if !is_in_degrees(known.projection) {
+        return;
     }
+    let Some(metres) = &report.metres else {
+        findings.push(Finding::new(Check::Accuracy, "metres in the report", "figures", "none"));
+        return;
+    };
+    findings.checked(Check::Accuracy, 2);
+    let per_degree = metres_per_degree(bounds[1]);
+    let expected = [0, 1].map(|a| total.errors.max[a] * per_degree[a]);
+    let found = [0, 1].map(|a| metres.errors.max[a]);
+    // the box may be that of decoded positions
+    if (0..2).any(|a| (found[a] - expected[a]).abs() > 1e-6 * expected[a]) {
+        findings.push(Finding::new(Check::Accuracy, "max in metres in the report", json!(expected), json!(found)));
+    }
+}
+
+/// Metres in a degree of longitude at the latitude nearest to the equator, and of latitude at the farthest (WGS 84).
+fn metres_per_degree([south, north]: [f64; 2]) -> [f64; 2] {
+    const A: f64 = 6_378_137.0;
+    const F: f64 = 1.0 / 298.257_223_563;
+    let e2 = F * (2.0 - F);
+    let near = if south * north <= 0.0 { 0.0 } else { south.abs().min(north.abs()).to_radians() };
+    let far = south.abs().max(north.abs()).to_radians();
+    let w = |latitude: f64| (1.0 - e2 * latitude.sin() * latitude.sin()).sqrt();
+    [A * near.cos() / w(near), A * (1.0 - e2) / (w(far) * w(far) * w(far))].map(|radian| radian * 1f64.to_radians())
 }
 
 /// True for longitudes and latitudes in degrees.
