@@ -35,7 +35,7 @@ pub(crate) use record::{RecordFrame, copy_record, position};
 pub(crate) use regroup::Regrouper;
 pub(crate) use segments::{Segment, Segments};
 pub(crate) use shortfall::Shortfall;
-pub(crate) use stats::{Range, Stats};
+pub(crate) use stats::{Change, Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 
 use pointmill_format::Aabb;

@@ -34,6 +34,10 @@ pub(crate) struct Stats {
     /// Skipped because they lie exactly at the origin of their scan.
     pub(crate) origin_skipped: u64,
     pub(crate) unreadable: u64,
+    /// Points whose integers in their scan do not come back from the job lattice.
+    pub(crate) integers_lost: u64,
+    /// Some point moved to the job lattice by more than doubles of its coordinates are rounded.
+    pub(crate) moves: bool,
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -275,6 +279,8 @@ impl Stats {
             invalid: 0,
             origin_skipped: 0,
             unreadable: 0,
+            integers_lost: 0,
+            moves: false,
             warnings: Vec::new(),
         }
     }
@@ -310,6 +316,8 @@ impl Stats {
         self.invalid += other.invalid;
         self.origin_skipped += other.origin_skipped;
         self.unreadable += other.unreadable;
+        self.integers_lost += other.integers_lost;
+        self.moves |= other.moves;
         self.warnings.extend_from_slice(&other.warnings);
         self.warnings.sort_by_cached_key(Warning::to_string);
     }

@@ -8,7 +8,7 @@ use pointmill_format::{Column, PointBatch, Positions};
 use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{CellParts, Context};
-use super::{partition, ranges, select};
+use super::{moved, partition, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
 use crate::runtime::os_hints;
@@ -233,6 +233,12 @@ impl<'a> Worker<'a> {
             Moved::Each => Err(&self.change[a][..]),
         });
         self.stats.change.add(points, axes);
+        if let Some(own) = &self.pass.sources.all[source].scan.info().lattice {
+            self.stats.integers_lost += moved::integers_lost(&axes, own, points);
+        }
+        if !self.stats.moves {
+            self.stats.moves = moved::is_more_than_rounding(&axes, &self.q, &bounds, &self.pass.lattice);
+        }
         for (a, by) in axes.iter().enumerate().filter(|(a, _)| self.pass.claims[source][*a]) {
             let rounding = self.pass.rounding(source, a, &bounds);
             if by.is_err_and(|column| column.iter().any(|v| v.abs() > rounding)) {

@@ -12,6 +12,7 @@ mod context;
 mod cut;
 mod far;
 mod lattice;
+mod moved;
 mod origins;
 mod outliers;
 mod partition;

@@ -4,8 +4,8 @@ use pointmill_format::{Aabb, DatasetKind};
 use serde_json::{Map, Value, json};
 
 use super::types::{
-    AttributeReport, CoordinateChange, GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport,
-    PhaseReport, PointsReport, Report, SharedPlaceReport,
+    AttributeReport, GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport,
+    Report, SharedPlaceReport,
 };
 use crate::cloud::{Cloud, Cube, JobLattice, SharedPlace};
 use crate::error::ConvertError;
@@ -31,7 +31,6 @@ pub(crate) struct Account {
 /// Points that do not add up.
 pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
     let stats = &cloud.stats;
-    let count = stats.points.max(1) as f64;
     let Account { settings, other_files, outputs, phases, seconds } = account;
     let of_outputs = outputs.iter().flat_map(|o| &o.warnings);
     Ok(Report {
@@ -43,10 +42,6 @@ pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, Conv
         grid: grid_report(&cloud.lattice, cloud.is_lossless, &cloud.frame.cube),
         points: points_report(cloud, &outputs)?,
         shared_places: cloud.shared_places.iter().map(shared_place).collect(),
-        coordinate_change: CoordinateChange {
-            max: stats.change.max,
-            rms: stats.change.sum_of_squares.map(|s| (s / count).sqrt()),
-        },
         checksum_in: stats.checksum.to_string(),
         temp_bytes: cloud.store.spilled_bytes(),
         output_bytes: outputs.iter().map(|o| o.bytes).sum(),

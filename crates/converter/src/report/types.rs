@@ -7,6 +7,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::accuracy::Accuracy;
 use crate::reason::GridReason;
 use crate::warning::Warning;
 
@@ -28,8 +29,6 @@ pub struct Report {
     pub points: PointsReport,
     /// Places that very many points share (16 or more, and at least one in a hundred), the fullest first.
     pub shared_places: Vec<SharedPlaceReport>,
-    /// Largest and RMS change of a coordinate, per axis, world units.
-    pub coordinate_change: CoordinateChange,
     /// One entry per attribute that was read, in the order of the stored records.
     pub attributes: Vec<AttributeReport>,
     /// One entry per dataset written, in the order requested.
@@ -62,6 +61,8 @@ pub struct OutputReport {
     pub points: u64,
     /// Points that were dropped because all of their values repeat.
     pub duplicates_dropped: u64,
+    /// How far the positions that a reader decodes are from those of the sources.
+    pub accuracy: Accuracy,
     /// Attributes that were kept.
     pub attributes: Vec<String>,
     /// Attributes that were omitted, and why.
@@ -249,16 +250,6 @@ pub struct SharedPlaceReport {
     pub position: [f64; 3],
     /// Points of the cloud that lie there.
     pub points: u64,
-}
-
-/// Coordinate change by moving to the output lattice.
-#[derive(Debug, Clone, Default, Serialize)]
-#[non_exhaustive]
-pub struct CoordinateChange {
-    /// Largest, world units.
-    pub max: [f64; 3],
-    /// Root of the mean square, world units.
-    pub rms: [f64; 3],
 }
 
 /// An attribute that is not in the dataset. Serialises to its name, why as text, and the constant if there is one.

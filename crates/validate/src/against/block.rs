@@ -16,8 +16,33 @@ pub(crate) struct Block {
     pub(crate) words: Vec<Vec<u64>>,
     /// Which records take part.
     pub(crate) keep: Vec<bool>,
+    /// Of the sources: what the lattice and the format do to each record's position.
+    pub(crate) moved: Moved,
     /// Hash states of what was mixed in so far.
     states: Vec<[u64; 2]>,
+}
+
+/// By how much positions of a block of the sources move, by record.
+#[derive(Debug, Default)]
+pub(crate) struct Moved {
+    /// Index of the block's first point in its file: blocks of a file are added up in this order.
+    pub(crate) first: u64,
+    /// Positions of the sources.
+    pub(crate) world: [Vec<f64>; 3],
+    /// Their points on the job lattice, less these.
+    pub(crate) lattice: [Vec<f64>; 3],
+    /// The integers that the file has do not come back from the job lattice.
+    pub(crate) lost: Vec<bool>,
+    /// Where the dataset's integers are not certain, those of the sources on its lattice; else empty.
+    pub(crate) steps: Vec<[i64; 3]>,
+}
+
+impl Moved {
+    fn clear(&mut self) {
+        self.world.iter_mut().chain(&mut self.lattice).for_each(Vec::clear);
+        self.lost.clear();
+        self.steps.clear();
+    }
 }
 
 /// Odd constants with well-spread bits (hexadecimal digits of π and e).
@@ -58,6 +83,7 @@ impl Block {
         self.words.resize_with(attributes, Vec::new);
         self.words.iter_mut().for_each(Vec::clear);
         self.keep.clear();
+        self.moved.clear();
     }
 
     /// Position of a record.

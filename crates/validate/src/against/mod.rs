@@ -8,6 +8,7 @@
 pub(crate) mod block;
 mod exact;
 mod meaning;
+mod measured;
 mod narrow;
 pub(crate) mod rules;
 mod selection;
@@ -22,6 +23,7 @@ use pointmill_format::ReadError;
 use crate::check::Check;
 use crate::finding::Finding;
 use crate::outcome::AgainstSummary;
+use measured::Parts;
 use rules::RgbDepth;
 use sides::{COLOURS, Colour, Sum, rgb_of};
 
@@ -62,7 +64,11 @@ impl Against {
     pub(crate) fn compare(&self, context: &Context<'_>) -> Result<AgainstSummary, ReadError> {
         let rules = &self.sums.rules;
         let position_rules = if rules.foreign { &POSITION_RULES[..] } else { &POSITION_RULES[..1] };
-        let files = self.sum_sources(position_rules, context)?;
+        let parts = Parts::new(rules, self.sources.points, context.memory_bytes);
+        let files = self.sum_sources(position_rules, &parts, context)?;
+        if let Ok(mut measured) = self.measured.lock() {
+            *measured = Some(parts.finish());
+        }
         let found = self.sums.total();
         let colours = self.colour_rules(&files);
         let candidates = self.candidates(&files, &colours, position_rules);
@@ -95,7 +101,12 @@ impl Against {
     }
 
     /// One pass over the sources: sums by file, for every colour and position rule in question.
-    fn sum_sources(&self, positions: &[PositionRule], context: &Context<'_>) -> Result<Vec<FileSums>, ReadError> {
+    fn sum_sources(
+        &self,
+        positions: &[PositionRule],
+        parts: &Parts<'_>,
+        context: &Context<'_>,
+    ) -> Result<Vec<FileSums>, ReadError> {
         let rules = &self.sums.rules;
         let files: Vec<FileSums> = self
             .sources
@@ -108,6 +119,7 @@ impl Against {
             .collect();
         self.sources.each_block(rules, context.progress, "sources", |block, at| {
             let file = &files[at];
+            parts.add(block, at);
             if let Some(rgb) = rules.rgb
                 && block.words[rgb].iter().any(|v| *v > 255)
             {

@@ -126,14 +126,32 @@ impl Rules {
         AxisGrid { step: self.lattice.scale[axis], offset: self.lattice_offset[axis] }
     }
 
-    /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
+    /// Steps of the job lattice to a world coordinate.
     #[inline]
-    pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
-        if !self.compare_positions {
-            return (0, 0);
-        }
-        let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
-        (steps.round_ties_even() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
+    pub(crate) fn job_steps(&self, axis: usize, world: f64) -> f64 {
+        (world - self.lattice_offset[axis]) / self.lattice.scale[axis]
+    }
+
+    /// The dataset's coordinate of a point of the job lattice.
+    #[inline]
+    pub(crate) fn stored_steps(&self, axis: usize, job: i64) -> i64 {
+        if self.compare_positions { job.wrapping_sub(self.shift[axis]) } else { 0 }
+    }
+
+    /// The dataset's integer next to a decoded coordinate.
+    pub(crate) fn steps(&self, axis: usize, decoded: f64) -> i64 {
+        ((decoded - self.lattice.offset[axis]) / self.lattice.scale[axis]).round_ties_even() as i64
+    }
+
+    /// World coordinate of a point of the job lattice.
+    #[inline]
+    pub(crate) fn job_world(&self, axis: usize, steps: f64) -> f64 {
+        steps * self.lattice.scale[axis] + self.lattice_offset[axis]
+    }
+
+    /// World coordinates, on the job lattice, of the dataset's integers.
+    pub(crate) fn meant(&self, stored: [i64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|a| self.job_world(a, (stored[a] + self.shift[a]) as f64))
     }
 }
 

@@ -19,6 +19,9 @@ use super::rules::{Rules, grey};
 use super::selection::Selection;
 use crate::options::{Progress, ProgressFn};
 
+/// A position moved by this part of a step of its scan is neither's: its integer does not come back.
+const HALF: f64 = 0.499_999;
+
 /// A scan, and where its columns go.
 pub(crate) struct Source {
     scan: Box<dyn Scan>,
@@ -166,13 +169,17 @@ impl Source {
     fn fill(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
         block.reset(rules.attributes.len());
         block.keep.resize(points, true);
+        block.moved.lost.resize(points, false);
+        block.moved.first = batch.first_point + start as u64;
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
         self.selection.apply(batch, start, &mut block.keep);
         if let Some(stored) = &rules.stored {
             for i in 0..points {
-                let words = stored.stored(block.position(i));
+                let step = block.position(i);
+                let words = stored.stored(step);
+                block.moved.steps.push(step);
                 words.into_iter().enumerate().for_each(|(axis, word)| block.positions[axis][i] = word);
             }
         }
@@ -221,22 +228,29 @@ impl Source {
         rules: &Rules,
         block: &mut Block,
     ) {
+        let lattice = self.scan.info().lattice;
         let mut take = |i: usize, world: f64, exact: Option<i64>| {
-            let (rounded, truncated) = rules.quantize(axis, world);
-            block.positions[axis].push(exact.unwrap_or(rounded));
+            let steps = rules.job_steps(axis, world);
+            let job = exact.unwrap_or(steps.round_ties_even() as i64);
+            let moved = &mut block.moved;
+            let change = rules.job_world(axis, job as f64) - world;
+            moved.world[axis].push(world);
+            moved.lattice[axis].push(change);
+            moved.lost[i] |= lattice.is_some_and(|own| change.abs() >= HALF * own.scale[axis]);
+            block.positions[axis].push(rules.stored_steps(axis, job));
             if rules.foreign {
-                block.truncated[axis].push(truncated);
+                block.truncated[axis].push(rules.stored_steps(axis, steps as i64));
             }
             // a point without a finite position is none
             block.keep[i] &= world.is_finite();
         };
-        match (&batch.positions, self.scan.info().lattice) {
+        match (&batch.positions, lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();
-                let exact = Some(&self.exact[axis]).filter(|_| rules.compare_positions).copied().flatten();
-                let on_dataset = |v| exact.map(|e| e.nearest(v) - rules.shift[axis]);
-                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_dataset(*v)));
+                let exact = self.exact[axis];
+                let on_job = |v| exact.map(|e| e.nearest(v));
+                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_job(*v)));
             }
             (Positions::World(values), _) => {
                 values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v, None));

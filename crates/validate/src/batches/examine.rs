@@ -8,6 +8,7 @@ use super::formulas::{BATCH, power};
 use super::order::Key;
 use super::positions::Axis;
 use super::task::Task;
+use crate::accuracy::Side;
 use crate::against::rules::grey;
 use crate::check::Check;
 use crate::finding::Finding;
@@ -236,6 +237,7 @@ fn errors(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[Axis; 3]) -> Erro
     if points.ambiguous.contains(&true) {
         return errors;
     }
+    errors.side = side(task, raw, points, axes);
     for plane in 0..task.header.planes() {
         let bits = 10 * (plane as u32 + 1);
         for (a, axis) in axes.iter().enumerate() {
@@ -252,4 +254,27 @@ fn errors(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[Axis; 3]) -> Erro
         }
     }
     errors
+}
+
+/// What decoding does to the points of a batch, with all planes that are there.
+fn side(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[Axis; 3]) -> Side {
+    let (lattice, bits) = (&task.description.lattice, task.header.bits());
+    let mut side = Side::default();
+    let mut rows: Vec<([u64; 3], [i64; 3])> = Vec::with_capacity(raw.len());
+    for i in 0..raw.len() {
+        let x = points.lattice(i);
+        let decoded = [0, 1, 2].map(|a| axes[a].decoded(raw.q(i, a as u32), bits));
+        let meant = [0, 1, 2].map(|a| points.r[a][i]);
+        side.deviation.add([0, 1, 2].map(|a| decoded[a] - meant[a]), [0, 1, 2].map(|a| axes[a].world(x[a])));
+        let world = [0, 1, 2].map(|a| task.header.origin[a] + decoded[a]);
+        side.lost += u64::from([0, 1, 2].map(|a| lattice.quantize(a, world[a])) != x);
+        rows.push((decoded.map(f64::to_bits), x));
+    }
+    let is_apart = |a: usize| side.deviation.max[a] < 0.49 * lattice.scale[a];
+    if !(0..3).all(is_apart) {
+        rows.sort_unstable();
+        let places = rows.chunk_by(|a, b| a.0 == b.0).filter(|p| p.first().map(|r| r.1) != p.last().map(|r| r.1));
+        side.merged = Some(places.map(|place| place.len() as u64).sum());
+    }
+    side
 }

@@ -18,6 +18,8 @@ use super::task::TaskResults;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::outputs::origin::own_key;
+use crate::outputs::recovery::Lost;
+use crate::report::FormatErrors;
 
 /// Bytes of originals that are written at once.
 const WRITE_BYTES: usize = 4 << 20;
@@ -38,12 +40,21 @@ pub(super) struct Finished {
     pub(super) records: Vec<BatchRecord>,
     /// Of all plane counts, whether they are in the file or not.
     pub(super) errors: ErrorSums,
+    /// Points that do not come back.
+    pub(super) lost: Lost,
     pub(super) lod_points: [u64; LEVELS + 1],
     pub(super) layout: Layout,
     pub(super) originals_bytes: u64,
     /// Header and description.
     pub(super) end: Finish,
     pub(super) bytes: u64,
+}
+
+impl Finished {
+    /// What the planes in the file did to positions.
+    pub(super) fn format_errors(&self) -> FormatErrors {
+        FormatErrors::measured(&self.errors.deviations(self.precision), self.lost.points, self.lost.merged)
+    }
 }
 
 /// Writes all that can only be known when every task is done.
@@ -84,7 +95,8 @@ pub(super) fn finish(
     output.write(&end.header_bytes, 0)?;
     let bytes = end.description_offset + end.header.description_bytes;
     let originals_bytes = if settings.originals { Layout::originals_bytes(count) } else { 0 };
-    Ok(Finished { precision: layout.precision(), records, errors, lod_points, layout, originals_bytes, end, bytes })
+    let (precision, lost) = (layout.precision(), state.lost);
+    Ok(Finished { precision, records, errors, lost, lod_points, layout, originals_bytes, end, bytes })
 }
 
 /// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.

@@ -22,11 +22,12 @@ use serde_json::{Map, Value};
 pub use settings::BatchesSettings;
 
 use super::output::{DiskSize, Output, Target, Wants};
+use super::recovery::Recovery;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
-use crate::report::OutputReport;
+use crate::report::{self, OutputReport};
 use crate::runtime::Runtime;
 use crate::sources::Schema;
 use buckets::Task;
@@ -112,7 +113,8 @@ impl Output for BatchesSettings {
         // what is compressed is written raw first, elsewhere
         let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
         let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, cloud.store.unused_bytes());
-        let output = BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals);
+        let output =
+            BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals, Recovery::new(cloud), frame.grid.origin);
         let shop = Workshop {
             frame: &frame,
             content: &content,
@@ -131,6 +133,7 @@ impl Output for BatchesSettings {
         file.sync("syncing the batches")?;
         Ok(OutputReport {
             points: results.ledger.points(),
+            accuracy: report::accuracy(cloud, results.ledger.points(), finished.format_errors()),
             attributes: cloud.names(content.kept.iter().copied()),
             attributes_dropped: content.dropped,
             bytes: finished.bytes,
