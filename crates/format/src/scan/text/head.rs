@@ -71,7 +71,8 @@ impl Head {
         let (dialect, warning) = detect(&sample, options)
             .map_err(|what| ReadError::broken(source.path(), start, Fault::Row(what)).advise(Advice::DecimalMark))?;
         let numeric = numeric(dialect, &sample);
-        if numeric.iter().filter(|n| **n).count() < 2 {
+        let in_first = dialect.kinds(first).into_iter().filter(|k| matches!(k, FieldKind::Number | FieldKind::Empty));
+        if in_first.count() < 2 || numeric.iter().filter(|n| **n).count() < 2 {
             let what = format!("the line {:?} is no row of numbers", shown(first));
             return Err(ReadError::broken(source.path(), start, what)
                 .advise("only one header line is skipped; delete the others or start them with #"));
