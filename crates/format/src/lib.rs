@@ -68,7 +68,7 @@ pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Batches, Counted, Crs, Decimal, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, Resolution, Scan, ScanInfo,
-    ScanKind, ScanPart, ScanWarning, Scratch, Sink, UnknownAttribute, Wanted, open_scan, supported_scans,
+    ScanKind, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, supported_scans,
 };
 pub use write_error::WriteError;
 

@@ -18,8 +18,8 @@ pub(crate) const ANCHOR_BITS: u32 = 4;
 /// The same for the largest cube, which cannot grow to hold what its anchor leaves out: more extents fit this way.
 pub(crate) const LARGEST_ANCHOR_BITS: u32 = 6;
 
-/// An extent of this many steps fits the largest cube wherever it starts.
-pub(crate) const MOST_STEPS: f64 = ((1u64 << TREE_BITS) - (1 << (TREE_BITS - LARGEST_ANCHOR_BITS))) as f64;
+/// The largest extent, in steps, that a cube holds.
+pub(crate) const MOST_STEPS: f64 = ((1u64 << TREE_BITS) - 1) as f64;
 
 /// The smallest cube is this many bits wide: a root spacing (side / 128) below the lattice step would mean nothing.
 const MIN_CUBE_BITS: u32 = 7;
@@ -85,7 +85,8 @@ impl Cube {
         }
     }
 
-    /// The axis with the largest world extent gives the power of two; the other axes start at their minimum.
+    /// The axis with the largest world extent gives the power of two; the other axes start at their minimum. Serves for
+    /// extents that take all 31 bits, too.
     fn around_unequal(bounds: &JobBounds, scale: [f64; 3]) -> Result<Self, TooFine> {
         let world = |a: usize| bounds.extent(a) as f64 * scale[a];
         let reference = (1..3).fold(0, |best, a| if world(a) > world(best) { a } else { best });
@@ -96,11 +97,13 @@ impl Cube {
             bits += 1;
         }
         let start = |bits| anchor(bounds.min[reference], bits, anchor_bits(bits));
-        while !fits(start(bits), bounds.max[reference], bits) {
+        while bits < TREE_BITS && !fits(start(bits), bounds.max[reference], bits) {
             bits += 1;
         }
         let mut min = bounds.min;
-        min[reference] = start(bits);
+        if fits(start(bits), bounds.max[reference], bits) {
+            min[reference] = start(bits); // else every bit is needed: the cube starts where the points do
+        }
         if bits > TREE_BITS {
             let mut coarser_by = [1.0; 3];
             coarser_by[reference] = 2f64.powi((bits - TREE_BITS) as i32);
@@ -262,20 +265,23 @@ mod tests {
     fn an_extent_beyond_31_bits_asks_for_a_coarser_lattice() {
         let bounds = JobBounds::new([i64::from(i32::MIN); 3], [i64::from(i32::MAX); 3]);
         let Err(too_fine) = Cube::around(&bounds, &lattice([1.0; 3])) else { panic!("a cube of 33 bits") };
-        assert!(too_fine.coarser_by.iter().all(|f| (2.0..2.1).contains(f)), "{too_fine:?}");
+        assert!(too_fine.coarser_by.iter().all(|f| (2.0..2.001).contains(f)), "{too_fine:?}");
         let corridor = JobBounds::new([i64::from(i32::MIN), 0, 0], [i64::from(i32::MAX), 9, 9]);
         let Err(too_fine) = Cube::around(&corridor, &lattice([1.0; 3])) else { panic!("a cube of 33 bits") };
         assert_eq!(too_fine.coarser_by[1..], [1.0; 2], "the short axes fit");
     }
 
     #[test]
-    fn almost_31_bits_fit_wherever_they_start() {
+    fn all_31_bits_fit_wherever_they_start() {
         let most = MOST_STEPS as i64;
-        for min in [0, 1, -7, 123_456_789, -1_987_654_321] {
-            let cube = Cube::around(&JobBounds::new([min; 3], [min + most; 3]), &lattice([0.001; 3])).unwrap();
-            assert!(
-                cube.bits == TREE_BITS && (0..3).all(|a| cube.min[a] <= min && min + most < cube.min[a] + (1 << 31))
-            );
+        let grained = most - (1 << 25);
+        for (min, extent) in [(0, most), (1, most), (-7, grained), (123_456_789, most), (-1_987_654_321, grained)] {
+            let cube = Cube::around(&JobBounds::new([min; 3], [min + extent; 3]), &lattice([0.001; 3])).unwrap();
+            assert_eq!(cube.bits, TREE_BITS);
+            assert!((0..3).all(|a| cube.min[a] <= min && min + extent < cube.min[a] + (1 << 31)));
+            assert_eq!(cube.aligned_shift(0).is_some(), extent == grained || min == 0);
+            let ends = [min, min + extent].map(|v| i64::from(cube.tree(JobPoint([v; 3]))[0]));
+            assert_eq!(ends[1] - ends[0], extent, "a unit of the tree is a step");
         }
         let flat = JobBounds::new([-5, 3, 7], [-5 + most, most, 100]);
         let cube = Cube::around(&flat, &lattice([1e-8, 1e-8, 0.001])).unwrap();

@@ -13,7 +13,7 @@ use crate::memory;
 use crate::plan::{AttributeChoice, Filter, Plan};
 use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
-use crate::sources::{Sources, resolve_scan};
+use crate::sources::{Sources, resolve_crs};
 
 /// What a run has to show for itself, beside the cloud.
 pub(crate) struct Account {
@@ -64,12 +64,13 @@ fn points_report(cloud: &Cloud<'_>, outputs: &[OutputReport]) -> Result<PointsRe
         read: stats.sources.iter().map(|s| s.read).sum(),
         kept: stats.points,
         outside_bounds: stats.outside_bounds,
+        outliers: stats.outliers,
         other_class: stats.other_class,
         thinned: stats.thinned,
         invalid: stats.invalid,
         unreadable: stats.unreadable.saturating_add(cloud.sources.points_missing),
     };
-    let filtered = points.outside_bounds + points.other_class + points.thinned + points.invalid;
+    let filtered = points.outside_bounds + points.outliers + points.other_class + points.thinned + points.invalid;
     let is_whole = |o: &OutputReport| o.points + o.duplicates_dropped == points.kept;
     if points.read == points.kept + filtered && outputs.iter().all(is_whole) {
         return Ok(points);
@@ -97,7 +98,10 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
             points_read: seen.map_or(0, |s| s.read),
             bounds_declared: info.bounds_declared.map(flat),
             bounds_measured: seen.map(|s| s.bounds).filter(|b| !b.is_empty()).map(flat),
-            crs: resolve_scan(&info.crs).label,
+            resolution: source
+                .survey
+                .resolution(&seen.map(|s| s.bounds).or(info.bounds_declared).unwrap_or(Aabb::EMPTY)),
+            crs: resolve_crs(&info.crs).label,
             rgb_depth: coloured.map(|c| if c.facts.widen_rgb[i].is_some() { 8 } else { 16 }),
         }
     };
@@ -140,6 +144,7 @@ pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value>
     settings.insert("memory".into(), plan.memory_bytes.into());
     settings.insert("threads".into(), plan.threads.into());
     settings.insert("duplicates".into(), plan.duplicates.name().into());
+    settings.insert("outliers".into(), plan.outliers.name().into());
     settings.insert("rgb-depth".into(), plan.rgb_depth.name().into());
     settings
 }

@@ -100,6 +100,8 @@ pub struct InputReport {
     pub bounds_declared: Option<[f64; 6]>,
     /// Of the points decoded, before any filter.
     pub bounds_measured: Option<[f64; 6]>,
+    /// How finely the file stores these coordinates, per axis, world units; null: in doubles that show no step.
+    pub resolution: [Option<f64>; 3],
     /// As found, shortened for people ("EPSG:2994", "WKT: NAD83 / …") or empty.
     pub crs: String,
     /// 8 or 16 where the file has colour.
@@ -209,7 +211,7 @@ pub struct GridReport {
     pub why: GridReason,
 }
 
-/// Every point accounted for: `read = kept + outside_bounds + other_class + thinned + invalid`, and for every output
+/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid`, and for every output
 /// `kept = points + duplicates_dropped`. All are counted, none is a difference; the run fails where a sum is wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]
@@ -220,6 +222,8 @@ pub struct PointsReport {
     pub kept: u64,
     /// Outside the bounds.
     pub outside_bounds: u64,
+    /// Far from all others, where these are dropped.
+    pub outliers: u64,
     /// Of other classes than those to keep.
     pub other_class: u64,
     /// Removed by thinning.

@@ -8,11 +8,12 @@ mod survey;
 
 use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
-pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
+pub(crate) use crs::resolve_all as resolve_crs_of_all;
+pub use crs::{ResolvedCrs, resolve_crs};
 pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
 #[cfg(test)]
 pub(crate) use survey::Extent;
-pub(crate) use survey::{Fineness, Survey, far_out, intersection};
+pub(crate) use survey::{Fineness, Survey, far_out, intersection, single_step};
 
 use self::divisor::Divisors;
 use crate::error::{ConvertError, InputFault};

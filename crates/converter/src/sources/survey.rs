@@ -14,6 +14,11 @@ const SAMPLE_POINTS: usize = 131_072;
 /// No renderer's single precision holds coordinates beyond this, and no scanner gives them.
 const FARTHEST: f64 = 1e30;
 
+/// The step of single precision at `far` ≥ 0; `None` at 0, where it has none.
+pub(crate) fn single_step(far: f64) -> Option<f64> {
+    (far > 0.0 && far.is_finite()).then(|| 2f64.powi((far.log2().floor() as i32).max(-126) - 23))
+}
+
 /// True for bounds that cannot be coordinates.
 pub(crate) fn far_out(bounds: &Aabb) -> bool {
     bounds.min.iter().chain(&bounds.max).any(|v| v.abs() > FARTHEST)
@@ -55,7 +60,32 @@ pub(crate) struct Survey {
     pub(crate) fineness: [Fineness; 3],
 }
 
+/// Single precision that divides the longest side of a scan into fewer steps than this is worth a warning.
+const FEW_STEPS: f64 = 65_536.0;
+
 impl Survey {
+    /// How finely the file stores the coordinates of points within `bounds`, by axis; `None`: as doubles.
+    pub(crate) fn resolution(&self, bounds: &Aabb) -> [Option<f64>; 3] {
+        std::array::from_fn(|a| match self.fineness[a] {
+            Fineness::Grid { grid, .. } => Some(grid.step),
+            Fineness::Step(step) => Some(step),
+            Fineness::Single => single_step(bounds.min[a].abs().max(bounds.max[a].abs())),
+            Fineness::Double => None,
+        })
+    }
+
+    /// The resolution, where single precision makes it so coarse that the user should know.
+    pub(crate) fn coarse_single(&self, bounds: &Aabb) -> Option<[f64; 3]> {
+        if bounds.is_empty() || !self.fineness.contains(&Fineness::Single) {
+            return None;
+        }
+        let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+        let steps = self.resolution(bounds).map(Option::unwrap_or_default);
+        let is_coarse =
+            |(step, fineness): (&f64, &Fineness)| *fineness == Fineness::Single && longest < step * FEW_STEPS;
+        (longest > 0.0 && steps.iter().zip(&self.fineness).any(is_coarse)).then_some(steps)
+    }
+
     /// Declared bounds, else those of a sample of the points; the lattice or resolution that the file states, else the
     /// decimals of a sample. `divisors`: of the integers of scans with a lattice.
     pub(super) fn of(scan: &dyn Scan, divisors: Option<&Divisors>) -> Self {
@@ -76,8 +106,8 @@ impl Survey {
         }
         let Sample { bounds, decimals, is_whole } = sample(scan);
         let sampled = (!bounds.is_empty()).then_some(Extent { bounds, is_sampled: !is_whole });
-        let fineness =
-            std::array::from_fn(|a| stated(info.resolution[a], decimals[a].grid(bounds.max[a] - bounds.min[a])));
+        let longest = [0, 1, 2].map(|a| bounds.max[a] - bounds.min[a]).into_iter().fold(0.0, f64::max);
+        let fineness = std::array::from_fn(|a| stated(info.resolution[a], decimals[a].grid(longest)));
         Self { extent: declared.or(sampled), fineness }
     }
 }
@@ -129,4 +159,26 @@ fn sample(scan: &dyn Scan) -> Sample {
 /// The box that lies in both; empty if they do not meet.
 pub(crate) fn intersection(a: &Aabb, b: &Aabb) -> Aabb {
     Aabb { min: std::array::from_fn(|i| a.min[i].max(b.min[i])), max: std::array::from_fn(|i| a.max[i].min(b.max[i])) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_precision_has_its_step_at_the_largest_coordinate() {
+        assert_eq!([500_000.0, 5_400_000.0, 100.0].map(single_step), [Some(0.031_25), Some(0.5), Some(2f64.powi(-17))]);
+        assert_eq!(single_step(0.0), None);
+    }
+
+    #[test]
+    fn coarse_single_precision_is_worth_a_warning_and_a_fine_one_is_not() {
+        let survey = Survey { extent: None, fineness: [Fineness::Single; 3] };
+        let far = Aabb { min: [500_000.0, 5_400_000.0, 100.0], max: [500_100.0, 5_400_100.0, 110.0] };
+        assert_eq!(survey.coarse_single(&far), Some([0.031_25, 0.5, 2f64.powi(-17)]));
+        let near = Aabb { min: [-50.0; 3], max: [50.0; 3] };
+        assert_eq!(survey.coarse_single(&near), None);
+        let doubles = Survey { extent: None, fineness: [Fineness::Double; 3] };
+        assert_eq!((doubles.coarse_single(&far), doubles.resolution(&far)), (None, [None; 3]));
+    }
 }

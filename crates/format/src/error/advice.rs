@@ -22,6 +22,8 @@ pub enum Advice {
     NameColumns,
     /// A comma that may be a decimal mark or a separator, which [`crate::OpenOptions::decimal`] can say.
     DecimalMark,
+    /// An archive: the scans are in it.
+    Unpack,
     /// The kinds of scans that this build reads ([`crate::supported_scans`]).
     Supported(String),
     /// Cut short or damaged, or of another kind than those that this build reads.
@@ -47,6 +49,7 @@ impl fmt::Display for Advice {
                 f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")
             }
             Self::DecimalMark => f.write_str("say whether commas are decimal marks"),
+            Self::Unpack => f.write_str("unpack it and name the scans in it"),
             Self::Supported(kinds) if kinds.is_empty() => f.write_str("this build reads no scans; enable a feature"),
             Self::Supported(kinds) => write!(f, "supported are {kinds}"),
             Self::CopyOrSupported(kinds) => {

@@ -16,6 +16,11 @@ pub enum Fault {
     },
     /// The file is something else, not a scan: "an Arc/Info ASCII grid, a raster".
     OtherKind(String),
+    /// An archive or a compressed file: a scan may be in it.
+    Archive {
+        /// "a gzip file", "a ZIP archive", ….
+        what: &'static str,
+    },
     /// The format is known, this version of it is not.
     UnknownVersion {
         /// "LAS", "E57", ….
@@ -101,6 +106,7 @@ impl fmt::Display for Fault {
                 write!(f, "called .{extension}, but it is no scan that is known here")
             }
             Self::OtherKind(what) => write!(f, "this is {what}, not a scan"),
+            Self::Archive { what } => write!(f, "this is {what}, not a scan"),
             Self::UnknownVersion { format, found: (major, minor), known } => {
                 write!(f, "{format} version {major}.{minor} is not known ({known})")
             }

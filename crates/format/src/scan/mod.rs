@@ -1,5 +1,6 @@
 //! Scans: files of points, of any kind, opened by content and decoded in pieces.
 
+mod archive;
 mod batches;
 #[cfg(any(feature = "e57", feature = "las"))]
 mod catch_panic;
@@ -10,6 +11,7 @@ mod open;
 mod other_kind;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
+mod unit;
 mod wanted;
 mod warning;
 // each reader uses its part of it: a build with few of them leaves some of it idle
@@ -34,5 +36,6 @@ pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
 pub use other_kind::OtherKind;
+pub use unit::Unit;
 pub use wanted::{UnknownAttribute, Wanted};
 pub use warning::{Counted, ScanWarning};

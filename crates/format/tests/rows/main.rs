@@ -6,4 +6,6 @@ mod corpus;
 mod damage;
 mod golden;
 mod hand_made;
+mod pcd;
+mod ply;
 mod text_kinds;

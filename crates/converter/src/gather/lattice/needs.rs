@@ -3,10 +3,9 @@
 use pointmill_format::{Aabb, AxisGrid, Lattice};
 
 use super::axis::{GridOrigin, Need, Reach, Room};
-use super::steps::single;
 use crate::cloud::{JobLattice, Stats};
 use crate::plan::Plan;
-use crate::sources::{Fineness, Source, Sources, intersection};
+use crate::sources::{Fineness, Source, Sources, intersection, single_step};
 
 /// The true box of a sampled scan is larger, though hardly twice as large.
 const SAMPLE_MARGIN: f64 = 2.0;
@@ -76,6 +75,12 @@ impl Knowledge {
         }
     }
 
+    /// The same, if only the points inside a box were there.
+    pub(super) fn inside(self, bounds: &Aabb) -> Self {
+        let all = [0, 1, 2].map(|a| Reach::of(bounds, a));
+        Self { bounds: self.bounds.iter().map(|b| intersection(b, bounds)).collect(), all, certain: all, ..self }
+    }
+
     /// The least steps for an axis.
     pub(super) fn room(&self, axis: usize) -> Room {
         Room::new(self.all[axis], self.certain[axis])
@@ -114,7 +119,7 @@ fn need(source: &Source, known: &Knowledge, i: usize, axis: usize) -> Need {
         (Fineness::Step(step), _) => Need::Step(step),
         (Fineness::Single, _) => {
             let farthest = known.farthest(i, axis);
-            single(farthest).map_or(Need::Nothing, |step| Need::Single { step, farthest })
+            single_step(farthest).map_or(Need::Nothing, |step| Need::Single { step, farthest })
         }
         (Fineness::Double, _) if known.bounds[i].is_empty() => Need::Nothing,
         (Fineness::Double, _) => Need::Finest,

@@ -40,11 +40,6 @@ pub(in super::super) fn ulp(far: f64) -> f64 {
     far.next_up() - far
 }
 
-/// The step of single precision at `far`; `None` at 0, where it has none.
-pub(super) fn single(far: f64) -> Option<f64> {
-    (far > 0.0 && far.is_finite()).then(|| 2f64.powi((far.log2().floor() as i32).max(-126) - 23))
-}
-
 fn decimal(digit: u32, exponent: i32) -> f64 {
     format!("{digit}e{exponent}").parse().unwrap_or(f64::NAN)
 }
@@ -62,9 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn single_precision_and_doubles_have_their_distances() {
-        assert_eq!([500_000.0, 5_400_000.0, 100.0].map(single), [Some(0.031_25), Some(0.5), Some(2f64.powi(-17))]);
-        assert_eq!(single(0.0), None);
+    fn doubles_have_their_distances() {
         assert_eq!([1.0, 1e9, 0.0].map(least), [2f64.powi(-51), 2f64.powi(-22), 0.0]);
     }
 }

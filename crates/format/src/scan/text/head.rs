@@ -212,7 +212,7 @@ fn elsewhere(source: &Source, from: u64, counted: bool) -> Result<Vec<Vec<u8>>, 
     for place in 1..=PLACES {
         let bytes = source.vec_at(from + (left - PLACE_BYTES) / PLACES * place, PLACE_BYTES)?;
         let Some(end) = memchr::memrchr(lines::line_end(&bytes), &bytes) else { continue };
-        let whole = lines::text_lines(&bytes[..end]).skip(1).map(|(_, line)| line);
+        let whole = lines::lines(&bytes[..end]).skip(1).map(|(_, line)| line);
         let data = whole.filter(|line| is_data(line) && lines::is_filled(line) && !(counted && count(line).is_some()));
         rows.extend(data.take(PLACE_ROWS).map(<[u8]>::to_vec));
     }
