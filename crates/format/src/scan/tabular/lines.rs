@@ -166,13 +166,9 @@ impl Cutter {
     }
 }
 
-/// [`lines`], which may also end with CR alone.
-pub(crate) fn text_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
-    lines_that_end(bytes, line_end(bytes))
-}
-
-fn lines_that_end(bytes: &[u8], line_end: u8) -> impl Iterator<Item = (usize, &[u8])> {
-    let mut start = 0;
+/// The lines of `bytes`, each with its place and without its line end.
+pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let (mut start, line_end) = (0, line_end(bytes));
     std::iter::from_fn(move || {
         let rest = bytes.get(start..).filter(|r| !r.is_empty())?;
         let end = memchr(line_end, rest).map_or(rest.len(), |n| n + 1);
@@ -203,13 +199,13 @@ mod tests {
         let index = index(&source(text), 0, u64::MAX, is_filled).unwrap();
         assert_eq!((index.rows, index.end), (3, text.len() as u64));
         assert_eq!(index.pieces, [Piece { first_point: 0, points: 3, byte_offset: 0, byte_len: text.len() as u64 }]);
-        assert_eq!(lines_that_end(text, b'\n').map(|(_, l)| l.len()).collect::<Vec<_>>(), [1, 0, 1, 2, 1]);
+        assert_eq!(lines(text).map(|(_, l)| l.len()).collect::<Vec<_>>(), [1, 0, 1, 2, 1]);
     }
 
     #[test]
     fn lines_may_end_with_cr_alone() {
         let text = b"1 2\r3 4\r\r5 6";
-        let found: Vec<_> = text_lines(text).map(|(at, line)| (at, line.len())).collect();
+        let found: Vec<_> = lines(text).map(|(at, line)| (at, line.len())).collect();
         assert_eq!(found, [(0, 3), (4, 3), (8, 0), (9, 3)]);
         assert_eq!(index(&source(text), 0, u64::MAX, is_filled).unwrap().rows, 3);
         let long = [b"1".repeat(5000), b"\r2\r".to_vec()].concat();

@@ -347,7 +347,7 @@ impl Decoder<'_> {
         let LineRule { separator, strict, least, .. } = *rule;
         let parser = RowParser { fields, wanted: self.wanted, separator, strict, least, elements: &elements };
         let mut points_line = Vec::new();
-        let mut lines = lines::text_lines(bytes).filter(|(_, line)| (rule.is_row)(line));
+        let mut lines = lines::lines(bytes).filter(|(_, line)| (rule.is_row)(line));
         for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for row in 0..points {
@@ -381,8 +381,8 @@ impl Decoder<'_> {
         let elements: Vec<_> = self.schema.attributes.iter().map(|a| a.elements).collect();
         let (fields, wanted) = (&self.schema.fields, self.wanted);
         let parser =
-            RowParser { fields, wanted, separator: None, least: usize::MAX, strict: false, elements: &elements };
-        let mut tokens = Tokens { line, at: 0, separator: None, strict: false };
+            RowParser { fields, wanted, separator: None, strict: false, least: usize::MAX, elements: &elements };
+        let mut tokens = Tokens::of(line);
         for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for row in 0..points {

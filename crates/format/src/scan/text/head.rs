@@ -71,7 +71,8 @@ impl Head {
         let (dialect, warning) = detect(&sample, options)
             .map_err(|what| ReadError::broken(source.path(), start, Fault::Row(what)).advise(Advice::DecimalMark))?;
         let numeric = numeric(dialect, &sample);
-        if numeric.iter().filter(|n| **n).count() < 2 {
+        let in_first = dialect.kinds(first).into_iter().filter(|k| matches!(k, FieldKind::Number | FieldKind::Empty));
+        if in_first.count() < 2 || numeric.iter().filter(|n| **n).count() < 2 {
             let what = format!("the line {:?} is no row of numbers", shown(first));
             return Err(ReadError::broken(source.path(), start, what)
                 .advise("only one header line is skipped; delete the others or start them with #"));
@@ -211,7 +212,7 @@ fn elsewhere(source: &Source, from: u64, counted: bool) -> Result<Vec<Vec<u8>>, 
     for place in 1..=PLACES {
         let bytes = source.vec_at(from + (left - PLACE_BYTES) / PLACES * place, PLACE_BYTES)?;
         let Some(end) = memchr::memrchr(lines::line_end(&bytes), &bytes) else { continue };
-        let whole = lines::text_lines(&bytes[..end]).skip(1).map(|(_, line)| line);
+        let whole = lines::lines(&bytes[..end]).skip(1).map(|(_, line)| line);
         let data = whole.filter(|line| is_data(line) && lines::is_filled(line) && !(counted && count(line).is_some()));
         rows.extend(data.take(PLACE_ROWS).map(<[u8]>::to_vec));
     }

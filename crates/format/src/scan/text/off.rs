@@ -22,7 +22,7 @@ pub(super) struct Keyword {
 impl Keyword {
     pub(super) fn find(first_bytes: &[u8]) -> Option<Self> {
         let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);
-        let (at, line) = lines::text_lines(text).find(|(_, line)| is_data(line))?;
+        let (at, line) = lines::lines(text).find(|(_, line)| is_data(line))?;
         let start = line.iter().position(|b| *b > b' ')?;
         let word = fields(line, None).first().copied()?;
         let mut rest = word.strip_suffix(b"OFF")?;
@@ -102,7 +102,7 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
 /// The counts, behind the keyword or on the next line: their place, the counts, and where the vertices start.
 fn counts<'a>(source: &Source, first: &'a [u8], keyword: Keyword) -> Result<(u64, Vec<&'a [u8]>, u64), ReadError> {
     let mut at = keyword.end;
-    for (place, line) in lines::text_lines(&first[keyword.end..]) {
+    for (place, line) in lines::lines(&first[keyword.end..]) {
         at = keyword.end + place;
         if is_data(line) {
             let (end, _) = lines::skip(source, at as u64, 1)?;

@@ -8,7 +8,7 @@ use crate::scan::tabular::lines;
 /// The filled lines of the first bytes, 64 at most; the last one may be cut and counts only if it is the only one.
 pub(super) fn filled(first_bytes: &[u8]) -> Vec<&[u8]> {
     let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);
-    let mut lines: Vec<_> = lines::text_lines(text).map(|(_, l)| l).filter(|l| lines::is_filled(l)).take(64).collect();
+    let mut lines: Vec<_> = lines::lines(text).map(|(_, l)| l).filter(|l| lines::is_filled(l)).take(64).collect();
     if lines.len() > 3 && lines.len() < 64 && !text.ends_with(&[lines::line_end(text)]) {
         lines.pop();
     }
