@@ -6,7 +6,7 @@ use super::fields::{Encoding, Field};
 use super::notes::Notes;
 use super::options::E57Options;
 use super::scaling::Scaling;
-use crate::scan::quantities::quantity;
+use crate::scan::quantities::{NORMALS, quantity};
 use crate::{Attribute, AttributeType, AxisGrid, Resolution, ScanWarning};
 
 /// Columns that a file may have: more is not a scan.
@@ -251,15 +251,14 @@ impl Kind {
 }
 
 /// The name of an extra column: that of its quantity, where others have it, too.
-fn usual_name<'a>(name: &RecordName, tag: &'a str) -> &'a str {
+fn usual_name<'a>(name: &RecordName, tag: &'a str, ty: AttributeType) -> &'a str {
+    // what the standard has itself, or a part of a normal, is not the quantity if an extension has it
+    let is_usual = |n: &&str| !matches!(*n, "intensity" | "point source id") && !NORMALS.contains(n);
     match name {
         RecordName::ReturnIndex => "return number",
         RecordName::ReturnCount => "number of returns",
         RecordName::TimeStamp => "timestamp",
-        // quantities that the standard has itself are not those of an extension
-        RecordName::Unknown { .. } => quantity(tag, AttributeType::Float64)
-            .filter(|n| !matches!(*n, "intensity" | "point source id"))
-            .unwrap_or(tag),
+        RecordName::Unknown { .. } => quantity(tag, ty).filter(is_usual).unwrap_or(tag),
         _ => tag,
     }
 }
@@ -329,8 +328,10 @@ impl Schema {
         for (name, tag, kind) in columns {
             // the index of a return counts from 0, the number of a return from 1
             let add = i64::from(*name == RecordName::ReturnIndex);
-            let usual = Some(usual_name(name, tag)).filter(|name| self.attributes.iter().all(|a| a.name != *name));
-            let attribute = kind.plus(add).attribute(self.free_name(usual.unwrap_or(tag)));
+            let mut attribute = kind.plus(add).attribute(String::new());
+            let usual = usual_name(name, tag, attribute.ty);
+            let is_free = self.attributes.iter().all(|a| a.name != usual);
+            attribute.name = self.free_name(if is_free { usual } else { tag });
             self.push(attribute, scans, |s| {
                 let extra = s.roles.extras.iter().find(|(i, _)| s.fields[*i].name == *name);
                 extra.map(|(field, invalid)| Fill::Plain { field: *field, invalid: *invalid, add })
