@@ -4,7 +4,7 @@ use super::fields::{Encoding, Field, Name};
 use super::notes::Notes;
 use super::options::E57Options;
 use super::scaling::Scaling;
-use crate::scan::quantities::quantity;
+use crate::scan::quantities::{NORMALS, quantity};
 use crate::{Attribute, AttributeType, AxisGrid, Resolution, ScanWarning};
 
 /// Columns that a file may have: more is not a scan.
@@ -244,15 +244,14 @@ impl Kind {
 }
 
 /// The name of an extra column: that of its quantity, where others have it, too.
-fn usual_name<'a>(name: &Name, tag: &'a str) -> &'a str {
+fn usual_name<'a>(name: &Name, tag: &'a str, ty: AttributeType) -> &'a str {
+    // what the standard has itself, or a part of a normal, is not the quantity if an extension has it
+    let is_usual = |n: &&str| !matches!(*n, "intensity" | "point source id") && !NORMALS.contains(n);
     match name {
         Name::ReturnIndex => "return number",
         Name::ReturnCount => "number of returns",
         Name::TimeStamp => "timestamp",
-        // quantities that the standard has itself are not those of an extension
-        Name::Other { .. } => quantity(tag, AttributeType::Float64)
-            .filter(|n| !matches!(*n, "intensity" | "point source id"))
-            .unwrap_or(tag),
+        Name::Other { .. } => quantity(tag, ty).filter(is_usual).unwrap_or(tag),
         _ => tag,
     }
 }
@@ -322,8 +321,10 @@ impl Schema {
         for (name, tag, kind) in columns {
             // the index of a return counts from 0, the number of a return from 1
             let add = i64::from(*name == Name::ReturnIndex);
-            let usual = Some(usual_name(name, tag)).filter(|name| self.attributes.iter().all(|a| a.name != *name));
-            let attribute = kind.plus(add).attribute(self.free_name(usual.unwrap_or(tag)));
+            let mut attribute = kind.plus(add).attribute(String::new());
+            let usual = usual_name(name, tag, attribute.ty);
+            let is_free = self.attributes.iter().all(|a| a.name != usual);
+            attribute.name = self.free_name(if is_free { usual } else { tag });
             self.push(attribute, scans, |s| {
                 let extra = s.roles.extras.iter().find(|(i, _)| s.fields[*i].name == *name);
                 extra.map(|(field, invalid)| Fill::Plain { field: *field, invalid: *invalid, add })

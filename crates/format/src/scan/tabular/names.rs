@@ -1,7 +1,7 @@
 //! What a column is, by its name.
 
 use crate::AttributeType;
-use crate::scan::quantities::{normal_axis, quantity};
+use crate::scan::quantities::{NORMALS, normal_axis, quantity};
 
 /// The meaning of a named number of a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,9 +47,9 @@ pub(crate) fn role(name: &str) -> Role {
     }
 }
 
-/// The name of an attribute without a role: that of its quantity, or its own.
+/// The name of an attribute without a role: that of its quantity, or its own. A part of a normal is none.
 pub(crate) fn other_name(name: &str, ty: AttributeType) -> &str {
-    quantity(name, ty).unwrap_or(name)
+    quantity(name, ty).filter(|usual| !NORMALS.contains(usual)).unwrap_or(name)
 }
 
 /// The type that LAS has for the quantity that `name` is a name of.
@@ -81,6 +81,7 @@ mod tests {
     fn a_name_of_pdal_becomes_that_of_las_only_with_its_unit() {
         assert_eq!(other_name("GpsTime", AttributeType::Float64), "gps-time");
         assert_eq!(other_name("GpsTime", AttributeType::Float32), "GpsTime");
+        assert_eq!(other_name("nx", AttributeType::Float32), "nx", "a normal of one component");
         assert_eq!((las_type("ReturnNumber"), las_type("Quality")), (Some(AttributeType::UInt8), None));
     }
 }
