@@ -78,7 +78,7 @@ impl<'a> Pass<'a> {
             .map(|(packed, CellPart { mut segments, moments })| {
                 segments.sort();
                 let points = segments.points();
-                Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, repeats: 0, moments }
+                Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, repeats: 0, bounds: None, moments }
             })
             .collect();
         cells.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));
