@@ -58,8 +58,9 @@ pub use plan::{
 };
 pub use reason::{GridReason, LatticeBasis, LatticeReason};
 pub use report::{
-    CoordinateChange, DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport,
-    PointsReport, Report, SharedPlaceReport, TreeReport,
+    AttributeReport, ChangedAttribute, ChangedValues, CoordinateChange, DropReason, DroppedAttribute, Estimate,
+    GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport,
+    TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
 pub use warning::{CrsNote, Proj4Fault, Warning};

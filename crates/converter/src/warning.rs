@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use pointmill_format::{Aabb, ReadError, ScanWarning};
+use pointmill_format::{Aabb, Changes, DatasetKind, ReadError, ScanWarning};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::advice::Advice;
@@ -83,10 +83,23 @@ pub enum Warning {
         /// The place is (0, 0, 0) in a file that does not say where the scanner stood.
         at_origin: bool,
     },
-    /// 64-bit integers were rounded to doubles.
-    IntegersRounded {
-        /// Number of values.
-        values: u64,
+    /// Values of an attribute could not stay as they were.
+    ValuesChanged {
+        /// Its name.
+        attribute: String,
+        /// The format that cannot hold them; `None`: they changed while they were read.
+        output: Option<DatasetKind>,
+        /// How many, by what became of them.
+        changes: Changes,
+    },
+    /// Some files, or some scans of a file, have no values of attributes that others have.
+    ValuesMissing {
+        /// Their names.
+        attributes: Vec<String>,
+        /// Points without.
+        points: u64,
+        /// Files that have such points.
+        files: u64,
     },
     /// Inputs with 8-bit colour are mixed with inputs with 16-bit colour.
     MixedRgbDepth {
@@ -186,7 +199,8 @@ impl Warning {
             Self::Outliers { .. } => "outliers",
             Self::OriginPoints { .. } => "origin_points",
             Self::SharedPlace { .. } => "shared_place",
-            Self::IntegersRounded { .. } => "integers_rounded",
+            Self::ValuesChanged { .. } => "values_changed",
+            Self::ValuesMissing { .. } => "values_missing",
             Self::MixedRgbDepth { .. } => "mixed_rgb_depth",
             Self::Crs(_) => "crs",
             Self::DifferentCrs { .. } => "different_crs",
@@ -233,10 +247,11 @@ impl Warning {
                 grouped(*of)
             ),
             Self::SharedPlace { position, points, of, more, .. } => shared_place(*position, *points, *of, *more),
-            Self::IntegersRounded { values } => format!(
-                "{values} values of 64-bit integers are beyond 2^53 and were rounded: they are stored as doubles, \
-                 because Potree viewers fail on 64-bit integers"
-            ),
+            Self::ValuesChanged { attribute, output: None, changes } => format!("{attribute}: {changes}"),
+            Self::ValuesChanged { attribute, output: Some(kind), changes } => {
+                format!("{}: {attribute}: {changes}", kind.name())
+            }
+            Self::ValuesMissing { attributes, points, files } => missing(attributes, *points, *files),
             Self::MixedRgbDepth { eight_bit, coloured, first } => format!(
                 "{eight_bit} of {coloured} inputs with colour have no value above 255 and are taken as 8 bits deep, \
                  the others as 16 (the first is {})",
@@ -267,6 +282,12 @@ pub(crate) fn reason_of(error: &ReadError) -> String {
         Some(pointmill_format::Advice::SkipUnreadable) | None => error.what_and_where(),
         Some(_) => error.to_string(),
     }
+}
+
+fn missing(attributes: &[String], points: u64, files: u64) -> String {
+    let (point, have) = if points == 1 { ("point", "has") } else { ("points", "have") };
+    let file = if files == 1 { "file" } else { "files" };
+    format!("{}: {points} {point} of {files} {file} {have} none; 0 is written", attributes.join(", "))
 }
 
 fn outliers(points: u64, factor: f64, holds_back_step: bool) -> String {
@@ -348,6 +369,17 @@ impl fmt::Display for Proj4Fault {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_missing_is_one_line_for_all_attributes_that_the_same_points_lack() {
+        let missing = |names: &[&str], points, files| {
+            let attributes = names.iter().map(|n| (*n).to_owned()).collect();
+            Warning::ValuesMissing { attributes, points, files }.to_string()
+        };
+        let line = "classification, intensity: 400 points of 2 files have none; 0 is written";
+        assert_eq!(missing(&["classification", "intensity"], 400, 2), line);
+        assert_eq!(missing(&["rgb"], 1, 1), "rgb: 1 point of 1 file has none; 0 is written");
+    }
 
     #[test]
     fn a_warning_is_an_object_with_kind_and_text() {

@@ -65,7 +65,7 @@ pub use dataset_kind::{DatasetKind, Located, locate};
 pub use error::{Advice, ErrorKind, Fault, ReadError};
 pub use geometry::{Aabb, Lattice, NodeKey};
 pub use names::UnknownName;
-pub use points::{Attribute, AttributeType, Column, Element, NodePoints, PointBatch, Positions};
+pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Batches, Counted, Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart,
     ScanWarning, Scratch, Sink, UnknownAttribute, Wanted, open_scan, supported_scans,

@@ -2,6 +2,7 @@
 //! coordinate reference system.
 
 use super::intake::Intake;
+use super::shortfall::{self, Shortfall};
 use super::stats::{Range, SourceStats, Stats};
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{Plan, RgbDepth};
@@ -16,6 +17,8 @@ pub(crate) struct Facts {
     pub(crate) class: Option<usize>,
     /// Ranges as outputs have them, by index of the schema.
     pub(crate) ranges: Vec<Range>,
+    /// What is missing or changed of each attribute, by index of the schema.
+    pub(crate) shortfalls: Vec<Shortfall>,
     pub(crate) crs: ResolvedCrs,
 }
 
@@ -27,9 +30,8 @@ impl Facts {
         stats: &Stats,
         warnings: &mut Vec<Warning>,
     ) -> Result<Self, ConvertError> {
-        if stats.rounded_values > 0 {
-            warnings.push(Warning::IntegersRounded { values: stats.rounded_values });
-        }
+        let shortfalls = shortfall::shortfalls(intake, stats);
+        warnings.extend(shortfall::warnings(intake, &shortfalls));
         let schema = &intake.schema;
         let mut ranges = stats.ranges.clone();
         let mut widen_rgb = vec![None; sources.all.len()];
@@ -51,7 +53,7 @@ impl Facts {
         }
         let crs = resolve_crs(plan, &sources.all, warnings)?;
         let class = schema.find("classification").filter(|&i| schema.attributes[i].size() == 1);
-        Ok(Self { widen_rgb, class: class.map(|i| schema.offsets[i]), ranges, crs })
+        Ok(Self { widen_rgb, class: class.map(|i| schema.offsets[i]), ranges, shortfalls, crs })
     }
 }
 

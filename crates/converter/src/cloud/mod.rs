@@ -16,6 +16,7 @@ mod morton_sort;
 mod record;
 mod regroup;
 mod segments;
+mod shortfall;
 mod stats;
 mod store;
 
@@ -33,6 +34,7 @@ pub(crate) use morton_sort::MortonSorter;
 pub(crate) use record::{RecordFrame, copy_record, position};
 pub(crate) use regroup::Regrouper;
 pub(crate) use segments::{Segment, Segments};
+pub(crate) use shortfall::Shortfall;
 pub(crate) use stats::{Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 

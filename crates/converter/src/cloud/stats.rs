@@ -1,6 +1,6 @@
 //! What the pass over the points learns: bounds, ranges, counts and the checksum.
 
-use pointmill_format::{Aabb, Column, with_column};
+use pointmill_format::{Aabb, Changes, Column, with_column};
 
 use super::checksum::Checksum;
 use super::frames::JobBounds;
@@ -28,8 +28,6 @@ pub(crate) struct Stats {
     /// Skipped because they lie exactly at the origin of their scan.
     pub(crate) origin_skipped: u64,
     pub(crate) unreadable: u64,
-    /// 64-bit integers that a double does not hold exactly.
-    pub(crate) rounded_values: u64,
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -64,6 +62,19 @@ pub(crate) struct SourceStats {
     pub(crate) rgb: Range,
     /// Range of the colour of batches that the filter cut, points that it omitted included.
     pub(crate) rgb_unfiltered: Range,
+    /// Values that could not stay as they were, of all points that were read: by attribute of the schema, empty where
+    /// there are none.
+    pub(crate) changes: Vec<Changes>,
+}
+
+impl SourceStats {
+    /// Adds to what changed of an attribute of the schema.
+    pub(crate) fn count_changes(&mut self, attribute: usize, changes: &Changes) {
+        if self.changes.len() <= attribute {
+            self.changes.resize(attribute + 1, Changes::default());
+        }
+        self.changes[attribute].merge(changes);
+    }
 }
 
 /// Smallest and largest value of each element; NaN and infinities are not values.
@@ -185,6 +196,7 @@ impl Stats {
             bounds: Aabb::EMPTY,
             rgb: Range::new(3),
             rgb_unfiltered: Range::new(3),
+            changes: Vec::new(),
         };
         Self {
             bounds: JobBounds::EMPTY,
@@ -200,7 +212,6 @@ impl Stats {
             invalid: 0,
             origin_skipped: 0,
             unreadable: 0,
-            rounded_values: 0,
             warnings: Vec::new(),
         }
     }
@@ -216,6 +227,7 @@ impl Stats {
             a.bounds = a.bounds.union(&b.bounds);
             a.rgb.merge(&b.rgb);
             a.rgb_unfiltered.merge(&b.rgb_unfiltered);
+            b.changes.iter().enumerate().for_each(|(attribute, changes)| a.count_changes(attribute, changes));
         }
         self.checksum.merge(&other.checksum);
         self.change.merge(&other.change);
@@ -226,7 +238,6 @@ impl Stats {
         self.invalid += other.invalid;
         self.origin_skipped += other.origin_skipped;
         self.unreadable += other.unreadable;
-        self.rounded_values += other.rounded_values;
         self.warnings.extend_from_slice(&other.warnings);
         self.warnings.sort_by_cached_key(Warning::to_string);
     }

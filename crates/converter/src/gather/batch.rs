@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-use pointmill_format::{PointBatch, Positions};
+use pointmill_format::{Changes, PointBatch, Positions};
 
 use super::axis::SourceMap;
 use super::columns::Part;
@@ -69,8 +69,9 @@ impl<'a> Worker<'a> {
     pub(super) fn take(&mut self, source: usize, batch: &PointBatch) -> Result<(), ConvertError> {
         let filtered = select::select(self.pass, source, batch, &mut self.stats, &mut self.selection)?;
         self.stats.sources[source].read += batch.len() as u64;
+        self.note_changes(source, batch);
         let stored;
-        let batch = match self.as_stored(batch) {
+        let batch = match self.as_stored(source, batch) {
             Some(other) => {
                 stored = other;
                 &stored
@@ -106,13 +107,25 @@ impl<'a> Worker<'a> {
         outcome
     }
 
+    /// Adds what the reader could not keep.
+    fn note_changes(&mut self, source: usize, batch: &PointBatch) {
+        for (column, changes) in batch.changes() {
+            if let Some(place) = self.pass.intake.sources[source].columns[column] {
+                self.stats.sources[source].count_changes(place, changes);
+            }
+        }
+    }
+
     /// The batch with columns of the types that are stored, if these differ from what was read.
-    fn as_stored(&mut self, batch: &PointBatch) -> Option<PointBatch> {
+    fn as_stored(&mut self, source: usize, batch: &PointBatch) -> Option<PointBatch> {
         let mut stored: Option<PointBatch> = None;
         for (i, column) in batch.columns.iter().enumerate() {
             if let Some((doubles, rounded)) = as_doubles(column) {
                 stored.get_or_insert_with(|| batch.clone()).columns[i] = doubles;
-                self.stats.rounded_values += rounded;
+                if let Some(place) = self.pass.intake.sources[source].columns[i] {
+                    let changes = Changes { rounded, ..Changes::default() };
+                    self.stats.sources[source].count_changes(place, &changes);
+                }
             }
         }
         stored

@@ -4,7 +4,8 @@ use pointmill_format::{Aabb, DatasetKind};
 use serde_json::{Map, Value, json};
 
 use super::types::{
-    CoordinateChange, GridReport, InputReport, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport,
+    AttributeReport, CoordinateChange, GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport,
+    Report, SharedPlaceReport,
 };
 use crate::cloud::{Cloud, Cube, JobLattice, SharedPlace};
 use crate::error::ConvertError;
@@ -36,6 +37,7 @@ pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, Conv
         version: env!("CARGO_PKG_VERSION").into(),
         options: settings,
         inputs: input_reports(cloud.sources, Some(cloud)),
+        attributes: attribute_reports(cloud),
         grid: grid_report(&cloud.lattice, cloud.is_lossless, &cloud.frame.cube),
         points: points_report(cloud, &outputs)?,
         shared_places: cloud.shared_places.iter().map(shared_place).collect(),
@@ -105,6 +107,21 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
         }
     };
     sources.all.iter().enumerate().map(report).collect()
+}
+
+/// What was read of each attribute.
+fn attribute_reports(cloud: &Cloud<'_>) -> Vec<AttributeReport> {
+    let report = |(attribute, shortfall): (&pointmill_format::Attribute, &crate::cloud::Shortfall)| {
+        let missing = MissingValues { points: shortfall.missing_points, files: shortfall.missing_files, value: 0 };
+        AttributeReport {
+            name: attribute.name.clone(),
+            ty: attribute.ty.to_string(),
+            elements: attribute.elements,
+            missing: (missing.points > 0).then_some(missing),
+            changed: (!shortfall.changes.is_empty()).then(|| shortfall.changes.into()),
+        }
+    };
+    cloud.schema().attributes.iter().zip(&cloud.facts.shortfalls).map(report).collect()
 }
 
 /// The lattice and the root cube.

@@ -5,6 +5,7 @@ mod types;
 
 pub(crate) use build::{Account, filter_settings, grid_report, input_reports, report, settings};
 pub use types::{
-    CoordinateChange, DropReason, DroppedAttribute, Estimate, GridReport, InputReport, OutputReport, PhaseReport,
-    PointsReport, Report, SharedPlaceReport, TreeReport,
+    AttributeReport, ChangedAttribute, ChangedValues, CoordinateChange, DropReason, DroppedAttribute, Estimate,
+    GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport,
+    TreeReport,
 };

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use pointmill_format::Changes;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
@@ -27,6 +28,8 @@ pub struct Report {
     pub shared_places: Vec<SharedPlaceReport>,
     /// Largest and RMS change of a coordinate, per axis, world units.
     pub coordinate_change: CoordinateChange,
+    /// One entry per attribute that was read, in the order of the stored records.
+    pub attributes: Vec<AttributeReport>,
     /// One entry per dataset written, in the order requested.
     pub outputs: Vec<OutputReport>,
     /// Order-independent checksum of the points that passed the filter; that of every output equals it, or the run fails.
@@ -61,6 +64,9 @@ pub struct OutputReport {
     pub attributes: Vec<String>,
     /// Attributes that were omitted, and why.
     pub attributes_dropped: Vec<DroppedAttribute>,
+    /// Attributes with values that the format cannot hold as they were read.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub attributes_changed: Vec<ChangedAttribute>,
     /// Bytes of its files.
     pub bytes: u64,
     /// Wall seconds from the gathered points to the synced files.
@@ -101,6 +107,70 @@ pub struct InputReport {
     pub crs: String,
     /// 8 or 16 where the file has colour.
     pub rgb_depth: Option<u8>,
+}
+
+/// One attribute of the cloud.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct AttributeReport {
+    /// Its name.
+    pub name: String,
+    /// The type of its elements in the records (`uint16`, `double`, …): one that holds the values of all inputs.
+    #[serde(rename = "type")]
+    pub ty: String,
+    /// Elements per point.
+    pub elements: usize,
+    /// Points without a value, for which 0 was taken; `None`: all have one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<MissingValues>,
+    /// Values that changed while they were read; `None`: none did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changed: Option<ChangedValues>,
+}
+
+/// Points that have no value of an attribute.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct MissingValues {
+    /// How many.
+    pub points: u64,
+    /// Of how many files.
+    pub files: u64,
+    /// What was taken for them.
+    pub value: u8,
+}
+
+/// An attribute with values that a format cannot hold as they were read.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct ChangedAttribute {
+    /// Its name.
+    pub name: String,
+    /// How many, by what became of them.
+    pub changed: ChangedValues,
+}
+
+/// Values that became others, by what became of them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct ChangedValues {
+    /// Outside the range that is declared or can be held: its nearest end was taken.
+    pub clamped: u64,
+    /// Between two values that can be held: the nearest was taken.
+    pub rounded: u64,
+    /// NaN or infinite where there are no such values: 0 was taken.
+    pub not_finite: u64,
+    /// Too large to be held, and the nearest end would mean something else: 0 was taken.
+    pub out_of_range: u64,
+    /// Least and greatest finite value among them.
+    pub extremes: Option<[f64; 2]>,
+}
+
+impl From<Changes> for ChangedValues {
+    fn from(changes: Changes) -> Self {
+        let Changes { clamped, rounded, not_finite, out_of_range, extremes, .. } = changes;
+        Self { clamped, rounded, not_finite, out_of_range, extremes }
+    }
 }
 
 /// File names need not be Unicode, JSON must be.

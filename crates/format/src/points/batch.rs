@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Attribute, Column, Element};
+use super::{Attribute, Changes, Column, Element};
 
 /// Positions of a batch, x, y, z of equal length.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +55,8 @@ pub struct PointBatch {
     pub columns: Vec<Column>,
     /// What the columns are.
     attributes: Arc<[Attribute]>,
+    /// By column; shorter than the columns, or empty, where nothing changed.
+    changes: Vec<Changes>,
 }
 
 impl PointBatch {
@@ -63,12 +65,34 @@ impl PointBatch {
     pub fn new(first_point: u64, positions: Positions, attributes: impl Into<Arc<[Attribute]>>) -> Self {
         let attributes = attributes.into();
         let columns = attributes.iter().map(|a| Column::new(a.ty)).collect();
-        Self { first_point, positions, columns, attributes }
+        Self { first_point, positions, columns, attributes, changes: Vec::new() }
     }
 
     /// What the columns are: [`crate::ScanInfo::attributes`] of their scan.
     pub fn attributes(&self) -> &[Attribute] {
         &self.attributes
+    }
+
+    /// What the reader could not keep of the values of these points: (index of the column, counts), where there is
+    /// something.
+    pub fn changes(&self) -> impl Iterator<Item = (usize, &Changes)> {
+        self.changes.iter().enumerate().filter(|(_, changes)| !changes.is_empty())
+    }
+
+    /// Counts changed values of a column, beside those of [`Self::changes`].
+    pub fn count_changes(&mut self, column: usize, changes: &Changes) {
+        if changes.is_empty() {
+            return;
+        }
+        if self.changes.len() <= column {
+            self.changes.resize(column + 1, Changes::default());
+        }
+        self.changes[column].merge(changes);
+    }
+
+    /// Starts counting anew, for other points.
+    pub fn clear_changes(&mut self) {
+        self.changes.clear();
     }
 
     /// The values of the attribute of that name, if its elements have the type `T`: [`Attribute::elements`] values per

@@ -2,6 +2,7 @@
 
 mod attribute;
 mod batch;
+mod changes;
 mod column;
 pub(crate) mod column_bytes;
 mod element;
@@ -9,6 +10,7 @@ mod node_points;
 
 pub use attribute::{Attribute, AttributeType};
 pub use batch::{PointBatch, Positions};
+pub use changes::Changes;
 pub use column::Column;
 pub use element::Element;
 pub use node_points::NodePoints;

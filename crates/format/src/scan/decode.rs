@@ -38,11 +38,13 @@ pub(super) fn fitting_batch<'a>(
         Some(b) if fits(b) => b.set_attributes(attributes),
         _ => *batch = None,
     }
-    batch.get_or_insert_with(|| {
+    let batch = batch.get_or_insert_with(|| {
         let quantized = || Positions::Quantized(Default::default());
         let positions = if is_quantized { quantized() } else { Positions::World(Default::default()) };
         PointBatch::new(0, positions, attributes.clone())
-    })
+    });
+    batch.clear_changes();
+    batch
 }
 
 /// A scan that is open for reading; any number of threads may decode different pieces at once.

@@ -308,6 +308,7 @@ impl Decoder<'_> {
     /// Gives the batch room for `points` points.
     fn prepare(&self, batch: &mut PointBatch, first_point: u64, points: usize) {
         batch.first_point = first_point;
+        batch.clear_changes();
         if let Positions::World(xyz) = &mut batch.positions {
             xyz.iter_mut().for_each(|axis| axis.resize(points, 0.0));
             if self.schema.flat {
