@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
+use pointmill_format::Lattice;
+
 use super::axis::SourceMap;
 use super::cut::Cut;
 use super::origins::Origins;
@@ -31,6 +33,8 @@ pub(super) struct Context<'a> {
     pub(super) cuts: Vec<Option<Cut>>,
     /// Where the scanners of each source stood.
     pub(super) origins: Vec<Origins>,
+    /// The lattice of the pass.
+    pub(super) lattice: Lattice,
     pub(super) partition: Partition,
     pub(super) store: Store,
     pub(super) wants_moments: bool,

@@ -102,7 +102,7 @@ mod tests {
         }
         let info = info(Some(Lattice { scale: [0.1; 3], offset: [0.0; 3] }), Resolution::Double);
         assert_eq!(inside(&info, 0.05, 0.34, &steps(0..9)), [1, 2, 3], "between the steps");
-        assert_eq!(inside(&info, 0.31, 0.34, &steps(0..9)), [], "no step at all");
+        assert_eq!(inside(&info, 0.31, 0.34, &steps(0..9)), Vec::<usize>::new(), "no step at all");
         assert_eq!(inside(&info, -1.0, 9.0, &steps(0..9)).len(), 9);
     }
 

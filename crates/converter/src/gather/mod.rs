@@ -10,6 +10,7 @@ mod batch;
 mod columns;
 mod context;
 mod cut;
+mod exact;
 mod lattice;
 mod origins;
 mod outliers;

@@ -51,6 +51,7 @@ impl<'a> Pass<'a> {
             sources,
             intake,
             maps: sources.all.iter().map(map).collect(),
+            lattice: lattice.lattice,
             cuts: sources.all.iter().map(|s| plan.filter.bounds.map(|b| Cut::new(&b, s.scan.info()))).collect(),
             origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),

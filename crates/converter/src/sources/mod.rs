@@ -8,7 +8,7 @@ use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
 pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
 pub(crate) use extent::{Extent, far_out, intersection};
-pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
+pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema, as_doubles};
 
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{OnFault, Plan};

@@ -14,6 +14,8 @@ pub(crate) struct Block {
     pub(crate) truncated: [Vec<i64>; 3],
     /// For each attribute of the dataset but the position: the bits of its elements, point by point.
     pub(crate) words: Vec<Vec<u64>>,
+    /// What the lattice takes away of the position; filled where equal records count once.
+    pub(crate) residues: Vec<u64>,
     /// Which records take part.
     pub(crate) keep: Vec<bool>,
     /// Hash states of what was mixed in so far.
@@ -57,6 +59,7 @@ impl Block {
         self.positions.iter_mut().chain(&mut self.truncated).for_each(Vec::clear);
         self.words.resize_with(attributes, Vec::new);
         self.words.iter_mut().for_each(Vec::clear);
+        self.residues.clear();
         self.keep.clear();
     }
 

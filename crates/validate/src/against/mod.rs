@@ -6,6 +6,7 @@
 //! collisions on purpose). Unequal sums are narrowed down in further passes ([`narrow`]).
 
 pub(crate) mod block;
+mod distinct;
 mod narrow;
 pub(crate) mod rules;
 mod selection;

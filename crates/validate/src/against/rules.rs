@@ -118,6 +118,12 @@ impl Rules {
         self.stored.as_ref().map_or_else(|| self.lattice.world(position), |stored| stored.world(position))
     }
 
+    /// World coordinate of a dataset's coordinate, as the job's lattice has it, and the offset in it.
+    pub(super) fn job_world(&self, axis: usize, stored: i64) -> (f64, f64) {
+        let offset = self.lattice_offset[axis];
+        ((stored + self.shift[axis]) as f64 * self.lattice.scale[axis] + offset, offset)
+    }
+
     /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
     #[inline]
     pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
