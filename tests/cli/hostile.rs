@@ -116,5 +116,5 @@ fn scans_that_no_lattice_can_hold_together_are_refused() {
     let mut far = Las::terrain(3000, 1);
     far.offset[0] = 1e300;
     dir.write("scans/b.las", &far.bytes());
-    dir.run(["convert", "scans", "-o", "out", "-q"]).failed_with(4, &["too far apart"]);
+    dir.run(["convert", "scans", "-o", "out", "-q"]).failed_with(3, &["cannot be coordinates", "--bounds"]);
 }

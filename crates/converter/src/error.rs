@@ -310,7 +310,8 @@ impl fmt::Display for InputFault {
                  classes, {thinned} thinned out, {invalid} without a valid position, {at_origin} at the scanner's origin"
             ),
             Self::FarPoints { min, max } => {
-                write!(f, "there are points from {min:?} to {max:?}, which cannot be coordinates")
+                let corner = |c: &[f64; 3]| format!("{:e}, {:e}, {:e}", c[0], c[1], c[2]);
+                write!(f, "there are points from ({}) to ({}), which cannot be coordinates", corner(min), corner(max))
             }
             Self::InvalidPosition { path, point } => {
                 write!(f, "{}: point {point} has no finite position", path.display())

@@ -56,7 +56,7 @@ pub use plan::{
     AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice,
     Setting,
 };
-pub use reason::{GridReason, LatticeBasis, LatticeReason};
+pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
     AttributeReport, ChangedAttribute, ChangedValues, CoordinateChange, DropReason, DroppedAttribute, Estimate,
     GridReport, InputReport, MissingValues, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport,

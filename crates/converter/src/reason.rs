@@ -8,13 +8,41 @@ use serde::{Serialize, Serializer};
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct LatticeReason {
-    /// What it was chosen by.
-    pub basis: LatticeBasis,
-    /// Made this many times coarser, because 31 bits could not hold the extent.
-    pub coarser: Option<f64>,
+    /// Per axis.
+    pub axes: [AxisReason; 3],
 }
 
-/// What a lattice was chosen by.
+/// Why the step of an axis was chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
+pub struct AxisReason {
+    /// What it was chosen by.
+    pub basis: LatticeBasis,
+    /// It had to be coarser than that.
+    pub coarser: Option<Coarser>,
+}
+
+/// How much coarser a step had to be, and why.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Coarser {
+    /// As many times.
+    pub factor: f64,
+    /// Why.
+    pub cause: CoarserCause,
+}
+
+/// Why a step had to be coarser.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CoarserCause {
+    /// 31 bits do not hold the extent.
+    Extent,
+    /// Doubles as large as the coordinates are further apart: a step is at least two of their distances.
+    Doubles,
+}
+
+/// What a step was chosen by.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub enum LatticeBasis {
@@ -25,12 +53,16 @@ pub enum LatticeBasis {
     Requested,
     /// The lattice that all sources share.
     Sources,
-    /// The finest of the sources, per axis.
+    /// The coarsest step that holds the coordinates of all sources.
+    Common,
+    /// The finest step of the sources, for want of a common one.
     FinestOfSources,
-    /// The finest of the sources that have one, per axis.
-    FinestOfSome,
-    /// Decimal parts of that, for the others' sake.
+    /// Decimal parts of the step of some sources, for the others' sake.
     PartOfFinest,
+    /// What all integers of the sources have in common.
+    Divisor,
+    /// The decimals that the coordinates have.
+    Decimals,
     /// The resolution of single precision at the largest coordinate, world units.
     SinglePrecision {
         /// The largest coordinate.
@@ -42,40 +74,62 @@ pub enum LatticeBasis {
     StoredStep,
     /// Neither lattice nor extent: the usual step.
     Usual,
-    /// The finest power of ten.
-    PowerOfTen,
+    /// The finest step of 1, 2 or 5 times a power of ten.
+    Decimal,
+}
+
+impl LatticeReason {
+    /// The same reason for all axes.
+    pub(crate) fn of_all(basis: LatticeBasis) -> Self {
+        Self { axes: [AxisReason { basis, coarser: None }; 3] }
+    }
+}
+
+impl fmt::Display for LatticeBasis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Open => f.write_str("known once the points are read"),
+            Self::Requested => f.write_str("as requested"),
+            Self::Sources => f.write_str("that of the sources"),
+            Self::Common => f.write_str("the coarsest that holds the coordinates of all sources"),
+            Self::FinestOfSources => f.write_str("the finest of the sources, which have none in common"),
+            Self::PartOfFinest => {
+                f.write_str("a power of ten below the finest of the sources that store integers, for the other sources")
+            }
+            Self::Divisor => f.write_str("a power of ten that all integers of the sources are multiples of"),
+            Self::Decimals => f.write_str("the decimals of the coordinates"),
+            Self::SinglePrecision { farthest } => {
+                write!(f, "single precision of the sources, which resolves no finer at {farthest:.6}")
+            }
+            Self::PowerOfTwo => f.write_str(
+                "the finest power of two that 31-bit integers hold; single precision of the sources would be finer",
+            ),
+            Self::StoredStep => f.write_str("the step in which the sources store coordinates"),
+            Self::Usual => f.write_str("the inputs have no lattice and no extent"),
+            Self::Decimal => f.write_str("the finest of 1, 2 and 5 times powers of ten that 31-bit integers hold"),
+        }
+    }
+}
+
+impl fmt::Display for AxisReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.basis.fmt(f)?;
+        let Some(Coarser { factor, cause }) = self.coarser else { return Ok(()) };
+        write!(f, "; made {factor} times coarser, because ")?;
+        match cause {
+            CoarserCause::Extent => f.write_str("31 bits do not hold the extent"),
+            CoarserCause::Doubles => f.write_str("doubles as large as the coordinates are further apart"),
+        }
+    }
 }
 
 impl fmt::Display for LatticeReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.basis {
-            LatticeBasis::Open => f.write_str("known once the points are read"),
-            LatticeBasis::Requested => f.write_str("as requested"),
-            LatticeBasis::Sources => f.write_str("that of the sources"),
-            LatticeBasis::FinestOfSources => f.write_str("the finest scale of the sources, per axis"),
-            LatticeBasis::FinestOfSome => f.write_str(
-                "the finest scale of the sources that have a lattice, per axis; the others are rounded to it",
-            ),
-            LatticeBasis::PartOfFinest => f.write_str(
-                "a power of ten below the finest scale of the sources that have a lattice, for the other sources",
-            ),
-            LatticeBasis::SinglePrecision { farthest } => write!(
-                f,
-                "single precision of the sources: coordinates up to {farthest:.6} resolve no finer on every axis"
-            ),
-            LatticeBasis::PowerOfTwo => f.write_str(
-                "the finest power of two that 31-bit integers hold; single precision of the sources would be finer",
-            ),
-            LatticeBasis::StoredStep => f.write_str("the step in which the sources store coordinates"),
-            LatticeBasis::Usual => f.write_str("the inputs have no lattice and no extent"),
-            LatticeBasis::PowerOfTen => {
-                f.write_str("the sources have no lattice; the finest power of ten that 31-bit integers hold")
-            }
-        }?;
-        match self.coarser {
-            Some(factor) => write!(f, "; made {factor} times coarser, because 31 bits could not hold the extent"),
-            None => Ok(()),
+        let [x, y, z] = &self.axes;
+        if x == y && y == z {
+            return x.fmt(f);
         }
+        write!(f, "x: {x}; y: {y}; z: {z}")
     }
 }
 

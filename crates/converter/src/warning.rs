@@ -40,17 +40,27 @@ pub enum Warning {
     },
     /// The declared bounds, or the coordinate step chosen from them, do not fit the points: they are read again.
     ReadAgain,
-    /// The declared bounds made the coordinate step too coarse: the points are read again.
-    StepTooCoarse {
-        /// How many times too coarse.
-        factor: f64,
+    /// Bounds that were declared, or decimals of a sample, made the coordinate step too coarse: the points are read
+    /// again.
+    FinerStep {
+        /// The step per axis, world units.
+        scale: [f64; 3],
+        /// Why.
+        reason: LatticeReason,
     },
-    /// The extent asks for a coarser coordinate step.
+    /// The points ask for a coarser coordinate step: they are read again.
     CoarserStep {
         /// The step per axis, world units.
         scale: [f64; 3],
         /// Why.
         reason: LatticeReason,
+    },
+    /// Single precision does not resolve the coordinates of an input well.
+    CoarseSingle {
+        /// The input.
+        path: PathBuf,
+        /// Distance of neighbouring coordinates at the largest ones, per axis, world units.
+        resolution: [f64; 3],
     },
     /// A few points are far from all others.
     Outliers {
@@ -194,8 +204,9 @@ impl Warning {
             Self::InputSkipped { .. } => "input_skipped",
             Self::PointsSkipped { .. } => "points_skipped",
             Self::ReadAgain => "read_again",
-            Self::StepTooCoarse { .. } => "step_too_coarse",
+            Self::FinerStep { .. } => "finer_step",
             Self::CoarserStep { .. } => "coarser_step",
+            Self::CoarseSingle { .. } => "coarse_single",
             Self::Outliers { .. } => "outliers",
             Self::OriginPoints { .. } => "origin_points",
             Self::SharedPlace { .. } => "shared_place",
@@ -235,11 +246,17 @@ impl Warning {
             Self::ReadAgain => "the points lie outside the declared bounds, or their extent does not fit the chosen \
                                 step; reading again with the measured bounds"
                 .to_owned(),
-            Self::StepTooCoarse { factor } => format!(
-                "the declared bounds made the coordinate step {factor} times too coarse; reading again with the \
-                 measured bounds"
+            Self::FinerStep { scale, reason } => format!(
+                "the coordinates are finer than bounds or a sample showed; reading again with the step {}: {reason}",
+                steps(*scale)
             ),
-            Self::CoarserStep { scale, reason } => format!("coordinate step {scale:?}: {reason}"),
+            Self::CoarserStep { scale, reason } => format!("coordinate step {}: {reason}", steps(*scale)),
+            Self::CoarseSingle { path, resolution } => format!(
+                "{}: stores coordinates in single precision, which resolves {} here and no finer; no tool can restore \
+                 what it lacks",
+                path.display(),
+                steps(*resolution)
+            ),
             Self::Outliers { points, factor, holds_back_step, .. } => outliers(*points, *factor, *holds_back_step),
             Self::OriginPoints { points, of } => format!(
                 "{} of {} points lie exactly at the origin of their scan, where the scanner stood",
@@ -274,6 +291,12 @@ impl Warning {
             Self::NoColour => "batches: no input has colour or intensity; all points are white".to_owned(),
         }
     }
+}
+
+/// One number where all axes have the same.
+fn steps(scale: [f64; 3]) -> String {
+    let [x, y, z] = scale;
+    if x == y && y == z { x.to_string() } else { format!("{x}, {y}, {z}") }
 }
 
 /// The line of an error of something that was skipped: without the advice to skip it.

@@ -63,7 +63,7 @@ pub mod scan;
 
 pub use dataset_kind::{DatasetKind, Located, locate};
 pub use error::{Advice, ErrorKind, Fault, ReadError};
-pub use geometry::{Aabb, Lattice, NodeKey};
+pub use geometry::{Aabb, AxisGrid, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{

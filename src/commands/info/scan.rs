@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pointmill_format::{OpenOptions, Resolution, Scan, ScanInfo, ScanPart};
+use pointmill_format::{AxisGrid, OpenOptions, Resolution, Scan, ScanInfo, ScanPart};
 use serde_json::{Map, Value, json};
 
 use super::description::{Description, attribute_json, corners};
@@ -62,20 +62,30 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
     t.0
 }
 
-/// The precision of stored coordinates, as the step at the far ends of the bounds.
+/// The precision of stored coordinates: one text where all axes agree, else one per axis.
 fn resolution(info: &ScanInfo, measured: Option<&Measured>) -> String {
-    match info.resolution {
-        Resolution::Step(step) => format!("stored in steps of {}", number(step)),
-        Resolution::Double => "stored in double precision, or as decimal text".to_owned(),
-        Resolution::Single => {
-            let measured = measured.map(|m| m.bounds).filter(|b| !b.is_empty());
-            match measured.or(info.bounds_declared) {
-                None => "stored in single precision; --deep reports the step at the far ends".to_owned(),
-                Some(b) => {
-                    let steps = [0, 1, 2].map(|a| single_step(b.min[a].abs().max(b.max[a].abs())));
-                    format!("stored in single precision: steps of {} at the far ends", numbers(&steps))
-                }
-            }
+    let bounds = measured.map(|m| m.bounds).filter(|b| !b.is_empty()).or(info.bounds_declared);
+    let [x, y, z] = std::array::from_fn(|a| {
+        let far = bounds.map(|b| b.min[a].abs().max(b.max[a].abs()));
+        axis_resolution(info.resolution[a], far)
+    });
+    if x == y && y == z { format!("stored {x}") } else { format!("stored x {x}, y {y}, z {z}") }
+}
+
+/// The precision of an axis; `far`: its largest coordinate.
+fn axis_resolution(resolution: Resolution, far: Option<f64>) -> String {
+    match (resolution, far) {
+        (Resolution::Grid(AxisGrid { step, offset }), _) if offset % step == 0.0 => {
+            format!("in steps of {}", number(step))
+        }
+        (Resolution::Grid(AxisGrid { step, offset }), _) => {
+            format!("in steps of {} from {}", number(step), number(offset))
+        }
+        (Resolution::Step(step), _) => format!("in steps of {}", number(step)),
+        (Resolution::Double, _) => "in double precision, or as decimal text".to_owned(),
+        (Resolution::Single, None) => "in single precision; --deep reports the step at the far ends".to_owned(),
+        (Resolution::Single, Some(far)) => {
+            format!("in single precision, steps of {} at the far ends", number(single_step(far)))
         }
     }
 }
@@ -126,12 +136,13 @@ fn half_turn_axis(m: &[[f64; 3]; 3]) -> [f64; 3] {
 fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
     let info = scan.info();
     let part = |p: &ScanPart| json!({ "name": p.name, "points": p.points, "rotation": p.rotation, "translation": p.translation });
-    let resolution = match info.resolution {
-        _ if info.lattice.is_some() => Value::Null,
+    let of_axis = |resolution: Resolution| match resolution {
+        Resolution::Grid(grid) => json!({ "stored": "steps", "step": grid.step, "offset": grid.offset }),
         Resolution::Step(step) => json!({ "stored": "steps", "step": step }),
         Resolution::Single => json!({ "stored": "single" }),
         Resolution::Double => json!({ "stored": "double or text" }),
     };
+    let resolution = info.lattice.is_none().then(|| info.resolution.map(of_axis));
     let mut object = json!({
         "path": info.path.to_string_lossy(),
         "kind": "scan",

@@ -22,12 +22,12 @@ mod store;
 
 pub(crate) use cell::{Cell, SharedPlace};
 pub(crate) use checksum::Checksum;
-pub(crate) use cube::{ANCHOR_BITS, Cube, TREE_BITS, tidy_world};
+pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
 pub(crate) use frames::{JobBounds, JobColumns, JobPoint, StoredOrigin, StoredPoint, TreePoint};
 pub(crate) use grouping::{CellHash, Grouping};
 pub(crate) use intake::Intake;
-pub(crate) use lattice::{JobLattice, Steps};
+pub(crate) use lattice::JobLattice;
 pub(crate) use ledger::Ledger;
 pub(crate) use moments::Moments;
 pub(crate) use morton_sort::MortonSorter;
@@ -38,11 +38,9 @@ pub(crate) use shortfall::Shortfall;
 pub(crate) use stats::{Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 
-use pointmill_format::Resolution;
-
 use crate::error::ConvertError;
 use crate::plan::Plan;
-use crate::sources::{Schema, Sources};
+use crate::sources::{Fineness, Schema, Sources};
 use crate::warning::Warning;
 
 /// All points of a run, and what every output is made from.
@@ -126,13 +124,10 @@ impl<'a> Cloud<'a> {
 
     /// Least step of the coordinates of the sources, world units; that of the lattice where a source states none.
     pub(crate) fn source_step(&self) -> [f64; 3] {
-        let step = |source: &crate::sources::Source, a: usize| match (
-            source.scan.info().lattice,
-            source.scan.info().resolution,
-        ) {
-            (Some(lattice), _) => lattice.scale[a],
-            (None, Resolution::Step(step)) => step,
-            (None, _) => self.lattice.lattice.scale[a],
+        let step = |source: &crate::sources::Source, a: usize| match source.survey.fineness[a] {
+            Fineness::Grid { grid, .. } => grid.step,
+            Fineness::Step(step) => step,
+            Fineness::Single | Fineness::Double => self.lattice.lattice.scale[a],
         };
         std::array::from_fn(|a| self.sources.all.iter().map(|s| step(s, a)).fold(f64::INFINITY, f64::min))
     }

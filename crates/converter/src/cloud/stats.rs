@@ -31,19 +31,63 @@ pub(crate) struct Stats {
     pub(crate) warnings: Vec<Warning>,
 }
 
-/// Coordinate change by moving to the job lattice, world units: sums over points.
+/// Coordinate change by moving to the job lattice (job minus source), world units, over the points that go in.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Change {
+    /// Largest magnitude.
     pub(crate) max: [f64; 3],
+    /// Signed: the bias, once divided by the number of points.
+    pub(crate) sum: [f64; 3],
     pub(crate) sum_of_squares: [f64; 3],
+    /// Largest square of the distance that a point moved.
+    pub(crate) max_squared_3d: f64,
 }
 
 impl Change {
+    /// Adds `points` points, with the change of each axis: the same for all, or a column of it.
+    pub(crate) fn add(&mut self, points: usize, axes: [Result<f64, &[f64]>; 3]) {
+        for (a, axis) in axes.iter().enumerate() {
+            match axis {
+                Ok(by) => {
+                    self.max[a] = self.max[a].max(by.abs());
+                    self.sum[a] += by * points as f64;
+                    self.sum_of_squares[a] += by * by * points as f64;
+                }
+                Err(column) => {
+                    let (mut max, mut sum, mut squares) = (0.0f64, 0.0, 0.0);
+                    for v in *column {
+                        max = max.max(v.abs());
+                        sum += v;
+                        squares += v * v;
+                    }
+                    self.max[a] = self.max[a].max(max);
+                    self.sum[a] += sum;
+                    self.sum_of_squares[a] += squares;
+                }
+            }
+        }
+        if axes.iter().all(Result::is_ok) {
+            let squared = axes.iter().map(|a| a.unwrap_or_default().powi(2)).sum();
+            self.max_squared_3d = self.max_squared_3d.max(squared);
+            return;
+        }
+        let at = |axis: &Result<f64, &[f64]>, i: usize| match axis {
+            Ok(by) => *by,
+            Err(column) => column[i],
+        };
+        for i in 0..points {
+            let squared = axes.iter().map(|axis| at(axis, i).powi(2)).sum();
+            self.max_squared_3d = self.max_squared_3d.max(squared);
+        }
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         for a in 0..3 {
             self.max[a] = self.max[a].max(other.max[a]);
+            self.sum[a] += other.sum[a];
             self.sum_of_squares[a] += other.sum_of_squares[a];
         }
+        self.max_squared_3d = self.max_squared_3d.max(other.max_squared_3d);
     }
 }
 
@@ -58,6 +102,8 @@ pub(crate) struct SourceStats {
     pub(crate) at_origin: u64,
     /// World coordinates, before any filter.
     pub(crate) bounds: Aabb,
+    /// Axes on which a point contradicts the grid that the file, or a sample, claims.
+    pub(crate) off_grid: [bool; 3],
     /// Range of the colour of the points that go in.
     pub(crate) rgb: Range,
     /// Range of the colour of batches that the filter cut, points that it omitted included.
@@ -194,6 +240,7 @@ impl Stats {
             kept: 0,
             at_origin: 0,
             bounds: Aabb::EMPTY,
+            off_grid: [false; 3],
             rgb: Range::new(3),
             rgb_unfiltered: Range::new(3),
             changes: Vec::new(),
@@ -225,6 +272,7 @@ impl Stats {
             a.kept += b.kept;
             a.at_origin += b.at_origin;
             a.bounds = a.bounds.union(&b.bounds);
+            a.off_grid = std::array::from_fn(|axis| a.off_grid[axis] || b.off_grid[axis]);
             a.rgb.merge(&b.rgb);
             a.rgb_unfiltered.merge(&b.rgb_unfiltered);
             b.changes.iter().enumerate().for_each(|(attribute, changes)| a.count_changes(attribute, changes));
@@ -246,6 +294,19 @@ impl Stats {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn changes_add_up_by_axis_and_in_space() {
+        let mut change = Change::default();
+        change.add(2, [Ok(0.5), Err(&[3.0, -1.0]), Err(&[4.0, 0.0])]);
+        let mut other = Change::default();
+        other.add(1, [Ok(-1.0), Ok(0.0), Ok(0.0)]);
+        change.merge(&other);
+        assert_eq!(change.max, [1.0, 3.0, 4.0]);
+        assert_eq!(change.sum, [0.0, 2.0, 4.0]);
+        assert_eq!(change.sum_of_squares, [1.5, 10.0, 16.0]);
+        assert_eq!(change.max_squared_3d, 25.25);
+    }
 
     #[test]
     fn ranges_skip_what_is_not_a_number_and_say_so() {

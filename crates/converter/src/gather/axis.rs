@@ -1,18 +1,26 @@
-//! From a source's coordinates to the job lattice, one axis at a time.
+//! From a source's coordinates to the job lattice, one axis at a time, and how far each coordinate moves by that.
 
-use pointmill_format::Lattice;
+use pointmill_format::{AxisGrid, Lattice};
 
-/// How one axis of a source maps to the job lattice.
+/// How one axis of a source maps to the job lattice. Ties are rounded to even everywhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum AxisMap {
     /// `job = source · mul + add`: every source coordinate is a point of the job lattice.
     Exact {
         mul: i64,
         add: i64,
-        /// What is left of the difference of the offsets, world units; below a millionth of a step.
+        /// What the job lattice adds to every coordinate, world units; below a millionth of a step.
         residue: f64,
     },
-    /// `job = round((source · scale + offset − job_offset) / job_scale)`: coordinates may move by half a step.
+    /// `job = round((source · mul + add) / div)`, in integers: the job lattice is coarser, or lies between.
+    Ratio {
+        mul: i64,
+        add: i64,
+        div: i64,
+        /// World units of one.
+        unit: f64,
+    },
+    /// `job = round((source · scale + offset − job_offset) / job_scale)`, in doubles.
     Rounded { scale: f64, offset: f64, job_scale: f64, job_offset: f64 },
 }
 
@@ -20,6 +28,15 @@ pub(super) enum AxisMap {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SourceMap {
     pub(super) axes: [AxisMap; 3],
+}
+
+/// By how much coordinates move on an axis: job minus source, world units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Moved {
+    /// All by this.
+    By(f64),
+    /// Each by the value in the column.
+    Each,
 }
 
 impl SourceMap {
@@ -31,11 +48,6 @@ impl SourceMap {
         });
         Self { axes }
     }
-
-    /// True if no position moves.
-    pub(super) fn is_exact(&self) -> bool {
-        self.axes.iter().all(|axis| matches!(axis, AxisMap::Exact { .. }))
-    }
 }
 
 impl AxisMap {
@@ -45,51 +57,85 @@ impl AxisMap {
         let (mul, add) = (ratio.round(), shift.round());
         let near = (ratio - mul).abs() <= mul.abs() * 1e-15 && (shift - add).abs() <= 1e-6;
         if near && mul >= 1.0 && mul < 2f64.powi(31) && add.abs() < 2f64.powi(52) {
-            let residue = ((shift - add) * job_scale).abs();
+            let residue = (add - shift) * job_scale;
             return Self::Exact { mul: mul as i64, add: add as i64, residue };
         }
-        Self::Rounded { scale, offset, job_scale, job_offset }
+        let plain = Self::Rounded { scale, offset, job_scale, job_offset };
+        Self::ratio(AxisGrid { step: scale, offset }, AxisGrid { step: job_scale, offset: job_offset }).unwrap_or(plain)
     }
 
-    /// Maps lattice integers; appends to `out` and returns the largest change and the sum of squared changes.
-    pub(super) fn map_integers(&self, source: &[i32], out: &mut Vec<i64>) -> (f64, f64) {
+    /// The map in integers, if both grids lie on one that is fine enough for both.
+    fn ratio(source: AxisGrid, job: AxisGrid) -> Option<Self> {
+        let unit = AxisGrid::common(&[source, job])?.step;
+        let [mul, div, add] = [source.step, job.step, source.offset - job.offset].map(|length| (length / unit).round());
+        let fits = mul < 2f64.powi(30) && div < 2f64.powi(30) && add.abs() < 2f64.powi(60);
+        fits.then_some(Self::Ratio { mul: mul as i64, add: add as i64, div: div as i64, unit })
+    }
+
+    /// Maps lattice integers; appends to `out`, and to `change` if coordinates move by different amounts.
+    pub(super) fn map_integers(&self, source: &[i32], out: &mut Vec<i64>, change: &mut Vec<f64>) -> Moved {
         match *self {
             Self::Exact { mul: 1, add, residue } => {
                 out.extend(source.iter().map(|q| i64::from(*q) + add));
-                (residue, residue * residue * source.len() as f64)
+                Moved::By(residue)
             }
             Self::Exact { mul, add, residue } => {
                 out.extend(source.iter().map(|q| i64::from(*q) * mul + add));
-                (residue, residue * residue * source.len() as f64)
+                Moved::By(residue)
+            }
+            Self::Ratio { mul, add, div, unit } => {
+                change.reserve(source.len());
+                out.extend(source.iter().map(|q| {
+                    let units = i64::from(*q) * mul + add;
+                    let job = divided(units, div);
+                    change.push((job * div - units) as f64 * unit);
+                    job
+                }));
+                Moved::Each
             }
             Self::Rounded { scale, offset, .. } => {
-                self.round_all(source.iter().map(|q| f64::from(*q) * scale + offset), out)
+                self.round_all(source.iter().map(|q| f64::from(*q) * scale + offset), out, change)
             }
         }
     }
 
-    /// Maps world coordinates; appends to `out`; see [`Self::map_integers`].
-    pub(super) fn map_world(&self, source: &[f64], out: &mut Vec<i64>) -> (f64, f64) {
-        self.round_all(source.iter().copied(), out)
+    /// Maps world coordinates; see [`Self::map_integers`].
+    pub(super) fn map_world(&self, source: &[f64], out: &mut Vec<i64>, change: &mut Vec<f64>) -> Moved {
+        self.round_all(source.iter().copied(), out, change)
     }
 
-    fn round_all(&self, world: impl Iterator<Item = f64>, out: &mut Vec<i64>) -> (f64, f64) {
-        let Self::Rounded { job_scale, job_offset, .. } = *self else { return (0.0, 0.0) };
-        let (mut max, mut squares) = (0.0f64, 0.0);
+    fn round_all(&self, world: impl Iterator<Item = f64>, out: &mut Vec<i64>, change: &mut Vec<f64>) -> Moved {
+        let Self::Rounded { job_scale, job_offset, .. } = *self else { return Moved::By(0.0) };
+        change.reserve(world.size_hint().0);
         out.extend(world.map(|w| {
-            let q = ((w - job_offset) / job_scale).round();
-            let change = (q * job_scale + job_offset - w).abs();
-            max = max.max(change);
-            squares += change * change;
+            let q = ((w - job_offset) / job_scale).round_ties_even();
+            change.push(q * job_scale + job_offset - w);
             q as i64
         }));
-        (max, squares)
+        Moved::Each
     }
+}
+
+/// `units / div` to the nearest whole number, ties to even; `div` > 0.
+fn divided(units: i64, div: i64) -> i64 {
+    let (floor, rest) = (units.div_euclid(div), units.rem_euclid(div));
+    let up = match (2 * rest).cmp(&div) {
+        std::cmp::Ordering::Less => 0,
+        std::cmp::Ordering::Equal => floor & 1,
+        std::cmp::Ordering::Greater => 1,
+    };
+    floor + up
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn mapped(map: &AxisMap, source: &[i32]) -> (Vec<i64>, Vec<f64>) {
+        let (mut out, mut change) = (Vec::new(), Vec::new());
+        map.map_integers(source, &mut out, &mut change);
+        (out, change)
+    }
 
     #[test]
     fn lattices_that_share_points_map_exactly() {
@@ -99,19 +145,39 @@ mod tests {
         let coarse = Lattice { scale: [0.01; 3], offset: [477_000.0, 0.0, 0.0] };
         let map = SourceMap::new(Some(&coarse), &job);
         assert!(matches!(map.axes[0], AxisMap::Exact { mul: 10, add: 1_000_000, .. }), "{map:?}");
-        let mut out = Vec::new();
-        map.axes[0].map_integers(&[-3, 5], &mut out);
-        assert_eq!(out, [999_970, 1_000_050]);
+        assert_eq!(mapped(&map.axes[0], &[-3, 5]), (vec![999_970, 1_000_050], vec![]));
     }
 
     #[test]
-    fn other_lattices_round_to_the_nearest_and_measure_the_change() {
+    fn other_lattices_round_to_the_nearest_in_integers_and_measure_the_change() {
         let job = Lattice { scale: [0.01; 3], offset: [0.0; 3] };
         let odd = Lattice { scale: [0.003; 3], offset: [0.0; 3] };
-        let mut out = Vec::new();
-        let (max, squares) = SourceMap::new(Some(&odd), &job).axes[0].map_integers(&[0, 1, 2, 5], &mut out);
-        assert_eq!(out, [0, 0, 1, 2]);
-        assert!((max - 0.005).abs() < 1e-12);
-        assert!((squares - (0.003f64.powi(2) + 0.004f64.powi(2) + 0.005f64.powi(2))).abs() < 1e-12);
+        let (out, change) = mapped(&SourceMap::new(Some(&odd), &job).axes[0], &[0, 1, 2, 5]);
+        assert_eq!(out, [0, 0, 1, 2], "0.015 is a tie");
+        assert_eq!(change.map_in_steps(0.001), [0, -3, 4, 5]);
+    }
+
+    #[test]
+    fn ties_go_to_even_so_that_a_doubled_step_has_no_bias() {
+        let job = Lattice { scale: [0.002; 3], offset: [0.0; 3] };
+        let source = Lattice { scale: [0.001; 3], offset: [0.0; 3] };
+        let all: Vec<i32> = (-1000..1000).collect();
+        let (out, change) = mapped(&SourceMap::new(Some(&source), &job).axes[0], &all);
+        assert_eq!(out[..5], [-500, -500, -499, -498, -498]);
+        assert_eq!(change.map_in_steps(0.001).iter().sum::<i64>(), 0);
+        let worlds: Vec<f64> = all.iter().map(|q| f64::from(*q) * 0.5).collect();
+        let (mut q, mut change) = (Vec::new(), Vec::new());
+        let halves = SourceMap::new(None, &Lattice { scale: [1.0; 3], offset: [0.0; 3] });
+        halves.axes[0].map_world(&worlds, &mut q, &mut change);
+        assert_eq!(change.iter().sum::<f64>(), 0.0);
+    }
+
+    trait InSteps {
+        fn map_in_steps(&self, step: f64) -> Vec<i64>;
+    }
+    impl InSteps for Vec<f64> {
+        fn map_in_steps(&self, step: f64) -> Vec<i64> {
+            self.iter().map(|v| (v / step).round() as i64).collect()
+        }
     }
 }

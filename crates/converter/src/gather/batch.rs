@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use pointmill_format::{Changes, PointBatch, Positions};
 
-use super::axis::SourceMap;
+use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{CellParts, Context};
 use super::{exact, partition, ranges, select};
@@ -33,6 +33,7 @@ pub(super) struct Worker<'a> {
     q: JobColumns,
     /// See [`exact::marks`]; empty if they are not needed.
     marks: Vec<u64>,
+    change: [Vec<f64>; 3],
     selection: Vec<u32>,
     cells: Vec<u64>,
     grouping: Grouping,
@@ -54,6 +55,7 @@ impl<'a> Worker<'a> {
             parts: CellParts::default(),
             q: JobColumns::default(),
             marks: Vec::new(),
+            change: Default::default(),
             selection: Vec::new(),
             cells: Vec::new(),
             grouping: Grouping::default(),
@@ -135,7 +137,7 @@ impl<'a> Worker<'a> {
     }
 
     fn take_slice(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> Result<(), ConvertError> {
-        let bounds = quantize(&self.pass.maps[source], batch, rows, &mut self.q, &mut self.stats);
+        let bounds = self.quantize(source, batch, rows);
         self.stats.bounds.union(&bounds);
         if !self.pass.partition.holds(&bounds) {
             self.pass.misled.store(true, Ordering::Relaxed);
@@ -226,6 +228,34 @@ impl<'a> Worker<'a> {
         }
     }
 
+    /// Puts the positions of some rows on the job lattice, measures how far they move, and returns their bounds there.
+    fn quantize(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> JobBounds {
+        let map = &self.pass.maps[source];
+        let mut bounds = JobBounds::EMPTY;
+        let mut moved = [Moved::By(0.0); 3];
+        for a in 0..3 {
+            let (q, change) = (&mut self.q.0[a], &mut self.change[a]);
+            q.clear();
+            change.clear();
+            moved[a] = quantize_axis(map, a, &batch.positions, rows, q, change);
+            bounds.min[a] = q.iter().copied().min().unwrap_or(i64::MAX);
+            bounds.max[a] = q.iter().copied().max().unwrap_or(i64::MIN);
+        }
+        let points = self.q.len();
+        let axes = std::array::from_fn(|a| match moved[a] {
+            Moved::By(by) => Ok(by),
+            Moved::Each => Err(&self.change[a][..]),
+        });
+        self.stats.change.add(points, axes);
+        for (a, by) in axes.iter().enumerate().filter(|(a, _)| self.pass.claims[source][*a]) {
+            let rounding = self.pass.rounding(source, a, &bounds);
+            if by.is_err_and(|column| column.iter().any(|v| v.abs() > rounding)) {
+                self.stats.sources[source].off_grid[a] = true;
+            }
+        }
+        bounds
+    }
+
     fn note_segments(&mut self, block: u32, mut start: u32) {
         let mut first = 0;
         for &(cell, count) in &self.grouping.groups {
@@ -256,28 +286,24 @@ impl Rows<'_> {
     }
 }
 
-/// Puts the positions of some rows on the job lattice and returns their bounds there.
-fn quantize(map: &SourceMap, batch: &PointBatch, rows: &Rows<'_>, q: &mut JobColumns, stats: &mut Stats) -> JobBounds {
-    let mut bounds = JobBounds::EMPTY;
-    for a in 0..3 {
-        let q = &mut q.0[a];
-        q.clear();
-        let (max, squares) = match (&batch.positions, rows) {
-            (Positions::Quantized(p), Rows::Consecutive(r)) => map.axes[a].map_integers(&p[a][r.clone()], q),
-            (Positions::World(p), Rows::Consecutive(r)) => map.axes[a].map_world(&p[a][r.clone()], q),
-            (Positions::Quantized(p), Rows::Selected(s)) => {
-                let chosen: Vec<i32> = s.iter().map(|i| p[a][*i as usize]).collect();
-                map.axes[a].map_integers(&chosen, q)
-            }
-            (Positions::World(p), Rows::Selected(s)) => {
-                let chosen: Vec<f64> = s.iter().map(|i| p[a][*i as usize]).collect();
-                map.axes[a].map_world(&chosen, q)
-            }
-        };
-        stats.change.max[a] = stats.change.max[a].max(max);
-        stats.change.sum_of_squares[a] += squares;
-        bounds.min[a] = q.iter().copied().min().unwrap_or(i64::MAX);
-        bounds.max[a] = q.iter().copied().max().unwrap_or(i64::MIN);
+fn quantize_axis(
+    map: &SourceMap,
+    a: usize,
+    positions: &Positions,
+    rows: &Rows<'_>,
+    q: &mut Vec<i64>,
+    change: &mut Vec<f64>,
+) -> Moved {
+    match (positions, rows) {
+        (Positions::Quantized(p), Rows::Consecutive(r)) => map.axes[a].map_integers(&p[a][r.clone()], q, change),
+        (Positions::World(p), Rows::Consecutive(r)) => map.axes[a].map_world(&p[a][r.clone()], q, change),
+        (Positions::Quantized(p), Rows::Selected(s)) => {
+            let chosen: Vec<i32> = s.iter().map(|i| p[a][*i as usize]).collect();
+            map.axes[a].map_integers(&chosen, q, change)
+        }
+        (Positions::World(p), Rows::Selected(s)) => {
+            let chosen: Vec<f64> = s.iter().map(|i| p[a][*i as usize]).collect();
+            map.axes[a].map_world(&chosen, q, change)
+        }
     }
-    bounds
 }

@@ -8,8 +8,9 @@ use pointmill_format::Lattice;
 use super::axis::SourceMap;
 use super::cut::Cut;
 use super::origins::Origins;
+use super::lattice::ulp;
 use super::partition::Partition;
-use crate::cloud::{CellHash, Intake, Moments, Segments, Store};
+use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segments, Store};
 use crate::plan::Plan;
 use crate::sources::Sources;
 
@@ -33,6 +34,8 @@ pub(super) struct Context<'a> {
     pub(super) cuts: Vec<Option<Cut>>,
     /// Where the scanners of each source stood.
     pub(super) origins: Vec<Origins>,
+    /// Axes of each source on which every point has to prove the claim that a grid holds it.
+    pub(super) claims: Vec<[bool; 3]>,
     /// The lattice of the pass.
     pub(super) lattice: Lattice,
     pub(super) partition: Partition,
@@ -40,6 +43,18 @@ pub(super) struct Context<'a> {
     pub(super) wants_moments: bool,
     /// True once a point did not fit the partition: from then on only bounds are wanted.
     pub(super) misled: AtomicBool,
+}
+
+impl Context<'_> {
+    /// What the arithmetic of doubles may move coordinates of a source within `bounds` by.
+    pub(super) fn rounding(&self, source: usize, axis: usize, bounds: &JobBounds) -> f64 {
+        if self.sources.all[source].scan.info().lattice.is_some() {
+            return 0.0; // in integers
+        }
+        let world = |q: i64| (q as f64 * self.lattice.scale[axis] + self.lattice.offset[axis]).abs();
+        let far = world(bounds.min[axis]).max(world(bounds.max[axis])).max(self.lattice.offset[axis].abs());
+        4.0 * ulp(far)
+    }
 }
 
 /// The parts of cells that were seen, by packed cell.

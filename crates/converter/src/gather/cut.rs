@@ -22,14 +22,14 @@ impl Cut {
             let last = std::array::from_fn(|a| border(lattice, a, bounds.max[a], f64::floor));
             return Self::Lattice { first, last };
         }
-        if info.resolution == Resolution::Single {
-            // The coordinates were rounded to single precision, so are the borders.
-            let single = |corner: [f64; 3]| corner.map(|v| f64::from(v as f32));
-            return Self::World { min: single(bounds.min), max: single(bounds.max) };
-        }
-        let step = if let Resolution::Step(step) = info.resolution { step } else { 0.0 };
-        let slack = |v: f64| (4.0 * f64::EPSILON * v.abs()).max(SAME_PLACE * step);
-        Self::World { min: bounds.min.map(|v| v - slack(v)), max: bounds.max.map(|v| v + slack(v)) }
+        // Coordinates that were rounded to single precision are compared with borders that are.
+        let moved = |axis: usize, border: f64, outwards: f64| match info.resolution[axis] {
+            Resolution::Single => f64::from(border as f32),
+            resolution => border + outwards * slack(border, resolution),
+        };
+        let min = std::array::from_fn(|a| moved(a, bounds.min[a], -1.0));
+        let max = std::array::from_fn(|a| moved(a, bounds.max[a], 1.0));
+        Self::World { min, max }
     }
 
     /// True if every position is inside.
@@ -53,6 +53,16 @@ impl Cut {
     }
 }
 
+/// How far from a border of the box a coordinate of that resolution is still on it.
+fn slack(border: f64, resolution: Resolution) -> f64 {
+    let (step, offset) = match resolution {
+        Resolution::Grid(grid) => (grid.step, grid.offset),
+        Resolution::Step(step) => (step, 0.0),
+        Resolution::Single | Resolution::Double => (0.0, 0.0),
+    };
+    (4.0 * f64::EPSILON * (border.abs() + offset.abs())).max(SAME_PLACE * step)
+}
+
 fn all_within(column: &[i32], first: i64, last: i64) -> bool {
     column.iter().all(|q| first <= i64::from(*q) && i64::from(*q) <= last)
 }
@@ -74,7 +84,7 @@ mod tests {
 
     fn info(lattice: Option<Lattice>, resolution: Resolution) -> ScanInfo {
         let mut info = ScanInfo::new("x", "", 0);
-        (info.lattice, info.resolution) = (lattice, resolution);
+        (info.lattice, info.resolution) = (lattice, [resolution; 3]);
         info
     }
 

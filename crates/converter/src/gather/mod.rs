@@ -20,18 +20,17 @@ mod places;
 mod ranges;
 mod select;
 
-use pointmill_format::{Aabb, Lattice, ReadError};
+use pointmill_format::{Aabb, AxisGrid, Lattice, ReadError};
 
 pub(crate) use context::Demand;
 pub(crate) use lattice::from_headers;
 
-use crate::cloud::{Cloud, Cube, Gathered, Intake, JobBounds, JobLattice, JobPoint, SharedPlace, Stats};
+use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
 use crate::plan::{OriginPoints, Plan};
 use crate::runtime::{Clock, Phase, Runtime};
-use crate::sources::{Source, Sources, far_out};
+use crate::sources::{Fineness, Sources, far_out, intersection};
 use crate::warning::Warning;
-use axis::SourceMap;
 use origins::Origins;
 use pass::{Pass, PassEnd};
 
@@ -51,44 +50,48 @@ pub(crate) fn gather<'a>(
     let mut lattice = from_headers(plan, sources)?;
     let hint = sources.bounds_hint(plan.filter.bounds.as_ref());
     let mut hint = hint.map(|bounds| quantized(&lattice.lattice, &bounds));
-    for _ in 0..MAX_PASSES {
+    for pass in 1..=MAX_PASSES {
         clock.begin(Phase::Read, sources.points_declared);
         let mut warn = |warning: Warning| {
             rt.warn(&warning);
             warnings.push(warning);
         };
-        match Pass::new(plan, sources, intake, demand, &lattice, hint, rt).run()? {
-            PassEnd::Complete(mut gathered) => match finer(plan, sources, &gathered)? {
-                Some(finer) => {
-                    let factor = (lattice.lattice.scale[0] / finer.lattice.scale[0]).round();
-                    warn(Warning::StepTooCoarse { factor });
-                    let all = gathered.stats.sources.iter().fold(Aabb::EMPTY, |all, s| all.union(&s.bounds));
-                    hint = Some(quantized(&finer.lattice, &all));
-                    lattice = finer;
-                }
-                None => {
-                    gathered.shared_places = places::find(&mut gathered)?;
-                    odd_places(plan, sources, &gathered).into_iter().for_each(&mut warn);
-                    if let Some(outliers) = outliers::find(&gathered) {
-                        warn(outliers.warning(gathered.lattice.is_held_back()));
-                    }
-                    let known = warnings.len() + gathered.stats.warnings.len();
-                    let cloud = Cloud::new(plan, sources, intake, *gathered, warnings)?;
-                    cloud.warnings[known..].iter().for_each(|w| rt.warn(w));
-                    return Ok(cloud);
-                }
-            },
+        let (stats, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, rt).run()? {
             PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
-            PassEnd::Misled(bounds) => {
+            PassEnd::Misled(stats) => (stats, None),
+            PassEnd::Complete(gathered) => (Box::new(gathered.stats.clone()), Some(gathered)),
+        };
+        let settled = settled(plan, sources, &lattice, &stats)?;
+        match (settled, complete) {
+            (Some(other), None) => {
+                warn(change_of_step(&lattice, &other));
+                hint = Some(measured(plan, &other.lattice, &stats));
+                lattice = other;
+            }
+            (Some(other), Some(_)) if pass < MAX_PASSES => {
+                warn(change_of_step(&lattice, &other));
+                hint = Some(measured(plan, &other.lattice, &stats));
+                lattice = other;
+            }
+            (None, None) => {
                 warn(Warning::ReadAgain);
-                hint = Some(bounds);
-                if let Err(too_fine) = Cube::around(&bounds, &lattice.lattice) {
-                    let coarser = lattice.coarsened(2f64.powi(too_fine.coarser_by as i32));
-                    let (scale, reason) = (coarser.lattice.scale, coarser.reason);
-                    warn(Warning::CoarserStep { scale, reason });
-                    hint = Some(moved(&bounds, &lattice.lattice, &coarser.lattice));
-                    lattice = coarser;
+                hint = Some(stats.bounds);
+            }
+            (_, Some(mut gathered)) => {
+                gathered.shared_places = places::find(&mut gathered)?;
+                odd_places(plan, sources, &gathered).into_iter().for_each(&mut warn);
+                if let Some(outliers) = outliers::find(&gathered) {
+                    warn(outliers.warning(gathered.lattice.is_held_back()));
                 }
+                for (source, stats) in sources.all.iter().zip(&gathered.stats.sources) {
+                    if let Some(resolution) = source.survey.coarse_single(&stats.bounds) {
+                        warn(Warning::CoarseSingle { path: source.scan.info().path.clone(), resolution });
+                    }
+                }
+                let known = warnings.len() + gathered.stats.warnings.len();
+                let cloud = Cloud::new(plan, sources, intake, *gathered, warnings)?;
+                cloud.warnings[known..].iter().for_each(|w| rt.warn(w));
+                return Ok(cloud);
             }
         }
     }
@@ -117,35 +120,50 @@ fn odd_places(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Vec<Warnin
     warnings
 }
 
-/// A finer lattice for points that the declared bounds made too coarse.
-fn finer(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Result<Option<JobLattice>, ConvertError> {
-    let (lattice, bounds) = (&gathered.lattice.lattice, &gathered.stats.bounds);
-    let (min, max) = (lattice.world(bounds.min.0), lattice.world(bounds.max.0));
+/// The lattice that the points turned out to need, if it is another one.
+fn settled(
+    plan: &Plan,
+    sources: &Sources,
+    lattice: &JobLattice,
+    stats: &Stats,
+) -> Result<Option<JobLattice>, ConvertError> {
+    let (min, max) = (lattice.lattice.world(stats.bounds.min.0), lattice.lattice.world(stats.bounds.max.0));
     if far_out(&Aabb { min, max }) {
         return Err(InputFault::FarPoints { min, max }.into());
     }
-    Ok(lattice::refined(plan, sources, &gathered.lattice, &gathered.stats))
+    Ok(lattice::settled(plan, sources, lattice, stats))
 }
 
-/// True if every position of the sources is a point of the lattice.
+fn change_of_step(before: &JobLattice, after: &JobLattice) -> Warning {
+    let (then, now) = (before.lattice.scale, after.lattice.scale);
+    let (scale, reason) = (now, after.reason);
+    if (0..3).any(|a| now[a] > then[a]) {
+        Warning::CoarserStep { scale, reason }
+    } else {
+        Warning::FinerStep { scale, reason }
+    }
+}
+
+/// The box of all points that passed the filter's box, on a lattice.
+fn measured(plan: &Plan, lattice: &Lattice, stats: &Stats) -> JobBounds {
+    let all = stats.sources.iter().fold(Aabb::EMPTY, |all, s| all.union(&s.bounds));
+    quantized(lattice, &plan.filter.bounds.as_ref().map_or(all, |cut| intersection(&all, cut)))
+}
+
+/// True if every position of the sources is a point of the lattice, as far as is known.
 pub(crate) fn is_lossless(sources: &Sources, lattice: &JobLattice) -> bool {
-    let is_exact = |s: &Source| SourceMap::new(s.scan.info().lattice.as_ref(), &lattice.lattice).is_exact();
-    sources.all.iter().all(is_exact)
+    let Lattice { scale, offset } = lattice.lattice;
+    let is_held = |a: usize, fineness: Fineness| match fineness {
+        Fineness::Grid { grid, .. } => AxisGrid { step: scale[a], offset: offset[a] }.holds(&grid),
+        Fineness::Step(_) | Fineness::Single | Fineness::Double => false,
+    };
+    sources.all.iter().all(|s| (0..3).all(|a| is_held(a, s.survey.fineness[a])))
 }
 
 /// A box of the world on a lattice.
 pub(crate) fn quantized(lattice: &Lattice, bounds: &Aabb) -> JobBounds {
     let at = |corner: [f64; 3]| JobPoint(std::array::from_fn(|a| lattice.quantize(a, corner[a])));
     JobBounds { min: at(bounds.min), max: at(bounds.max) }
-}
-
-/// Bounds on a coarser lattice, a step wider.
-fn moved(bounds: &JobBounds, from: &Lattice, to: &Lattice) -> JobBounds {
-    let at = |q: JobPoint, widen: i64| {
-        let world = from.world(q.0);
-        JobPoint(std::array::from_fn(|a| to.quantize(a, world[a]) + widen))
-    };
-    JobBounds { min: at(bounds.min, -1), max: at(bounds.max, 1) }
 }
 
 fn nothing_to_convert(sources: &Sources, stats: &Stats) -> ConvertError {

@@ -20,10 +20,11 @@ pub(super) struct Partition {
 
 #[derive(Debug, Clone)]
 enum Grid {
-    /// Equal scales: cells of `2^shift` lattice steps on the absolute lattice. They are octree nodes of any cube whose
-    /// anchor is at least that coarse, so the bounds need not be known: `cell = (q >> shift) - first`.
-    Absolute { shift: u32, first: [i64; 3] },
-    /// Different scales: cells of a cube that is believed until the bounds are known.
+    /// Scales that are equal, or powers of two apart: cells of `2^shift` lattice steps on the absolute lattice. They are
+    /// octree nodes of any cube whose anchor is at least that coarse, so the bounds need not be known:
+    /// `cell = (q >> shift) - first`.
+    Absolute { shift: [u32; 3], first: [i64; 3] },
+    /// Other scales: cells of a cube that is believed until the bounds are known.
     OfCube { cube: Box<Cube>, level: u32 },
 }
 
@@ -38,13 +39,16 @@ impl Partition {
         // Surfaces: cells quadruple with each level.
         let level = (points / POINTS_PER_CELL).max(1).ilog2().div_ceil(2).clamp(ANCHOR_BITS + 2, 8);
         let cube = Cube::around(&hint, lattice);
-        let grid = match cube {
-            Ok(cube) if !cube.is_aligned() => Grid::OfCube { cube: Box::new(cube), level },
-            cube => {
-                let bits = cube.map_or(TREE_BITS, |c| c.bits);
-                let shift = bits.saturating_sub(level);
-                Grid::Absolute { shift, first: center.map(|c| (c >> shift) - (1 << (CELL_BITS - 1))) }
+        let shift = match cube {
+            Ok(cube) => cube.aligned_shift(level).ok_or(cube),
+            Err(_) => Ok(Cube::largest_shift(lattice, level)),
+        };
+        let grid = match shift {
+            Ok(shift) => {
+                let first = std::array::from_fn(|a| (center[a] >> shift[a]) - (1 << (CELL_BITS - 1)));
+                Grid::Absolute { shift, first }
             }
+            Err(cube) => Grid::OfCube { cube: Box::new(cube), level },
         };
         Self { origin: StoredOrigin(JobPoint(origin)), grid }
     }
@@ -62,7 +66,7 @@ impl Partition {
         stored
             && match &self.grid {
                 Grid::Absolute { shift, first } => (0..3).all(|a| {
-                    (bounds.min[a] >> shift) >= first[a] && (bounds.max[a] >> shift) - first[a] < 1 << CELL_BITS
+                    (bounds.min[a] >> shift[a]) >= first[a] && (bounds.max[a] >> shift[a]) - first[a] < 1 << CELL_BITS
                 }),
                 Grid::OfCube { .. } => true,
             }
@@ -76,9 +80,9 @@ impl Partition {
         match &self.grid {
             Grid::Absolute { shift, first } => out.extend(points.map(|((x, y), z)| {
                 pack([
-                    ((x >> shift) - first[0]) as u64,
-                    ((y >> shift) - first[1]) as u64,
-                    ((z >> shift) - first[2]) as u64,
+                    ((x >> shift[0]) - first[0]) as u64,
+                    ((y >> shift[1]) - first[1]) as u64,
+                    ((z >> shift[2]) - first[2]) as u64,
                 ])
             })),
             Grid::OfCube { cube, level } => out.extend(points.map(|((x, y), z)| {
@@ -91,7 +95,7 @@ impl Partition {
     /// True if the cells are octree nodes of the final cube.
     pub(super) fn fits(&self, cube: &Cube, bounds: &JobBounds) -> bool {
         match &self.grid {
-            Grid::Absolute { shift, .. } => self.holds(bounds) && *shift <= cube.bits - ANCHOR_BITS,
+            Grid::Absolute { shift, .. } => self.holds(bounds) && cube.is_anchored_on(*shift),
             Grid::OfCube { cube: believed, .. } => self.holds(bounds) && **believed == *cube,
         }
     }
@@ -101,8 +105,8 @@ impl Partition {
         let cell = unpack(packed);
         match &self.grid {
             Grid::Absolute { shift, first } => {
-                let [x, y, z] = std::array::from_fn(|a| (cell[a] as i64 + first[a] - (cube.min[a] >> shift)) as u32);
-                NodeKey { level: (cube.bits - shift) as u8, x, y, z }
+                let [x, y, z] = std::array::from_fn(|a| (cell[a] as i64 + first[a] - (cube.min[a] >> shift[a])) as u32);
+                NodeKey { level: cube.level_of(*shift) as u8, x, y, z }
             }
             Grid::OfCube { level, .. } => {
                 let [x, y, z] = cell.map(|c| c as u32);
@@ -159,6 +163,8 @@ mod tests {
         assert!(check(hint, half, [0.01; 3]));
         let tiny = JobBounds::new([1000; 3], [1300; 3]);
         assert!(!check(hint, tiny, [0.01; 3]), "cells coarser than the anchor must be refused");
+        assert!(check(hint, slightly_larger, [0.25, 0.5, 0.125]), "powers of two apart");
+        assert!(check(hint, half, [0.25, 0.5, 0.125]));
         assert!(check(hint, hint, [0.01, 0.01, 0.001]));
         assert!(!check(hint, slightly_larger, [0.01, 0.01, 0.001]));
     }

@@ -2,13 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{Advice, Scratch};
+use pointmill_format::{Advice, Lattice, Scratch};
 
 use super::axis::SourceMap;
 use super::batch::Worker;
 use super::context::{CellPart, CellParts, Context, Demand};
 use super::cut::Cut;
 use super::origins::Origins;
+use super::lattice::ulp;
 use super::partition::Partition;
 use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton};
 use crate::error::ConvertError;
@@ -21,8 +22,8 @@ use crate::warning::{Warning, reason_of};
 pub(super) enum PassEnd {
     /// All points are there.
     Complete(Box<Gathered>),
-    /// The bounds or the lattice do not fit the points, which have these bounds.
-    Misled(JobBounds),
+    /// The bounds or the lattice do not fit the points, whose bounds are known now; nothing else of them is.
+    Misled(Box<Stats>),
     /// No point passed the filter (or there was none).
     Empty(Box<Stats>),
 }
@@ -51,9 +52,10 @@ impl<'a> Pass<'a> {
             sources,
             intake,
             maps: sources.all.iter().map(map).collect(),
-            lattice: lattice.lattice,
             cuts: sources.all.iter().map(|s| plan.filter.bounds.map(|b| Cut::new(&b, s.scan.info()))).collect(),
             origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
+            claims: sources.all.iter().map(|s| s.survey.fineness.map(|f| f.is_claim())).collect(),
+            lattice: lattice.lattice,
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
             store: Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, rt.budget.store_bytes),
             wants_moments: demand.moments,
@@ -69,10 +71,10 @@ impl<'a> Pass<'a> {
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
         }
-        let Self { context: Context { partition, store, misled, maps, intake, .. }, lattice, .. } = self;
+        let Self { context: Context { partition, store, misled, intake, .. }, lattice, .. } = self;
         let cube = match Cube::around(&bounds, &lattice.lattice) {
             Ok(cube) if !misled.into_inner() && partition.fits(&cube, &bounds) => cube,
-            _ => return Ok(PassEnd::Misled(bounds)),
+            _ => return Ok(PassEnd::Misled(Box::new(stats))),
         };
         let mut cells: Vec<Cell> = parts
             .into_iter()
@@ -85,7 +87,7 @@ impl<'a> Pass<'a> {
         cells.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));
         Ok(PassEnd::Complete(Box::new(Gathered {
             lattice: lattice.clone(),
-            is_lossless: maps.iter().all(SourceMap::is_exact),
+            is_lossless: is_rounding(&stats, &lattice.lattice),
             frame: RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() },
             store,
             cells,
@@ -162,4 +164,13 @@ impl<'a> Pass<'a> {
             Err(error) => Err(error.into()),
         }
     }
+}
+
+/// True if no coordinate moved by more than the rounding of doubles.
+fn is_rounding(stats: &Stats, lattice: &Lattice) -> bool {
+    let (min, max) = (lattice.world(stats.bounds.min.0), lattice.world(stats.bounds.max.0));
+    (0..3).all(|a| {
+        let far = min[a].abs().max(max[a].abs()).max(lattice.offset[a].abs());
+        stats.change.max[a] <= (4.0 * ulp(far)).max(1e-6 * lattice.scale[a])
+    })
 }

@@ -102,6 +102,9 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
             points_at_origin: seen.map_or(0, |s| s.at_origin),
             bounds_declared: info.bounds_declared.map(flat),
             bounds_measured: seen.map(|s| s.bounds).filter(|b| !b.is_empty()).map(flat),
+            resolution: source
+                .survey
+                .resolution(&seen.map(|s| s.bounds).or(info.bounds_declared).unwrap_or(Aabb::EMPTY)),
             crs: resolve_scan(&info.crs).label,
             rgb_depth: coloured.map(|c| if c.facts.widen_rgb[i].is_some() { 8 } else { 16 }),
         }

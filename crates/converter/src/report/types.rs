@@ -103,6 +103,8 @@ pub struct InputReport {
     pub bounds_declared: Option<[f64; 6]>,
     /// Of the points decoded, before any filter.
     pub bounds_measured: Option<[f64; 6]>,
+    /// How finely the file stores these coordinates, per axis, world units; null: in doubles that show no step.
+    pub resolution: [Option<f64>; 3],
     /// As found, shortened for people ("EPSG:2994", "WKT: NAD83 / …") or empty.
     pub crs: String,
     /// 8 or 16 where the file has colour.

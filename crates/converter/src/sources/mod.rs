@@ -1,15 +1,20 @@
 //! What the headers say, put together: open scans and the union of their attributes. Nothing changes it later.
 
 mod crs;
-mod extent;
+mod decimals;
+mod divisor;
 mod schema;
+mod survey;
 
 use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
 pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
-pub(crate) use extent::{Extent, far_out, intersection};
 pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema, as_doubles};
+#[cfg(test)]
+pub(crate) use survey::Extent;
+pub(crate) use survey::{Fineness, Survey, far_out, intersection, single_step};
 
+use self::divisor::Divisors;
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{OnFault, Plan};
 use crate::runtime::Events;
@@ -20,8 +25,8 @@ pub(crate) struct Source {
     pub(crate) scan: Box<dyn Scan>,
     /// Where each of its columns is in [`Sources::attributes`].
     pub(crate) columns: Vec<usize>,
-    /// Where its points are, as far as is known before they are read.
-    pub(crate) extent: Option<Extent>,
+    /// Where its points are, and how finely they are stored, as far as is known before they are read.
+    pub(crate) survey: Survey,
 }
 
 /// Everything known before the first point is decoded.
@@ -72,16 +77,17 @@ impl Sources {
         let infos: Vec<_> = scans.iter().map(|s| s.info()).collect();
         let (attributes, columns) = Schema::union(&infos);
         let points_declared = scans.iter().flat_map(|s| s.pieces()).map(|p| p.points).sum();
+        let divisors = Divisors::of(&scans);
         let sources = scans.into_iter().zip(columns).map(|(scan, columns)| {
-            let extent = Extent::of(&*scan);
-            Source { scan, columns, extent }
+            let survey = Survey::of(&*scan, Some(&divisors));
+            Source { scan, columns, survey }
         });
         Self { all: sources.collect(), attributes, points_declared, points_missing, warnings }
     }
 
     /// What the headers claim (or a sample shows) of where the points are, cut by the filter; a hint.
     pub(crate) fn bounds_hint(&self, cut: Option<&Aabb>) -> Option<Aabb> {
-        let extents = self.all.iter().filter_map(|s| s.extent.as_ref());
+        let extents = self.all.iter().filter_map(|s| s.survey.extent.as_ref());
         let all = extents.fold(Aabb::EMPTY, |all, e| all.union(&e.bounds));
         let hint = match cut {
             Some(cut) if !all.is_empty() => intersection(&all, cut),

@@ -25,10 +25,10 @@ impl Lattice {
         std::array::from_fn(|a| quantized[a] as f64 * self.scale[a] + self.offset[a])
     }
 
-    /// The nearest lattice coordinate on `axis`; saturates at the ends of `i64`, NaN gives 0.
+    /// The nearest lattice coordinate on `axis`, ties to even; saturates at the ends of `i64`, NaN gives 0.
     #[must_use]
     pub fn quantize(&self, axis: usize, world: f64) -> i64 {
-        ((world - self.offset[axis]) / self.scale[axis]).round() as i64
+        ((world - self.offset[axis]) / self.scale[axis]).round_ties_even() as i64
     }
 
     /// True if every scale is finite and > 0 and every offset finite.

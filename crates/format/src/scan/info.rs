@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Aabb, Attribute, Lattice, ScanWarning};
+use crate::{Aabb, Attribute, AxisGrid, Lattice, ScanWarning};
 
 /// The coordinate reference system as the file declares it; nothing is derived.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -40,8 +40,8 @@ pub struct ScanInfo {
     pub bounds_declared: Option<Aabb>,
     /// The lattice of [`crate::Positions::Quantized`] batches; `None` for world coordinates.
     pub lattice: Option<Lattice>,
-    /// How finely the file stores world coordinates; meaningless for scans that have a lattice.
-    pub resolution: Resolution,
+    /// How finely the file stores world coordinates, per axis; meaningless for scans that have a lattice.
+    pub resolution: [Resolution; 3],
     /// The scans within the file, where its format knows such (E57, PTX); else empty.
     pub parts: Vec<ScanPart>,
     /// The columns beside the position, in order.
@@ -64,7 +64,7 @@ impl ScanInfo {
             points_declared,
             bounds_declared: None,
             lattice: None,
-            resolution: Resolution::default(),
+            resolution: [Resolution::default(); 3],
             parts: Vec::new(),
             attributes: [].into(),
             crs: Crs::default(),
@@ -88,7 +88,9 @@ impl ScanInfo {
 /// How finely coordinates are stored: steps below that carry nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Resolution {
-    /// In steps of that many world units (scaled integers, or single precision of a known range).
+    /// As these coordinates and no others (scaled integers), but for the rounding of doubles.
+    Grid(AxisGrid),
+    /// In steps of that many world units, anywhere (scaled integers that are turned, single precision of a known range).
     Step(f64),
     /// In single precision, as world coordinates: 24 bits, so the step grows with the distance from 0.
     Single,

@@ -7,6 +7,7 @@
 
 pub(crate) mod block;
 mod distinct;
+mod exact;
 mod narrow;
 pub(crate) mod rules;
 mod selection;

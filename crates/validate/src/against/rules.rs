@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use pointmill_format::{Aabb, Attribute, Lattice};
+use pointmill_format::{Aabb, Attribute, AxisGrid, Lattice};
 use serde_json::Value;
 
 /// Meaning of 16-bit colours of the sources.
@@ -124,6 +124,11 @@ impl Rules {
         ((stored + self.shift[axis]) as f64 * self.lattice.scale[axis] + offset, offset)
     }
 
+    /// The job lattice's coordinates on an axis.
+    pub(crate) fn job_grid(&self, axis: usize) -> AxisGrid {
+        AxisGrid { step: self.lattice.scale[axis], offset: self.lattice_offset[axis] }
+    }
+
     /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
     #[inline]
     pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
@@ -131,7 +136,7 @@ impl Rules {
             return (0, 0);
         }
         let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
-        (steps.round() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
+        (steps.round_ties_even() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
     }
 }
 

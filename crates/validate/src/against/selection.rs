@@ -19,7 +19,7 @@ impl Selection {
     pub(super) fn new(info: &ScanInfo, rules: &Rules) -> Self {
         let range = |axis: usize, min: f64, max: f64| match &info.lattice {
             Some(lattice) => (steps(lattice, axis, min).0, steps(lattice, axis, max).1),
-            None => reals(info.resolution, min, max),
+            None => reals(info.resolution[axis], min, max),
         };
         let ranges = rules.bounds.map(|b| [0, 1, 2].map(|axis| range(axis, b.min[axis], b.max[axis])));
         let mut origins = Vec::new();
@@ -90,6 +90,7 @@ fn steps(lattice: &Lattice, axis: usize, world: f64) -> (f64, f64) {
 /// Borders for coordinates that are stored as numbers of that resolution.
 fn reals(resolution: Resolution, min: f64, max: f64) -> (f64, f64) {
     let slack = |v: f64| match resolution {
+        Resolution::Grid(grid) => rounding(v.abs() + grid.offset.abs()).max(1e-6 * grid.step),
         Resolution::Step(step) => rounding(v.abs()).max(1e-6 * step),
         _ => rounding(v.abs()),
     };

@@ -6,13 +6,14 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 use pointmill_format::{
-    Attribute, AttributeType, Column, OpenOptions, PointBatch, Positions, ReadError, Scan, Scratch, Wanted, open_scan,
-    with_column,
+    Attribute, AttributeType, AxisGrid, Column, OpenOptions, PointBatch, Positions, ReadError, Scan, Scratch, Wanted,
+    open_scan, with_column,
 };
 use rayon::prelude::*;
 
 use super::block::{BLOCK_POINTS, Block, append_words};
 use super::distinct::Residue;
+use super::exact::Exact;
 use super::rules::Conversion::{AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
 use super::selection::Selection;
@@ -21,6 +22,8 @@ use crate::options::{Progress, ProgressFn};
 /// A scan, and where its columns go.
 pub(crate) struct Source {
     scan: Box<dyn Scan>,
+    /// From its integers to the dataset's lattice, by axis.
+    exact: [Option<Exact>; 3],
     /// For each attribute of the dataset: the column of the scan with its name, and its elements.
     columns: Vec<Option<(usize, usize)>>,
     /// The column that the filter by class looks at.
@@ -131,7 +134,11 @@ impl Source {
             rules.constants.iter().filter_map(|(name, value)| Some((find(name)?, value.clone()))).collect();
         let deviating = constants.iter().map(|_| AtomicU64::new(0)).collect();
         let selection = Selection::new(info, rules);
-        Self { columns, classification, selection, constants, deviating, scan }
+        let exact = std::array::from_fn(|a| {
+            let own = info.lattice.map(|l| AxisGrid { step: l.scale[a], offset: l.offset[a] });
+            own.and_then(|own| Exact::new(own, rules.job_grid(a)))
+        });
+        Self { exact, columns, classification, selection, constants, deviating, scan }
     }
 
     fn wanted(&self) -> Wanted {
@@ -218,9 +225,9 @@ impl Source {
         rules: &Rules,
         block: &mut Block,
     ) {
-        let mut take = |i: usize, world: f64| {
+        let mut take = |i: usize, world: f64, exact: Option<i64>| {
             let (rounded, truncated) = rules.quantize(axis, world);
-            block.positions[axis].push(rounded);
+            block.positions[axis].push(exact.unwrap_or(rounded));
             if rules.foreign {
                 block.truncated[axis].push(truncated);
             }
@@ -231,14 +238,16 @@ impl Source {
             (Positions::Quantized(values), Some(lattice)) => {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();
-                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset));
+                let exact = Some(&self.exact[axis]).filter(|_| rules.compare_positions).copied().flatten();
+                let on_dataset = |v| exact.map(|e| e.nearest(v) - rules.shift[axis]);
+                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_dataset(*v)));
             }
             (Positions::World(values), _) => {
-                values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v));
+                values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v, None));
             }
             (Positions::Quantized(values), None) => {
                 let values = values[axis][start..start + points].iter().enumerate();
-                values.for_each(|(i, v)| take(i, f64::from(*v)));
+                values.for_each(|(i, v)| take(i, f64::from(*v), None));
             }
         }
     }

@@ -19,7 +19,9 @@ use super::schema::{Roles, ScanFields, Schema, fields};
 use super::streams::Streams;
 use super::{header, xml};
 use crate::scan::source::Source;
-use crate::{Aabb, Advice, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning};
+use crate::{
+    Aabb, Advice, AxisGrid, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning,
+};
 
 /// Records of a piece: one batch; a multiple of 8, so that packed values start at a byte border.
 const PIECE_RECORDS: u64 = 50_000;
@@ -203,18 +205,39 @@ fn pieces(cuts: &[Cut]) -> Vec<Piece> {
     cuts.iter().map(piece).collect()
 }
 
-/// The finest step of all scans, if each stores its coordinates in steps.
-fn resolution(source: &Source, drafts: &[Draft<'_>]) -> Resolution {
-    let steps = drafts.iter().map(|draft| {
+/// How finely all scans store coordinates, per axis.
+fn resolution(source: &Source, drafts: &[Draft<'_>]) -> [Resolution; 3] {
+    let of_draft = |draft: &Draft<'_>| {
         let farthest = |field: usize| {
             let (min, max) = sample(source, draft, &[field]);
             if min <= max { min.abs().max(max.abs()) } else { 0.0 }
         };
-        draft.roles.positions.step(&draft.fields, farthest)
-    });
-    match steps.collect::<Option<Vec<_>>>().and_then(|steps| steps.into_iter().reduce(f64::min)) {
-        Some(step) if step.is_finite() && step > 0.0 => Resolution::Step(step),
-        _ => Resolution::Double,
+        draft.pose.resolution(draft.roles.positions.resolution(&draft.fields, farthest))
+    };
+    let all: Vec<_> = drafts.iter().map(of_draft).collect();
+    std::array::from_fn(|a| combined(all.iter().map(|r| r[a])))
+}
+
+/// The resolution of an axis over all scans.
+fn combined(scans: impl Iterator<Item = Resolution>) -> Resolution {
+    let (mut grids, mut finest, mut are_grids) = (Vec::new(), f64::INFINITY, true);
+    for scan in scans {
+        match scan {
+            Resolution::Grid(grid) => {
+                finest = finest.min(grid.step);
+                grids.push(grid);
+            }
+            Resolution::Step(step) => {
+                finest = finest.min(step);
+                are_grids = false;
+            }
+            Resolution::Single | Resolution::Double => return Resolution::Double,
+        }
+    }
+    match AxisGrid::common(&grids).filter(|_| are_grids) {
+        Some(grid) => Resolution::Grid(grid),
+        None if finest.is_finite() => Resolution::Step(finest),
+        None => Resolution::Double,
     }
 }
 

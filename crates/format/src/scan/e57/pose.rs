@@ -2,7 +2,7 @@
 
 use ::e57::{CartesianBounds, PointCloud, SphericalBounds};
 
-use crate::{Aabb, ScanWarning};
+use crate::{Aabb, AxisGrid, Resolution, ScanWarning};
 
 /// From the scan's own coordinates to those of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +40,26 @@ impl Pose {
     pub(super) fn parts(&self) -> ([[f64; 3]; 3], [f64; 3]) {
         let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         (self.rotation.unwrap_or(identity), self.translation)
+    }
+
+    /// How finely moved coordinates are stored, from how finely those of the scan are: turned ones are on no grid.
+    pub(super) fn resolution(&self, own: [Resolution; 3]) -> [Resolution; 3] {
+        if self.rotation.is_none() {
+            return std::array::from_fn(|a| match own[a] {
+                Resolution::Grid(grid) => {
+                    Resolution::Grid(AxisGrid { offset: grid.offset + self.translation[a], ..grid })
+                }
+                other => other,
+            });
+        }
+        let step = |resolution| match resolution {
+            Resolution::Grid(grid) => Some(grid.step),
+            Resolution::Step(step) => Some(step),
+            Resolution::Single | Resolution::Double => None,
+        };
+        let steps = own.into_iter().map(step).collect::<Option<Vec<_>>>();
+        let finest = steps.and_then(|steps| steps.into_iter().reduce(f64::min));
+        [finest.map_or(Resolution::Double, Resolution::Step); 3]
     }
 
     fn identity() -> Self {

@@ -6,7 +6,7 @@ use super::fields::{Encoding, Field};
 use super::notes::Notes;
 use super::options::E57Options;
 use super::scaling::Scaling;
-use crate::{Attribute, AttributeType, ScanWarning};
+use crate::{Attribute, AttributeType, AxisGrid, Resolution, ScanWarning};
 
 /// Columns that a file may have: more is not a scan.
 const MAX_ATTRIBUTES: usize = 1000;
@@ -141,20 +141,26 @@ impl Roles {
 }
 
 impl PositionFields {
-    /// The step of the coordinates as they are stored, before the pose; `None` if it is too fine to determine.
-    /// `farthest`: the largest value of a field, of a sample: what the file declares may be wrong by orders of magnitude.
-    pub(super) fn step(&self, fields: &[Field], farthest: impl Fn(usize) -> f64) -> Option<f64> {
-        let step = |i: usize| match fields[i].encoding {
-            Encoding::Scaled { scale, .. } => Some(scale.abs()),
-            Encoding::Integer { .. } => Some(1.0),
-            // 24 bits of the largest coordinate
-            Encoding::Single => {
-                let far = Some(farthest(i)).filter(|f| *f > 0.0 && *f < 1e30)?;
-                Some(2f64.powi(far.log2().floor() as i32 - 23))
+    /// How finely the coordinates are stored, per axis, before the pose. `farthest`: the largest value of a field, of a
+    /// sample: what the file declares may be wrong by orders of magnitude.
+    pub(super) fn resolution(&self, fields: &[Field], farthest: impl Fn(usize) -> f64) -> [Resolution; 3] {
+        let of_field = |i: usize| match fields[i].encoding {
+            Encoding::Scaled { scale, offset, .. } if scale.is_normal() && offset.is_finite() => {
+                Resolution::Grid(AxisGrid { step: scale.abs(), offset })
             }
-            Encoding::Double | Encoding::Text => None,
+            Encoding::Integer { .. } => Resolution::Grid(AxisGrid { step: 1.0, offset: 0.0 }),
+            // 24 bits of the largest coordinate
+            Encoding::Single => match Some(farthest(i)).filter(|f| *f > 0.0 && *f < 1e30) {
+                Some(far) => Resolution::Step(2f64.powi(far.log2().floor() as i32 - 23)),
+                None => Resolution::Double,
+            },
+            Encoding::Scaled { .. } | Encoding::Double | Encoding::Text => Resolution::Double,
         };
-        self.cartesian?.into_iter().flatten().map(step).collect::<Option<Vec<_>>>()?.into_iter().reduce(f64::min)
+        match self.cartesian {
+            // an axis that the file lacks is zero
+            Some(fields) => fields.map(|f| f.map_or(Resolution::Grid(AxisGrid { step: 1.0, offset: 0.0 }), of_field)),
+            None => [Resolution::Double; 3],
+        }
     }
 
     /// Marks the fields that positions need.

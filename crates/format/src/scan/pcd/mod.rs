@@ -18,7 +18,7 @@ use std::path::Path;
 use crate::scan::source::Source;
 use crate::scan::tabular::{
     Endian, LineRule, Planes, Property, Role, RowScan, Schema, Storage, binary, lines, precision, reconcile,
-    resolution, settle_float_colours,
+    resolutions, settle_float_colours,
 };
 use crate::{Advice, AttributeType, Fault, Piece, ReadError, Scan, ScanWarning};
 use header::{Encoding, Header};
@@ -46,7 +46,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     let mut scan = RowScan::new(source, format, header.points, schema, storage);
     scan.pieces = pieces;
     scan.info.warnings = warnings;
-    scan.info.resolution = resolution(axis);
+    scan.info.resolution = resolutions(&properties);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))
 }

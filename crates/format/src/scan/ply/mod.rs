@@ -34,7 +34,7 @@ mod vertices;
 use std::path::Path;
 
 use crate::scan::source::Source;
-use crate::scan::tabular::{Property, RowScan, Schema, precision, resolution, settle_float_colours};
+use crate::scan::tabular::{Property, RowScan, Schema, precision, resolutions, settle_float_colours};
 use crate::{Advice, AttributeType, Fault, ReadError, Scan};
 use header::{Encoding, Header, Kind};
 
@@ -69,7 +69,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     let mut scan = RowScan::new(source, format, header.elements[vertices].count, schema, placed.storage);
     scan.pieces = placed.pieces;
     scan.info.warnings = warnings;
-    scan.info.resolution = resolution(axis);
+    scan.info.resolution = resolutions(&properties);
     settle_float_colours(&mut scan);
     Ok(Box::new(scan))
 }

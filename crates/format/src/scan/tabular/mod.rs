@@ -31,13 +31,21 @@ pub(crate) fn reconcile(declared: u64, there: u64, warnings: &mut Vec<ScanWarnin
     declared.min(there)
 }
 
+/// How finely the positions among `properties` are stored, per axis; an axis that is not there is zero.
+pub(crate) fn resolutions(properties: &[Property]) -> [crate::Resolution; 3] {
+    std::array::from_fn(|axis| {
+        let property = properties.iter().find(|p| p.role == Role::Axis(axis));
+        property.map_or(crate::Resolution::Single, |p| resolution(p.ty))
+    })
+}
+
 /// How finely positions of that type are stored.
-pub(crate) fn resolution(ty: crate::AttributeType) -> crate::Resolution {
+fn resolution(ty: crate::AttributeType) -> crate::Resolution {
     use crate::AttributeType as T;
     match ty {
         T::Float32 => crate::Resolution::Single,
         T::Float64 => crate::Resolution::Double,
-        _ => crate::Resolution::Step(1.0),
+        _ => crate::Resolution::Grid(crate::AxisGrid { step: 1.0, offset: 0.0 }),
     }
 }
 

@@ -104,7 +104,7 @@ impl RowScan {
             points_declared: points,
             bounds_declared: None,
             lattice: None,
-            resolution: Resolution::Double,
+            resolution: [Resolution::Double; 3],
             parts: Vec::new(),
             attributes: schema.attributes.clone().into(),
             crs: Default::default(),

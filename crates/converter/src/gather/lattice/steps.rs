@@ -1,0 +1,63 @@
+//! Steps that are easy to read, and the least that doubles allow.
+
+/// The least step, world units: below it single precision of renderers ends.
+const LEAST_STEP: f64 = 1e-30;
+
+/// The smallest of 1, 2 and 5 times powers of ten that is not below `value`, as exact as a double can be.
+pub(super) fn one_two_five(value: f64) -> f64 {
+    let exponent = value.max(f64::MIN_POSITIVE).log10().floor() as i32 - 1;
+    let steps = (exponent..exponent + 3).flat_map(|e| [1, 2, 5].map(|digit| decimal(digit, e)));
+    steps.into_iter().find(|step| *step >= value).unwrap_or(f64::NAN)
+}
+
+/// The smallest power of two that is not below `value`.
+pub(super) fn power_of_two(value: f64) -> f64 {
+    let mut exponent = value.max(f64::MIN_POSITIVE).log2().floor() as i32 - 1;
+    while 2f64.powi(exponent) < value {
+        exponent += 1;
+    }
+    2f64.powi(exponent)
+}
+
+/// The least of 1, 2, 5, 10, 20 … that is not below `factor`: as many times coarser, millimetres stay millimetres.
+pub(super) fn times_coarser(factor: f64) -> f64 {
+    if factor <= 1.0 { 1.0 } else { one_two_five(factor) }
+}
+
+/// `step · factor`, without the rounding of the product where a decimal is meant.
+pub(super) fn tidy_product(step: f64, factor: f64) -> f64 {
+    let product = step * factor;
+    format!("{product:.12e}").parse().ok().filter(|t: &f64| ((t - product) / product).abs() < 1e-13).unwrap_or(product)
+}
+
+/// The least step for coordinates as large as `far`: two distances of doubles.
+pub(super) fn least(far: f64) -> f64 {
+    if far > 0.0 { (2.0 * ulp(far)).max(LEAST_STEP) } else { 0.0 }
+}
+
+/// The distance of doubles at `far` ≥ 0.
+pub(in super::super) fn ulp(far: f64) -> f64 {
+    far.next_up() - far
+}
+
+fn decimal(digit: u32, exponent: i32) -> f64 {
+    format!("{digit}e{exponent}").parse().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_one_two_five() {
+        assert_eq!([3e-7, 0.001, 0.0011, 4.0, 6.0].map(one_two_five), [5e-7, 0.001, 0.002, 5.0, 10.0]);
+        assert_eq!([1.0, 1.5, 4.0, 11.0].map(times_coarser), [1.0, 2.0, 5.0, 20.0]);
+        assert_eq!([0.3, 0.5, 3.0].map(power_of_two), [0.5, 0.5, 4.0]);
+        assert_eq!(tidy_product(0.001, 5.0), 0.005);
+    }
+
+    #[test]
+    fn doubles_have_their_distances() {
+        assert_eq!([1.0, 1e9, 0.0].map(least), [2f64.powi(-51), 2f64.powi(-22), 0.0]);
+    }
+}

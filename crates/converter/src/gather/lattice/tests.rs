@@ -1,0 +1,185 @@
+use pointmill_format::{Aabb, AxisGrid, Lattice, Piece, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
+
+use super::*;
+use crate::cloud::{JobBounds, JobPoint};
+use crate::sources::{Extent, Fineness, Schema, Source, Survey};
+
+/// A scan of which only the headers matter.
+struct Header(ScanInfo);
+
+impl Scan for Header {
+    fn info(&self) -> &ScanInfo {
+        &self.0
+    }
+
+    fn pieces(&self) -> &[Piece] {
+        &[]
+    }
+
+    fn decode(&self, _: usize, _: &Wanted, _: &mut Scratch, _: &mut Sink<'_>) -> Result<(), ReadError> {
+        Ok(())
+    }
+}
+
+fn grid(step: f64) -> Fineness {
+    Fineness::Grid { grid: AxisGrid { step, offset: 0.0 }, is_claim: true }
+}
+
+fn world(fineness: [Fineness; 3], min: [f64; 3], max: [f64; 3]) -> Source {
+    let extent = Some(Extent { bounds: Aabb { min, max }, is_sampled: false });
+    let scan = Box::new(Header(ScanInfo::new("x", "", 0)));
+    Source { scan, columns: Vec::new(), survey: Survey { extent, fineness } }
+}
+
+fn with_lattice(lattice: Lattice, bounds: Option<Aabb>) -> Source {
+    let mut info = ScanInfo::new("x", "", 0);
+    (info.lattice, info.bounds_declared) = (Some(lattice), bounds);
+    let fineness = std::array::from_fn(|a| {
+        let grid = AxisGrid { step: lattice.scale[a], offset: lattice.offset[a] };
+        Fineness::Grid { grid, is_claim: false }
+    });
+    let extent = bounds.map(|bounds| Extent { bounds, is_sampled: false });
+    Source { scan: Box::new(Header(info)), columns: Vec::new(), survey: Survey { extent, fineness } }
+}
+
+fn sources(all: Vec<Source>) -> Sources {
+    let attributes = Schema::new(Vec::new());
+    Sources { all, attributes, points_declared: 0, points_missing: 0, warnings: Vec::new() }
+}
+
+fn plan(scale: ScaleChoice) -> Plan {
+    let mut plan = Plan::new(vec!["x".into()], "out".into());
+    plan.scale = scale;
+    plan
+}
+
+fn chosen(all: Vec<Source>) -> JobLattice {
+    from_headers(&plan(ScaleChoice::Auto), &sources(all)).unwrap()
+}
+
+fn lattice(step: f64, offset: [f64; 3]) -> Lattice {
+    Lattice { scale: [step; 3], offset }
+}
+
+#[test]
+fn sources_that_agree_keep_their_lattice_and_others_get_one_that_holds_all() {
+    let a = lattice(0.01, [100.0, 0.0, 0.0]);
+    let b = lattice(0.001, [200.0, 0.0, -5.0]);
+    let both = |x, y| chosen(vec![with_lattice(x, None), with_lattice(y, None)]).lattice;
+    assert_eq!(both(a, a), a);
+    assert_eq!(both(a, b), b);
+    assert_eq!(both(lattice(0.01, [0.0; 3]), lattice(0.025, [0.0; 3])).scale, [0.005; 3]);
+    let fixed = |step| {
+        from_headers(&plan(ScaleChoice::Fixed(step)), &sources(vec![with_lattice(a, None), with_lattice(b, None)]))
+    };
+    assert_eq!(fixed(0.5).unwrap().lattice.offset, [0.0, 0.0, 0.0]);
+    assert_eq!(fixed(0.3).unwrap().lattice.offset, [100.0, 0.0, -5.0]);
+}
+
+#[test]
+fn declared_bounds_however_wide_do_not_make_the_lattice_of_sources_coarser() {
+    let own = lattice(0.001, [0.0; 3]);
+    let lie = Aabb { min: [-1e12; 3], max: [1e12; 3] };
+    assert_eq!(chosen(vec![with_lattice(own, Some(lie))]).lattice, own);
+}
+
+#[test]
+fn doubles_get_the_finest_step_that_31_bits_hold() {
+    let step = |min, max| chosen(vec![world([Fineness::Double; 3], min, max)]).lattice.scale;
+    assert_eq!(step([0.0; 3], [1000.0, 10.0, 10.0]), [5e-7; 3]);
+    assert_eq!(step([0.0; 3], [2e6; 3]), [1e-3; 3]);
+    // two numbers near 10^7 a millimetre apart: doubles resolve 1.9e-9
+    assert_eq!(step([1e7; 3], [1e7 + 1e-3; 3]), [5e-9; 3]);
+    // degrees with heights: equal steps would be half a decimetre on the ground
+    assert_eq!(step([13.0, 52.0, 0.0], [13.5, 52.5, 1000.0]), [5e-10, 5e-10, 5e-7]);
+}
+
+#[test]
+fn decimals_are_kept_where_the_integers_hold_them_and_stay_decimal_where_not() {
+    let step = |decimal, extent| {
+        let c = chosen(vec![world([grid(decimal); 3], [0.0; 3], [extent; 3])]);
+        (c.lattice.scale[0], c.reason.axes[0].coarser.map(|c| c.factor))
+    };
+    assert_eq!(step(0.001, 600_000.0), (0.001, None), "6e8 steps fit 31 bits");
+    assert_eq!(step(0.001, 2_100_000.0), (0.001, None));
+    assert_eq!(step(0.001, 2_200_000.0), (0.002, Some(2.0)));
+    assert_eq!(step(0.001, 9_000_000.0), (0.005, Some(5.0)));
+    let degrees = [grid(1e-8), grid(1e-8), grid(0.01)];
+    let c = chosen(vec![world(degrees, [13.0, 52.0, 0.0], [13.5, 52.5, 1000.0])]);
+    assert_eq!(c.lattice.scale, [1e-8, 1e-8, 0.01], "a step for each axis");
+    let uneven = chosen(vec![world([grid(0.001), grid(0.001), grid(0.01)], [0.0; 3], [100.0; 3])]);
+    assert_eq!(uneven.lattice.scale, [0.001; 3], "near steps are equal");
+}
+
+#[test]
+fn single_precision_gets_its_own_step_per_axis_and_no_finer() {
+    let single = [Fineness::Single; 3];
+    let c = chosen(vec![world(single, [499_000.0, 5_400_000.0, 90.0], [500_000.0, 5_401_000.0, 100.0])]);
+    assert_eq!(c.lattice.scale, [2f64.powi(-5), 0.5, 2f64.powi(-17)]);
+    // an axis near 0 would ask for more than 31 bits of another
+    let wide = chosen(vec![world(single, [0.0, 0.0, 0.0], [1e6, 1e6, 1e-3])]);
+    assert_eq!(wide.lattice.scale[..2], [2f64.powi(-4); 2]);
+    let flat = chosen(vec![world(single, [0.0; 3], [1.0, 1.0, 0.0])]);
+    assert_eq!(flat.lattice.scale, [2f64.powi(-23); 3], "a flat axis asks for nothing");
+}
+
+#[test]
+fn a_source_that_resolves_little_makes_the_others_neither_finer_nor_coarser() {
+    let own = with_lattice(lattice(0.001, [0.5, 0.0, 0.0]), None);
+    let far = world([Fineness::Single; 3], [499_000.0, 5_400_000.0, 900.0], [500_000.0, 5_401_000.0, 990.0]);
+    let c = chosen(vec![own, far]).lattice;
+    assert_eq!((c.scale, c.offset), ([0.001, 0.001, 0.0001], [0.5, 0.0, 0.0]));
+    let own = with_lattice(lattice(0.01, [0.0; 3]), None);
+    let step = world([Fineness::Step(0.02); 3], [0.0; 3], [1000.0; 3]);
+    assert_eq!(chosen(vec![own, step]).lattice.scale, [0.01; 3]);
+}
+
+#[test]
+fn a_step_is_at_least_two_distances_of_doubles() {
+    let far = lattice(1e-7, [1e9, 0.0, 0.0]);
+    let c = chosen(vec![with_lattice(far, None)]);
+    assert_eq!(c.lattice.scale, [5e-7, 1e-7, 1e-7]);
+    assert_eq!(c.reason.axes[0].coarser, Some(Coarser { factor: 5.0, cause: CoarserCause::Doubles }));
+    let absurd = chosen(vec![with_lattice(lattice(0.01, [1e16; 3]), None)]);
+    assert_eq!(absurd.lattice.scale, [5.0; 3]);
+}
+
+#[test]
+fn points_that_were_read_make_it_coarser_or_finer() {
+    let auto = plan(ScaleChoice::Auto);
+    let stats = |bounds: JobBounds, lattice: &Lattice, off_grid| {
+        let mut stats = Stats::new(&Schema::new(Vec::new()), 1);
+        stats.bounds = bounds;
+        stats.sources[0].bounds = Aabb { min: lattice.world(bounds.min.0), max: lattice.world(bounds.max.0) };
+        stats.sources[0].off_grid = off_grid;
+        stats
+    };
+    let wide = JobBounds { min: JobPoint([0; 3]), max: JobPoint([3_000_000_000, 5, 5]) };
+    let own = sources(vec![with_lattice(lattice(0.001, [0.0; 3]), None)]);
+    let present = from_headers(&auto, &own).unwrap();
+    let coarser = settled(&auto, &own, &present, &stats(wide, &present.lattice, [false; 3])).unwrap();
+    assert_eq!(coarser.lattice.scale, [0.002, 0.001, 0.001], "only the axis that does not fit");
+    let fits = JobBounds { min: JobPoint([0; 3]), max: JobPoint([2_000_000_000, 5, 5]) };
+    assert_eq!(settled(&auto, &own, &present, &stats(fits, &present.lattice, [false; 3])), None);
+    // a sample showed millimetres, a point has more
+    let text = sources(vec![world([grid(0.001); 3], [0.0; 3], [100.0; 3])]);
+    let present = from_headers(&auto, &text).unwrap();
+    let seen = JobBounds { min: JobPoint([0; 3]), max: JobPoint([100_000; 3]) };
+    assert_eq!(settled(&auto, &text, &present, &stats(seen, &present.lattice, [false; 3])), None);
+    let finer = settled(&auto, &text, &present, &stats(seen, &present.lattice, [true, false, false])).unwrap();
+    assert!(finer.lattice.scale[0] <= 1e-7, "{finer:?}");
+    // declared bounds lied
+    let lied = sources(vec![world([Fineness::Double; 3], [0.0; 3], [1e9; 3])]);
+    let present = from_headers(&auto, &lied).unwrap();
+    let small = JobBounds { min: JobPoint([0; 3]), max: JobPoint([200; 3]) };
+    let finer = settled(&auto, &lied, &present, &stats(small, &present.lattice, [false; 3])).unwrap();
+    assert!(finer.lattice.scale[0] < present.lattice.scale[0] / 1e6);
+}
+
+#[test]
+fn reasons_are_one_line_however_many_axes_differ() {
+    let far = chosen(vec![with_lattice(lattice(1e-7, [1e9, 0.0, 0.0]), None)]);
+    let text = far.reason.to_string();
+    assert!(text.contains("x: that of the sources; made 5 times coarser, because doubles"), "{text}");
+    assert!(text.ends_with("z: that of the sources"), "{text}");
+}

@@ -1,0 +1,80 @@
+//! How many decimals coordinates have: those of text, and of doubles that were decimals once.
+
+use pointmill_format::AxisGrid;
+
+/// More decimals than this are the noise of arithmetic.
+const MOST: u32 = 12;
+
+/// A decimal grid is not coarser than this part of the extent, or a small cloud would have no room for levels.
+pub(super) const PARTS_OF_EXTENT: f64 = 1024.0;
+
+/// The least number of decimals that all values so far are written with; `None` once one has more than [`MOST`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Decimals(Option<u32>);
+
+impl Default for Decimals {
+    fn default() -> Self {
+        Self(Some(0))
+    }
+}
+
+/// Powers of ten, all exact.
+const POWERS: [f64; MOST as usize + 1] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12];
+
+impl Decimals {
+    /// Takes a finite value into account.
+    pub(super) fn see(&mut self, value: f64) {
+        while let Some(decimals) = self.0
+            && !has_at_most(value, decimals)
+        {
+            self.0 = (decimals < MOST).then_some(decimals + 1);
+        }
+    }
+
+    /// The decimals as a grid, at most a part of `extent`; `None` if there are too many.
+    pub(super) fn grid(self, extent: f64) -> Option<AxisGrid> {
+        let mut decimals = self.0?;
+        while decimals < MOST && extent > 0.0 && extent * POWERS[decimals as usize] < PARTS_OF_EXTENT {
+            decimals += 1;
+        }
+        Some(AxisGrid { step: 1.0 / POWERS[decimals as usize], offset: 0.0 })
+    }
+}
+
+/// True if `value` is the double nearest to a number with so many decimals: the quotient of two exact numbers is
+/// correctly rounded.
+fn has_at_most(value: f64, decimals: u32) -> bool {
+    let power = POWERS[decimals as usize];
+    let units = (value * power).round();
+    units.abs() < 2f64.powi(53) && units / power == value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(values: &[f64]) -> Option<f64> {
+        let mut decimals = Decimals::default();
+        values.iter().for_each(|v| decimals.see(*v));
+        decimals.grid(f64::INFINITY).map(|g| g.step)
+    }
+
+    #[test]
+    fn decimals_are_those_of_the_longest_value() {
+        assert_eq!(step(&[345_678.123, -0.5, 5_432_109.456]), Some(0.001));
+        assert_eq!(step(&[1.0, 20.0]), Some(1.0));
+        assert_eq!(step(&[13.404_954_12]), Some(1e-8));
+        assert_eq!(step(&[0.1 + 0.2]), None, "0.30000000000000004");
+        assert_eq!(step(&[std::f64::consts::PI, 1.0]), None);
+        assert_eq!(step(&[f64::from(0.1f32)]), None);
+        assert_eq!(step(&[1e18]), None, "no double of that size has decimals to go by");
+    }
+
+    #[test]
+    fn whole_numbers_of_a_small_extent_get_room_for_levels() {
+        let mut decimals = Decimals::default();
+        [0.0, 1.0, 2.0].iter().for_each(|v| decimals.see(*v));
+        assert_eq!(decimals.grid(2.0).unwrap().step, 0.001);
+        assert_eq!(decimals.grid(0.0).unwrap().step, 1.0);
+    }
+}
