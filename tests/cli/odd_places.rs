@@ -118,14 +118,22 @@ fn points_that_only_the_step_makes_equal_are_no_duplicates() {
     // a thousand places, the first hundred twice
     let row = |i: u32| format!("{}.{:03} {}.5 0.125\n", i / 100, i % 100, i % 7);
     dir.write("a.txt", (0..1_100).map(|i| row(i % 1_000)).collect::<String>().as_bytes());
-    let las = Las { scale: [0.001; 3], offset: [0.0; 3], ..Las::new((0..1_100).map(|i: i32| las::Point::at([i % 1_000, 3, 0])).collect()) };
+    let las = Las {
+        scale: [0.001; 3],
+        offset: [0.0; 3],
+        ..Las::new((0..1_100).map(|i: i32| las::Point::at([i % 1_000, 3, 0])).collect())
+    };
     dir.write("a.las", &las.bytes());
     for file in ["a.txt", "a.las"] {
         for step in ["auto", "1", "0.25"] {
             dir.succeed(["convert", file, "-o", "out", "--overwrite", "-q", "--duplicates", "drop", "--scale", step]);
             let report = dir.report("out");
             let output = &report["outputs"][0];
-            assert_eq!((&output["points"], &output["duplicates_dropped"]), (&json!(1_000), &json!(100)), "{file} {step}");
+            assert_eq!(
+                (&output["points"], &output["duplicates_dropped"]),
+                (&json!(1_000), &json!(100)),
+                "{file} {step}"
+            );
             dir.validate("out", &[file]);
         }
     }
@@ -149,7 +157,10 @@ fn the_same_place_in_files_of_several_kinds_is_one_place() {
     dir.write("b.las", &Las { scale: [0.001; 3], offset: [0.0; 3], ..Las::new(finer) }.bytes());
     for step in ["auto", "0.5", "0.003"] {
         let files = ["a.las", "b.las"];
-        dir.succeed([&["convert"], &files[..], &["-o", "out", "--overwrite", "-q", "--duplicates", "drop", "--scale", step]].concat());
+        dir.succeed(
+            [&["convert"], &files[..], &["-o", "out", "--overwrite", "-q", "--duplicates", "drop", "--scale", step]]
+                .concat(),
+        );
         assert_eq!(dir.report("out")["outputs"][0]["points"], 50, "{step}");
         dir.validate("out", &files);
     }

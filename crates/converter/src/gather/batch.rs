@@ -147,7 +147,15 @@ impl<'a> Worker<'a> {
         }
         if self.pass.intake.mark.is_some() {
             let own = self.pass.sources.all[source].scan.info().lattice.as_ref();
-            exact::marks(&self.pass.maps[source], own, &self.pass.lattice, batch, &self.q, |i| rows.row(i), &mut self.marks);
+            exact::marks(
+                &self.pass.maps[source],
+                own,
+                &self.pass.lattice,
+                batch,
+                &self.q,
+                |i| rows.row(i),
+                &mut self.marks,
+            );
         }
         let points = self.q.len();
         self.stats.points += points as u64;

@@ -7,8 +7,8 @@ use pointmill_format::Lattice;
 
 use super::axis::SourceMap;
 use super::cut::Cut;
-use super::origins::Origins;
 use super::lattice::ulp;
+use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segments, Store};
 use crate::plan::Plan;

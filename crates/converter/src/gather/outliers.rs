@@ -103,7 +103,8 @@ mod tests {
             points,
             segments: Segments::default(),
             is_one_place: false,
-            repeats: 0, bounds: None,
+            repeats: 0,
+            bounds: None,
             moments: Moments::default(),
         }
     }

@@ -8,8 +8,8 @@ use super::axis::SourceMap;
 use super::batch::Worker;
 use super::context::{CellPart, CellParts, Context, Demand};
 use super::cut::Cut;
-use super::origins::Origins;
 use super::lattice::ulp;
+use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton};
 use crate::error::ConvertError;
@@ -81,7 +81,15 @@ impl<'a> Pass<'a> {
             .map(|(packed, CellPart { mut segments, moments })| {
                 segments.sort();
                 let points = segments.points();
-                Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, repeats: 0, bounds: None, moments }
+                Cell {
+                    key: partition.node(packed, &cube),
+                    points,
+                    segments,
+                    is_one_place: false,
+                    repeats: 0,
+                    bounds: None,
+                    moments,
+                }
             })
             .collect();
         cells.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));

@@ -67,15 +67,15 @@ impl Look<'_> {
                 min[a] = min[a].min(place[a]);
                 max[a] = max[a].max(place[a]);
             }
-            match counts.get_mut(&place) {
-                Some(count) => *count += 1,
-                None if counts.len() < most => {
-                    counts.insert(place, 1);
-                }
-                None => counts.retain(|_, count| {
+            if let Some(count) = counts.get_mut(&place) {
+                *count += 1;
+            } else if counts.len() < most {
+                counts.insert(place, 1);
+            } else {
+                counts.retain(|_, count| {
                     *count -= 1;
                     *count > 0
-                }),
+                });
             }
         })?;
         Ok((counts, [min, max]))

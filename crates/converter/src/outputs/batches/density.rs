@@ -41,7 +41,8 @@ fn side_for(cloud: &Cloud<'_>) -> f64 {
     let lattice = &cloud.lattice.lattice;
     let side = |level: u8| cloud.frame.cube.side / 2f64.powi(i32::from(level));
     let patch = |cell: &Cell| {
-        let area = cell.bounds.map_or(f64::INFINITY, |b| area([0, 1, 2].map(|a| b.extent(a)), lattice, cell.distinct()));
+        let area =
+            cell.bounds.map_or(f64::INFINITY, |b| area([0, 1, 2].map(|a| b.extent(a)), lattice, cell.distinct()));
         Patch { points: cell.distinct(), area: area.min(side(cell.key.level).powi(2)) }
     };
     let mut patches: Vec<Patch> = cloud.cells.iter().map(patch).collect();
