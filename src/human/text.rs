@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pointmill_format::{Attribute, Crs};
+use pointmill_converter::ResolvedCrs;
+use pointmill_format::{Attribute, Unit};
 
 use super::quantities::{count, number, numbers};
 
@@ -28,15 +29,14 @@ pub(crate) fn attribute_line(attribute: &Attribute, ranges: Option<&[[f64; 2]]>)
     line
 }
 
-/// The coordinate reference system in a few words.
-pub(crate) fn crs(crs: &Crs) -> String {
-    let codes = [crs.epsg, crs.vertical_epsg].into_iter().flatten().map(|code| format!("EPSG:{code}"));
-    let codes = codes.collect::<Vec<_>>().join(" + ");
-    let name = crs.wkt.as_deref().map(|wkt| wkt.split('"').nth(1).unwrap_or("no name"));
-    match name {
-        Some(name) if codes.is_empty() => format!("WKT {name}"),
-        Some(name) => format!("WKT {name}, {codes}"),
-        None => or_none(&codes).to_owned(),
+/// The unit of x and y, and of z, as far as they are known: "US survey foot; of heights: metre".
+pub(crate) fn units(crs: &ResolvedCrs) -> String {
+    let known = |unit: Option<Unit>| unit.map_or_else(|| "not known".to_owned(), |unit| unit.to_string());
+    match (crs.unit, crs.vertical_unit) {
+        (None, None) => known(None),
+        (unit, None) => format!("{}; that of heights is not known", known(unit)),
+        (unit, heights) if unit == heights => format!("{}, heights too", known(unit)),
+        (unit, heights) => format!("{}; of heights: {}", known(unit), known(heights)),
     }
 }
 

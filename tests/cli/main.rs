@@ -10,6 +10,7 @@ mod hostile;
 mod inputs;
 mod interrupted;
 mod odd_places;
+mod precision;
 mod reporting;
 
 mod same_points;

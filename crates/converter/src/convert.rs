@@ -10,7 +10,7 @@ use crate::outputs::{self, StagedFolder, Target};
 use crate::plan::Plan;
 use crate::report::{self, Account, Report};
 use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemDisk, TempFiles};
-use crate::sources::{Sources, resolve_crs};
+use crate::sources::{Sources, resolve_crs_of_all};
 
 /// Converts the inputs of `plan` to one dataset for each target. One goes into the output folder itself, several into
 /// folders of their names below it.
@@ -39,7 +39,7 @@ pub fn convert_on(
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes);
     let budget = Budget::new(plan, intake.schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
-    resolve_crs(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
+    resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, disk), events)?;
 

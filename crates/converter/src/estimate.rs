@@ -7,7 +7,7 @@ use crate::outputs::{self, DiskSize, Target, choose_attributes};
 use crate::plan::Plan;
 use crate::report::{Estimate, grid_report, input_reports};
 use crate::runtime::{Budget, Least, Silent};
-use crate::sources::{Sources, resolve_crs};
+use crate::sources::{Sources, resolve_crs_of_all};
 
 /// Bytes of metadata and report together.
 const JSON_BYTES: u64 = 16 << 10;
@@ -24,7 +24,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
     let schema = &intake.schema;
     let budget = Budget::new(plan, schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
     let mut warnings = sources.warnings.clone();
-    let crs = resolve_crs(plan, &sources.all, &mut warnings)?;
+    let crs = resolve_crs_of_all(plan, &sources.all, &mut warnings)?;
     let lattice = from_headers(plan, &sources)?;
     // Which attributes are constant is not known before the points are read.
     let ranges: Vec<Range> = schema.attributes.iter().map(|a| Range::new(a.elements)).collect();

@@ -53,8 +53,8 @@ pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
 pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
-    AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice,
-    Setting,
+    AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault, RgbDepth,
+    ScaleChoice, Setting,
 };
 pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
@@ -63,4 +63,5 @@ pub use report::{
     TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
+pub use sources::{ResolvedCrs, resolve_crs};
 pub use warning::{CrsNote, Proj4Fault, Warning};

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use pointmill_format::{Aabb, Changes, DatasetKind, ReadError, ScanWarning};
+use pointmill_format::{Aabb, Changes, DatasetKind, ReadError, ScanWarning, Unit};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::advice::Advice;
@@ -54,6 +54,13 @@ pub enum Warning {
         scale: [f64; 3],
         /// Why.
         reason: LatticeReason,
+    },
+    /// Points far from all others were dropped.
+    OutliersDropped {
+        /// At least as many.
+        points: u64,
+        /// The box of all others, world units.
+        others: Aabb,
     },
     /// Single precision does not resolve the coordinates of an input well.
     CoarseSingle {
@@ -153,7 +160,7 @@ pub enum Warning {
 }
 
 /// What is odd about a coordinate reference system.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum CrsNote {
     /// The WKT describes no horizontal system.
@@ -175,17 +182,51 @@ pub enum CrsNote {
         /// Why.
         why: Proj4Fault,
     },
-    /// WKT and GeoTIFF keys of one file disagree; the WKT was taken.
+    /// WKT and GeoTIFF keys of one file disagree.
     Disagree {
-        /// EPSG code of the WKT.
-        wkt: u32,
-        /// EPSG code of the GeoTIFF keys.
-        geotiff: u32,
+        /// What the WKT says: code, units.
+        wkt: String,
+        /// What the GeoTIFF keys say.
+        geotiff: String,
+        /// The file says that the keys count, and they were taken.
+        keys_taken: bool,
     },
+    /// Coordinates are declared in another unit than the one of their system.
+    Unit {
+        /// EPSG code of the system.
+        code: u32,
+        /// The unit of the system.
+        own: Unit,
+        /// The unit that was declared, and taken.
+        declared: Unit,
+    },
+    /// The given system has another unit than the one that the inputs declare.
+    GivenUnit {
+        /// The unit of the given system, which was taken.
+        given: Unit,
+        /// The unit that the inputs declare.
+        declared: Unit,
+    },
+    /// The false easting of the WKT is not the one of the code that it carries.
+    FalseEasting {
+        /// EPSG code of the system.
+        code: u32,
+        /// False easting of the WKT, metres.
+        found: f64,
+        /// False easting of the code, metres.
+        own: f64,
+    },
+    /// GeoTIFF keys define a system by parameters.
+    UserDefined {
+        /// Its name, or empty.
+        name: String,
+    },
+    /// The WKT ends too early.
+    CutWkt,
 }
 
 /// Why viewers cannot use a proj4 definition.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Proj4Fault {
     /// There is none.
@@ -194,6 +235,8 @@ pub enum Proj4Fault {
     Malformed(String),
     /// Viewers do not know the projection.
     UnknownProjection(String),
+    /// A definition cannot say that coordinates have this unit.
+    Unit(Unit),
 }
 
 impl Warning {
@@ -206,6 +249,7 @@ impl Warning {
             Self::ReadAgain => "read_again",
             Self::FinerStep { .. } => "finer_step",
             Self::CoarserStep { .. } => "coarser_step",
+            Self::OutliersDropped { .. } => "outliers_dropped",
             Self::CoarseSingle { .. } => "coarse_single",
             Self::Outliers { .. } => "outliers",
             Self::OriginPoints { .. } => "origin_points",
@@ -229,8 +273,8 @@ impl Warning {
             Self::Outliers { others, .. } => Some(Advice::CutBounds { bounds: Some(*others) }),
             Self::OriginPoints { .. } | Self::SharedPlace { at_origin: true, .. } => Some(Advice::SkipOriginPoints),
             Self::MixedRgbDepth { .. } => Some(Advice::SetRgbDepth),
-            Self::Crs(CrsNote::NoCode { .. }) => Some(Advice::NameEpsg),
-            Self::Crs(CrsNote::NotInTable { .. }) => Some(Advice::GiveProj4),
+            Self::Crs(CrsNote::NoCode { .. } | CrsNote::UserDefined { .. }) => Some(Advice::NameEpsg),
+            Self::Crs(CrsNote::NotInTable { .. } | CrsNote::FalseEasting { .. }) => Some(Advice::GiveProj4),
             Self::DifferentCrs { .. } => Some(Advice::Reproject),
             Self::ManyFiles { .. } => Some(Advice::PackLeaves),
             _ => None,
@@ -251,6 +295,9 @@ impl Warning {
                 steps(*scale)
             ),
             Self::CoarserStep { scale, reason } => format!("coordinate step {}: {reason}", steps(*scale)),
+            Self::OutliersDropped { points, others: Aabb { min, max } } => format!(
+                "{points} or more points far from all others are dropped: those outside {min:?} to {max:?}; reading again"
+            ),
             Self::CoarseSingle { path, resolution } => format!(
                 "{}: stores coordinates in single precision, which resolves {} here and no finer; no tool can restore \
                  what it lacks",
@@ -372,9 +419,31 @@ impl fmt::Display for CrsNote {
             Self::NotInTable { code } => write!(f, "EPSG:{code} is not in the table of proj4 definitions"),
             Self::NotForViewers { code: Some(code), why } => write!(f, "EPSG:{code}: {why}"),
             Self::NotForViewers { code: None, why } => why.fmt(f),
-            Self::Disagree { wkt, geotiff } => {
-                write!(f, "the WKT says EPSG:{wkt} but the GeoTIFF keys say EPSG:{geotiff}; the WKT was taken")
+            Self::Disagree { wkt, geotiff, keys_taken } => {
+                let taken = if *keys_taken { "the keys were taken, as the header says" } else { "the WKT was taken" };
+                write!(f, "the WKT says {wkt} but the GeoTIFF keys say {geotiff}; {taken}")
             }
+            Self::Unit { code, own, declared } => write!(
+                f,
+                "EPSG:{code} has coordinates in units of {own}, but units of {declared} are declared; the latter were taken"
+            ),
+            Self::GivenUnit { given, declared } => write!(
+                f,
+                "the inputs declare coordinates in units of {declared}, the given coordinate reference system has \
+                 units of {given}; the latter were taken"
+            ),
+            Self::FalseEasting { code, found, own } => write!(
+                f,
+                "the WKT has a false easting of {found} m, but the EPSG:{code} that it names has {own} m; the \
+                 projection stays empty"
+            ),
+            Self::UserDefined { name } if name.is_empty() => {
+                f.write_str("the GeoTIFF keys define a system of their own, which is not interpreted")
+            }
+            Self::UserDefined { name } => {
+                write!(f, "the GeoTIFF keys define a system of their own (\"{name}\"), which is not interpreted")
+            }
+            Self::CutWkt => f.write_str("the WKT ends before its brackets are closed"),
         }
     }
 }
@@ -384,6 +453,8 @@ impl fmt::Display for Proj4Fault {
         match self {
             Self::Missing => f.write_str("there is no proj4 definition for it"),
             Self::Malformed(text) => write!(f, "\"{text}\" is not a proj4 definition"),
+            Self::Unit(Unit::Unknown) => f.write_str("the unit of the coordinates is not known"),
+            Self::Unit(unit) => write!(f, "a proj4 definition cannot have coordinates in units of {unit}"),
             Self::UnknownProjection(name) => write!(f, "viewers do not know +proj={name}"),
         }
     }

@@ -68,7 +68,7 @@ pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Batches, Counted, Crs, MAX_BATCH_POINTS, OpenOptions, Piece, Resolution, Scan, ScanInfo, ScanKind, ScanPart,
-    ScanWarning, Scratch, Sink, UnknownAttribute, Wanted, open_scan, supported_scans,
+    ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, supported_scans,
 };
 pub use write_error::WriteError;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pointmill_format::{AxisGrid, OpenOptions, Resolution, Scan, ScanInfo, ScanPart};
+use pointmill_format::{AxisGrid, OpenOptions, Resolution, Scan, ScanInfo, ScanPart, Unit};
 use serde_json::{Map, Value, json};
 
 use super::description::{Description, attribute_json, corners};
@@ -45,7 +45,11 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
         Some(l) => t.row("lattice", format!("step {}, offset {}", numbers(&l.scale), numbers(&l.offset))),
         None => t.row("resolution", resolution(info, measured)),
     }
-    t.row("CRS", text::crs(&info.crs));
+    let crs = pointmill_converter::resolve_crs(&info.crs);
+    t.row("CRS", text::or_none(&crs.label));
+    if crs.unit.is_some() || crs.vertical_unit.is_some() {
+        t.row("units", text::units(&crs));
+    }
     let pieces = plural(scan.pieces().len() as u64, "piece");
     t.row("size", format!("{}, {pieces} to decode in parallel", bytes(info.file_bytes)));
     for (i, part) in info.parts.iter().take(MAX_PARTS).enumerate() {
@@ -59,6 +63,7 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
         t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, ranges));
     }
     info.warnings.iter().for_each(|w| t.row("warning", w.to_string()));
+    crs.notes.iter().for_each(|note| t.row("warning", note.to_string()));
     t.0
 }
 
@@ -151,7 +156,7 @@ fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
         "bounds_declared": info.bounds_declared.map(|b| corners(&b)),
         "lattice": info.lattice.map(|l| json!({ "scale": l.scale, "offset": l.offset })),
         "resolution": resolution,
-        "crs": { "wkt": info.crs.wkt, "epsg": info.crs.epsg, "vertical_epsg": info.crs.vertical_epsg },
+        "crs": crs_json(info),
         "scans": info.parts.iter().map(part).collect::<Vec<_>>(),
         "attributes": info.attributes.iter().map(attribute_json).collect::<Vec<_>>(),
         "pieces": scan.pieces().len(),
@@ -172,6 +177,23 @@ fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
         });
     }
     object
+}
+
+/// What the file declares, and what it comes to: name, definition for viewers, units.
+fn crs_json(info: &ScanInfo) -> Value {
+    let crs = pointmill_converter::resolve_crs(&info.crs);
+    let unit = |unit: Option<Unit>| unit.map(|unit| json!({ "name": unit.to_string(), "metres": unit.metres() }));
+    json!({
+        "wkt": info.crs.wkt,
+        "epsg": info.crs.epsg,
+        "vertical_epsg": info.crs.vertical_epsg,
+        "name": crs.label,
+        "projection": crs.projection,
+        "is_geographic": crs.is_geographic(),
+        "unit": unit(crs.unit),
+        "vertical_unit": unit(crs.vertical_unit),
+        "warnings": crs.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::shortfall::{self, Shortfall};
 use super::stats::{Range, SourceStats, Stats};
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{Plan, RgbDepth};
-use crate::sources::{ResolvedCrs, Sources, resolve_crs};
+use crate::sources::{ResolvedCrs, Sources, resolve_crs_of_all};
 use crate::warning::Warning;
 
 /// Facts about all points.
@@ -51,7 +51,7 @@ impl Facts {
             }
             warnings.extend(mixed_depths(sources, intake, stats, &depths, rgb));
         }
-        let crs = resolve_crs(plan, &sources.all, warnings)?;
+        let crs = resolve_crs_of_all(plan, &sources.all, warnings)?;
         let class = schema.find("classification").filter(|&i| schema.attributes[i].size() == 1);
         Ok(Self { widen_rgb, class: class.map(|i| schema.offsets[i]), ranges, shortfalls, crs })
     }

@@ -36,6 +36,8 @@ pub(super) struct Context<'a> {
     pub(super) origins: Vec<Origins>,
     /// Axes of each source on which every point has to prove the claim that a grid holds it.
     pub(super) claims: Vec<[bool; 3]>,
+    /// Points outside, in the terms of each source, are outliers, which are dropped.
+    pub(super) far_cuts: Vec<Option<Cut>>,
     /// The lattice of the pass.
     pub(super) lattice: Lattice,
     pub(super) partition: Partition,

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{Advice, Lattice, Scratch};
+use pointmill_format::{Aabb, Advice, Lattice, Scratch};
 
 use super::axis::SourceMap;
 use super::batch::Worker;
@@ -36,7 +36,8 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// `hint`: the bounds that are believed.
+    /// `hint`: the bounds that are believed; `far_cut`: the box of all points but outliers, which are dropped.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
         plan: &'a Plan,
         sources: &'a Sources,
@@ -44,15 +45,20 @@ impl<'a> Pass<'a> {
         demand: Demand,
         lattice: &'a JobLattice,
         hint: Option<JobBounds>,
+        far_cut: Option<Aabb>,
         rt: &'a Runtime<'a>,
     ) -> Self {
         let map = |s: &Source| SourceMap::new(s.scan.info().lattice.as_ref(), &lattice.lattice);
+        let cuts = |bounds: Option<Aabb>| -> Vec<Option<Cut>> {
+            sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect()
+        };
         let context = Context {
             plan,
             sources,
             intake,
             maps: sources.all.iter().map(map).collect(),
-            cuts: sources.all.iter().map(|s| plan.filter.bounds.map(|b| Cut::new(&b, s.scan.info()))).collect(),
+            cuts: cuts(plan.filter.bounds),
+            far_cuts: cuts(far_cut),
             origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             claims: sources.all.iter().map(|s| s.survey.fineness.map(|f| f.is_claim())).collect(),
             lattice: lattice.lattice,

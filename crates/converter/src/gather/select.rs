@@ -24,7 +24,8 @@ pub(super) fn select(
     let at_origin = origins.count(batch);
     stats.sources[source].at_origin += at_origin;
     let skips_origin = filter.origin_points == OriginPoints::Skip && at_origin > 0;
-    let all_inside = cut.is_none_or(|cut| cut.holds_all(&batch.positions));
+    let far_cut = pass.far_cuts[source].as_ref();
+    let all_inside = [cut, far_cut].into_iter().flatten().all(|cut| cut.holds_all(&batch.positions));
     let all_finite = match &batch.positions {
         Positions::Quantized(_) => true,
         Positions::World(p) => p.iter().all(|axis| axis.iter().all(|v| v.is_finite())),
@@ -54,6 +55,8 @@ pub(super) fn select(
             stats.origin_skipped += 1;
         } else if cut.is_some_and(|cut| !cut.holds(&batch.positions, i)) {
             stats.outside_bounds += 1;
+        } else if far_cut.is_some_and(|cut| !cut.holds(&batch.positions, i)) {
+            stats.outliers += 1;
         } else if filter
             .classes
             .as_ref()

@@ -114,6 +114,12 @@ pub enum PlanFault {
     /// Text that is not a coordinate reference system.
     #[error("\"{0}\" is not EPSG:n, a +proj=… definition or WKT")]
     NotACrs(String),
+    /// WKT that ends too early.
+    #[error("the WKT \"{0}\" ends before its brackets are closed")]
+    CutWkt(String),
+    /// WKT of a system without a name.
+    #[error("the WKT \"{0}\" has no name")]
+    EmptyWkt(String),
     /// A cell that the format of batches cannot have with this cloud.
     #[error("{0}")]
     Cell(String),

@@ -13,7 +13,7 @@ use crate::memory;
 use crate::plan::{AttributeChoice, Filter, OriginPoints, Plan};
 use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
-use crate::sources::{Sources, resolve_scan};
+use crate::sources::{Sources, resolve_crs};
 
 /// What a run has to show for itself, beside the cloud.
 pub(crate) struct Account {
@@ -63,13 +63,19 @@ fn points_report(cloud: &Cloud<'_>, outputs: &[OutputReport]) -> Result<PointsRe
         read: stats.sources.iter().map(|s| s.read).sum(),
         kept: stats.points,
         outside_bounds: stats.outside_bounds,
+        outliers: stats.outliers,
         other_class: stats.other_class,
         thinned: stats.thinned,
         invalid: stats.invalid,
         at_origin: stats.origin_skipped,
         unreadable: stats.unreadable.saturating_add(cloud.sources.points_missing),
     };
-    let filtered = points.outside_bounds + points.other_class + points.thinned + points.invalid + points.at_origin;
+    let filtered = points.outside_bounds
+        + points.outliers
+        + points.other_class
+        + points.thinned
+        + points.invalid
+        + points.at_origin;
     let is_whole = |o: &OutputReport| o.points + o.duplicates_dropped == points.kept;
     if points.read == points.kept + filtered && outputs.iter().all(is_whole) {
         return Ok(points);
@@ -105,7 +111,7 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
             resolution: source
                 .survey
                 .resolution(&seen.map(|s| s.bounds).or(info.bounds_declared).unwrap_or(Aabb::EMPTY)),
-            crs: resolve_scan(&info.crs).label,
+            crs: resolve_crs(&info.crs).label,
             rgb_depth: coloured.map(|c| if c.facts.widen_rgb[i].is_some() { 8 } else { 16 }),
         }
     };
@@ -148,6 +154,7 @@ pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value>
     settings.insert("memory".into(), plan.memory_bytes.into());
     settings.insert("threads".into(), plan.threads.into());
     settings.insert("duplicates".into(), plan.duplicates.name().into());
+    settings.insert("outliers".into(), plan.outliers.name().into());
     settings.insert("rgb-depth".into(), plan.rgb_depth.name().into());
     settings
 }

@@ -8,7 +8,8 @@ mod survey;
 
 use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
-pub(crate) use crs::{ResolvedCrs, resolve_all as resolve_crs, resolve_scan};
+pub(crate) use crs::resolve_all as resolve_crs_of_all;
+pub use crs::{ResolvedCrs, resolve_crs};
 pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema, as_doubles};
 #[cfg(test)]
 pub(crate) use survey::Extent;

@@ -4,10 +4,10 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Aabb, Attribute, AxisGrid, Lattice, ScanWarning};
+use crate::{Aabb, Attribute, AxisGrid, Lattice, ScanWarning, Unit};
 
 /// The coordinate reference system as the file declares it; nothing is derived.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Crs {
     /// OGC WKT text, as stored, without trailing zero bytes.
@@ -16,13 +16,29 @@ pub struct Crs {
     pub epsg: Option<u32>,
     /// EPSG code of the vertical system from GeoTIFF keys.
     pub vertical_epsg: Option<u32>,
+    /// Unit of x and y that GeoTIFF keys declare beside the code; it goes before the unit of `epsg`.
+    pub unit: Option<Unit>,
+    /// Unit of z that GeoTIFF keys declare beside the code; it goes before the unit of `vertical_epsg`.
+    pub vertical_unit: Option<Unit>,
+    /// What GeoTIFF keys call the system, for people.
+    pub citation: Option<String>,
+    /// GeoTIFF keys define a projected or geographic system of their own, by parameters that are not read.
+    pub is_user_defined: bool,
+    /// There are WKT and GeoTIFF keys, and the file says that the keys count.
+    pub keys_first: bool,
 }
 
 impl Crs {
     /// What is known: WKT text, code of the (projected) system, code of the vertical one.
     #[must_use]
     pub fn new(wkt: Option<String>, epsg: Option<u32>, vertical_epsg: Option<u32>) -> Self {
-        Self { wkt, epsg, vertical_epsg }
+        Self { wkt, epsg, vertical_epsg, ..Self::default() }
+    }
+
+    /// The same with the units that GeoTIFF keys declare, of x and y, and of z.
+    #[must_use]
+    pub fn with_units(self, unit: Option<Unit>, vertical_unit: Option<Unit>) -> Self {
+        Self { unit, vertical_unit, ..self }
     }
 }
 

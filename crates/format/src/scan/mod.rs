@@ -1,5 +1,6 @@
 //! Scans: files of points, of any kind, opened by content and decoded in pieces.
 
+mod archive;
 mod batches;
 #[cfg(any(feature = "e57", feature = "las"))]
 mod catch_panic;
@@ -8,6 +9,7 @@ mod info;
 mod open;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
+mod unit;
 mod wanted;
 mod warning;
 // each reader uses its part of it: a build with few of them leaves some of it idle
@@ -30,5 +32,6 @@ pub use batches::Batches;
 pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
+pub use unit::Unit;
 pub use wanted::{UnknownAttribute, Wanted};
 pub use warning::{Counted, ScanWarning};

@@ -1,7 +1,9 @@
-//! Well-known text of coordinate reference systems: which code does it carry?
+//! Well-known text of coordinate reference systems: which code does it carry, and which units?
 //!
 //! Reads WKT 1 (OGC 01-009, with the habits of GDAL and ESRI) and WKT 2 (OGC 18-010) as a flat list of elements with
-//! their depth. Nothing recurses and nothing is interpreted but names and authorities, so any bytes are safe.
+//! their depth. Nothing recurses and nothing is interpreted but names, authorities and units, so any bytes are safe.
+
+use pointmill_format::Unit;
 
 /// Real texts have some dozens of elements; what follows after this many is not looked at.
 const MAX_ELEMENTS: usize = 4096;
@@ -24,7 +26,11 @@ const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 /// Elements that only hold a system.
 const HOLDERS: [&str; 2] = ["BOUNDCRS", "SOURCECRS"];
 /// Systems that place nothing on the ground by themselves, but are systems.
-const OTHERS: [&str; 7] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "FITTED_CS", "VERT_CS", "VERTCRS", "VERTICALCRS"];
+const OTHERS: [&str; 4] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "FITTED_CS"];
+const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
+const UNITS: [&str; 4] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT", "ANGULARUNIT"];
+/// Names of the parameter that is `+x_0` in proj4, without blanks and underscores.
+const FALSE_EASTING: [&str; 3] = ["falseeasting", "eastingatfalseorigin", "eastingatprojectioncentre"];
 
 /// `KEYWORD[value, value, …]`, without its inner elements.
 struct Element<'a> {
@@ -36,7 +42,7 @@ struct Element<'a> {
 }
 
 /// What a text says about its coordinate reference system.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Default, Clone, PartialEq)]
 pub(super) struct WktSystem {
     /// Name of the outermost system (a compound's own), or of the horizontal one if that has none.
     pub(super) name: String,
@@ -44,17 +50,32 @@ pub(super) struct WktSystem {
     pub(super) epsg: Option<u32>,
     /// GDAL's `EXTENSION["PROJ4", …]` of the horizontal system.
     pub(super) proj4: Option<String>,
+    /// Unit of x and y, where the text says it.
+    pub(super) unit: Option<Unit>,
+    /// False easting, metres.
+    pub(super) false_easting: Option<f64>,
+    /// EPSG code of the vertical system.
+    pub(super) vertical_epsg: Option<u32>,
+    /// Unit of z, where the text says it.
+    pub(super) vertical_unit: Option<Unit>,
+    /// Brackets and quotes are closed: the text is whole.
+    pub(super) is_whole: bool,
 }
 
 /// True if the first word of `text` is the keyword of a coordinate reference system.
 pub(super) fn is_wkt(text: &str) -> bool {
     let word = text.trim_start().split(['[', '(']).next().unwrap_or_default().trim_end();
-    is_one_of(word, &HORIZONTAL) || is_one_of(word, &COMPOUND) || is_one_of(word, &HOLDERS) || is_one_of(word, &OTHERS)
+    [&HORIZONTAL[..], &COMPOUND, &HOLDERS, &OTHERS, &VERTICAL].iter().any(|words| is_one_of(word, words))
 }
 
-/// Finds name and code of the horizontal system; `None` if the text has no such system.
+/// True if all brackets and quotes of `text` are closed.
+pub(super) fn is_whole(text: &str) -> bool {
+    elements(text).is_whole
+}
+
+/// Finds name, code and units of the horizontal system; `None` if the text has no such system.
 pub(super) fn read(text: &str) -> Option<WktSystem> {
-    let elements = elements(text);
+    let Elements { found: elements, is_whole } = elements(text);
     let mut at = 0;
     let mut compound = None;
     // Every step goes to a child, so to a higher index: the loop ends.
@@ -73,11 +94,52 @@ pub(super) fn read(text: &str) -> Option<WktSystem> {
         let fits = e.keyword.eq_ignore_ascii_case("EXTENSION") && e.values[0].eq_ignore_ascii_case("PROJ4");
         fits.then(|| e.values[1].to_owned())
     });
+    let vertical = elements.iter().position(|e| is_one_of(e.keyword, &VERTICAL));
     Some(WktSystem {
         name: elements[compound.unwrap_or(at)].values[0].replace("\"\"", "\""),
         epsg: epsg_of(&elements, at).or_else(|| epsg_of(&elements, compound?)),
         proj4,
+        unit: unit_of(&elements, at, 0),
+        false_easting: false_easting(&elements, at),
+        vertical_epsg: vertical.and_then(|v| epsg_of(&elements, v)),
+        vertical_unit: vertical.map_or_else(|| third_unit(&elements, at), |v| unit_of(&elements, v, 0)),
+        is_whole,
     })
+}
+
+/// The unit of axis `axis` of a system: the axis' own (WKT 2), else the system's.
+fn unit_of(elements: &[Element<'_>], of: usize, axis: usize) -> Option<Unit> {
+    let axis = children(elements, of).filter(|&c| elements[c].keyword.eq_ignore_ascii_case("AXIS")).nth(axis);
+    let is_angular = is_one_of(elements[of].keyword, &["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS"]);
+    axis.and_then(|axis| own_unit(elements, axis, is_angular)).or_else(|| own_unit(elements, of, is_angular))
+}
+
+/// The unit of heights of a system with three axes.
+fn third_unit(elements: &[Element<'_>], of: usize) -> Option<Unit> {
+    let axes = children(elements, of).filter(|&c| elements[c].keyword.eq_ignore_ascii_case("AXIS")).count();
+    if axes < 3 { None } else { unit_of(elements, of, 2).filter(|unit| !unit.is_angle()) }
+}
+
+/// The unit that is a direct child of element `of`. `is_angular`: what `UNIT` alone means there.
+fn own_unit(elements: &[Element<'_>], of: usize, is_angular: bool) -> Option<Unit> {
+    let unit = children(elements, of).map(|c| &elements[c]).find(|e| is_one_of(e.keyword, &UNITS))?;
+    let size = unit.values[1].parse().unwrap_or(f64::NAN);
+    let is_angle = match unit.keyword {
+        keyword if keyword.eq_ignore_ascii_case("UNIT") => is_angular,
+        keyword => !keyword.eq_ignore_ascii_case("LENGTHUNIT"),
+    };
+    Some(if is_angle { Unit::angle(size) } else { Unit::length(size) })
+}
+
+/// The parameter's own unit (WKT 2) goes before that of the system. WKT 2 has parameters in its `CONVERSION`.
+fn false_easting(elements: &[Element<'_>], of: usize) -> Option<f64> {
+    let conversion = children(elements, of).find(|&c| elements[c].keyword.eq_ignore_ascii_case("CONVERSION"));
+    let parameter = children(elements, conversion.unwrap_or(of)).find(|&c| {
+        let name = elements[c].values[0].chars().filter(|c| !"_ ".contains(*c)).collect::<String>();
+        elements[c].keyword.eq_ignore_ascii_case("PARAMETER") && is_one_of(&name, &FALSE_EASTING)
+    })?;
+    let unit = own_unit(elements, parameter, false).or_else(|| unit_of(elements, of, 0))?;
+    Some(elements[parameter].values[1].parse::<f64>().ok()? * unit.metres()?)
 }
 
 /// The code in the element's own `AUTHORITY["EPSG", n]` or `ID["EPSG", n]`, not in those of its datum or units.
@@ -100,11 +162,20 @@ fn is_one_of(keyword: &str, words: &[&str]) -> bool {
     words.iter().any(|w| w.eq_ignore_ascii_case(keyword))
 }
 
-/// The elements in order of appearance. Ends where the first one is closed, or where the text stops making sense.
-fn elements(text: &str) -> Vec<Element<'_>> {
+/// The elements in order of appearance.
+struct Elements<'a> {
+    found: Vec<Element<'a>>,
+    /// All that were opened are closed.
+    is_whole: bool,
+}
+
+/// Ends where the first element is closed and no other follows behind a comma (as ESRI puts the vertical system), or
+/// where the text stops making sense.
+fn elements(text: &str) -> Elements<'_> {
     let bytes = text.as_bytes();
     let mut found: Vec<Element<'_>> = Vec::new();
     let mut open: Vec<usize> = Vec::new();
+    let mut is_whole = false;
     let mut word = ""; // the last word or string that no delimiter has followed yet
     let mut i = 0;
     while let Some(&byte) = bytes.get(i) {
@@ -117,6 +188,7 @@ fn elements(text: &str) -> Vec<Element<'_>> {
                 found.push(Element { depth: open.len() - 1, keyword: word, values: [""; 2], value_count: 0 });
                 word = "";
             }
+            b',' if open.is_empty() && !found.is_empty() => word = "",
             b',' | b']' | b')' => {
                 let Some(&top) = open.last() else { break };
                 let element = &mut found[top];
@@ -127,7 +199,8 @@ fn elements(text: &str) -> Vec<Element<'_>> {
                 word = "";
                 if byte != b',' {
                     open.pop();
-                    if open.is_empty() {
+                    if open.is_empty() && !text[i + 1..].trim_start().starts_with(',') {
+                        is_whole = true;
                         break;
                     }
                 }
@@ -147,7 +220,7 @@ fn elements(text: &str) -> Vec<Element<'_>> {
         }
         i += 1;
     }
-    found
+    Elements { found, is_whole }
 }
 
 /// Bytes before the closing quote; a doubled quote stands for one and closes nothing.
@@ -189,7 +262,8 @@ mod tests {
         let text = format!(
             r#"COMPD_CS["a + b",PROJCS["a",{GEOGCS},AUTHORITY["EPSG","2991"]],VERT_CS["b",AUTHORITY["EPSG","6360"]],AUTHORITY["EPSG","9999"]]"#
         );
-        assert_eq!(read(&text).unwrap(), WktSystem { name: "a + b".into(), epsg: Some(2991), proj4: None });
+        let system = read(&text).unwrap();
+        assert_eq!((system.name.as_str(), system.epsg, system.vertical_epsg), ("a + b", Some(2991), Some(6360)));
         let only_outside = r#"COMPOUNDCRS["NAD83(2011) + NAVD88 height",GEOGCRS["NAD83(2011)",DATUM["d",ELLIPSOID["GRS 1980",6378137,298.257222101,LENGTHUNIT["metre",1]]]],VERTCRS["NAVD88 height",ID["EPSG",5703]],ID["EPSG",6349]]"#;
         assert_eq!(code(only_outside), Some(6349));
     }
@@ -206,6 +280,59 @@ mod tests {
         // No code there is one of a system that stands on its own.
         assert_eq!(code(r#"TARGETCRS[GEOGCRS["WGS 84",ID["EPSG",4326]]]"#), None);
         assert_eq!(code(r#"VERT_CS["h",AUTHORITY["EPSG","5703"]]"#), None);
+    }
+
+    /// Units of x and y, and of z.
+    fn units(text: &str) -> (Option<Unit>, Option<Unit>) {
+        let system = read(text).unwrap();
+        (system.unit, system.vertical_unit)
+    }
+
+    #[test]
+    fn units_are_those_of_the_systems_and_not_of_their_parts() {
+        assert_eq!(units(GEOGCS), (Some(Unit::DEGREE), None));
+        let feet = format!(r#"PROJCS["x",{GEOGCS},UNIT["Foot_US",0.3048006096012192]]"#);
+        assert_eq!(units(&feet), (Some(Unit::US_SURVEY_FOOT), None));
+        assert_eq!(units(&format!(r#"PROJCS["x",{GEOGCS}]"#)), (None, None));
+        let compound = format!(r#"COMPD_CS["c",{feet},VERT_CS["h",VERT_DATUM["d",2005],UNIT["metre",1]]]"#);
+        assert_eq!(units(&compound), (Some(Unit::US_SURVEY_FOOT), Some(Unit::METRE)));
+        // ESRI puts the vertical system behind the other
+        let behind = format!(r#"{feet}, VERTCS["h",VDATUM["d"],UNIT["Foot",0.3048]]"#);
+        assert_eq!(units(&behind), (Some(Unit::US_SURVEY_FOOT), Some(Unit::FOOT)));
+        assert_eq!(units(r#"PROJCS["x",UNIT["none",0]]"#), (Some(Unit::Unknown), None));
+    }
+
+    #[test]
+    fn wkt_2_has_units_at_the_axes_or_behind_them() {
+        let axis = |unit: &str, order: u8| format!(r#"AXIS["a",east,ORDER[{order}],{unit}]"#);
+        let (us, metre, degree) = (
+            r#"LENGTHUNIT["US survey foot",0.304800609601219]"#,
+            r#"LENGTHUNIT["metre",1]"#,
+            r#"ANGLEUNIT["degree",0.0174532925199433]"#,
+        );
+        let base = format!(r#"BASEGEOGCRS["g",DATUM["d",ELLIPSOID["e",6378137,298,{metre}]],PRIMEM["p",0,{degree}]]"#);
+        let conversion = format!(r#"CONVERSION["c",PARAMETER["False easting",1640416.667,{us}]]"#);
+        let projected = format!(r#"PROJCRS["x",{base},{conversion},CS[Cartesian,2],{},{}]"#, axis(us, 1), axis(us, 2));
+        assert_eq!(units(&projected), (Some(Unit::US_SURVEY_FOOT), None));
+        assert!((read(&projected).unwrap().false_easting.unwrap() - 500_000.0).abs() < 1e-3);
+        let shared = format!(r#"PROJCRS["x",{base},CS[Cartesian,2],AXIS["e",east],AXIS["n",north],{us}]"#);
+        assert_eq!(units(&shared), (Some(Unit::US_SURVEY_FOOT), None));
+        let three = format!(r#"GEOGCRS["x",CS[ellipsoidal,3],{0},{0},{1}]"#, axis(degree, 1), axis(us, 3));
+        assert_eq!(units(&three), (Some(Unit::DEGREE), Some(Unit::US_SURVEY_FOOT)));
+        let vertical = format!(r#"COMPOUNDCRS["c",{projected},VERTCRS["h",CS[vertical,1],AXIS["H",up],{metre}]]"#);
+        assert_eq!(units(&vertical), (Some(Unit::US_SURVEY_FOOT), Some(Unit::METRE)));
+    }
+
+    #[test]
+    fn a_text_is_whole_when_all_is_closed() {
+        for whole in [GEOGCS, "PROJCS[\"a\"]", "PROJCS[\"a\"] , VERTCS[\"b\"]", "PROJCS(\"a]\")"] {
+            assert!(is_whole(whole), "{whole}");
+        }
+        for cut in ["PROJCS[\"x\"", "PROJCS[\"x", "PROJCS[", "PROJCS", "", "PROJCS[\"a\"],VERTCS[\"b\""] {
+            assert!(!is_whole(cut), "{cut}");
+        }
+        // a number that is cut is none
+        assert_eq!(read("PROJCS[\"x\",UNIT[\"f\",0.30").unwrap().unit, Some(Unit::Unknown));
     }
 
     #[test]

@@ -16,6 +16,8 @@ const RECORD_LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 #[derive(Debug, Clone)]
 pub(super) struct Header {
     pub(super) version: (u8, u8),
+    /// Bit 4 of the global encoding: of WKT and GeoTIFF keys, the former counts.
+    pub(super) wkt_counts: bool,
     /// Where the variable length records start.
     pub(super) header_size: u64,
     pub(super) points_start: u64,
@@ -74,6 +76,7 @@ impl Header {
         }
         let header = Self {
             version,
+            wkt_counts: u16_at(&bytes, 6) & 1 << 4 != 0,
             header_size: header_size(&bytes, warnings),
             points_start: u64::from(u32_at(&bytes, 96)),
             vlr_count: u32_at(&bytes, 100),

@@ -36,6 +36,7 @@ mod decode;
 mod decompress;
 mod extra_bytes;
 mod file;
+mod geotiff;
 mod header;
 mod kernels;
 mod laszip;
@@ -74,7 +75,7 @@ impl LasScan {
         let records = Records::read(&source, &header, &mut warnings)?;
         let laszip = find_laszip(&source, &header, &records, &mut warnings)?;
         let schema = Schema::new(&header, &records, &mut warnings);
-        let crs = crs::read(&records, &mut warnings);
+        let crs = crs::read(&records, header.wkt_counts, &mut warnings);
         let mut planner = Planner { source: &source, header: &header, records: &records, warnings: &mut warnings };
         let plan = match &laszip {
             Some(laszip) => planner.laz(laszip)?,

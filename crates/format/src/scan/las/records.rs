@@ -105,10 +105,13 @@ struct Area {
     end: u64,
 }
 
-/// Extra bytes, WKT, GeoTIFF keys, LASzip, COPC; user id and record id together, for numbers alone are not unique.
+/// Extra bytes, WKT, GeoTIFF keys, LASzip and its compatibility mode, COPC; user id and record id together, for numbers alone are not unique.
 fn is_of_interest(user_id: &str, record_id: u16) -> bool {
     matches!(
         (user_id, record_id),
-        ("LASF_Spec", 4) | ("LASF_Projection", 2112 | 34735) | ("laszip encoded", 22204) | ("copc", 1)
+        ("LASF_Spec", 4)
+            | ("LASF_Projection", 2112 | 34735..=34737)
+            | ("laszip encoded" | "lascompatible", 22204)
+            | ("copc", 1)
     )
 }
