@@ -1,8 +1,8 @@
-//! Places that very many points share, points where the scanner stood, and borders of boxes.
+//! Places that very many points share, points where the scanner stood, borders of boxes, and points that repeat.
 
 use std::fmt::Write as _;
 
-use pointmill_testkit::las::Las;
+use pointmill_testkit::las::{self, Las};
 use serde_json::json;
 
 use crate::support::Dir;
@@ -109,5 +109,59 @@ fn boxes_end_where_they_were_said_to_end() {
             assert_eq!(dir.report("out")["points"]["kept"], kept, "{file} {bounds}");
             dir.validate("out", &[file]);
         }
+    }
+}
+
+#[test]
+fn points_that_only_the_step_makes_equal_are_no_duplicates() {
+    let dir = Dir::new();
+    // a thousand places, the first hundred twice
+    let row = |i: u32| format!("{}.{:03} {}.5 0.125\n", i / 100, i % 100, i % 7);
+    dir.write("a.txt", (0..1_100).map(|i| row(i % 1_000)).collect::<String>().as_bytes());
+    let las = Las {
+        scale: [0.001; 3],
+        offset: [0.0; 3],
+        ..Las::new((0..1_100).map(|i: i32| las::Point::at([i % 1_000, 3, 0])).collect())
+    };
+    dir.write("a.las", &las.bytes());
+    for file in ["a.txt", "a.las"] {
+        for step in ["auto", "1", "0.25"] {
+            dir.succeed(["convert", file, "-o", "out", "--overwrite", "-q", "--duplicates", "drop", "--scale", step]);
+            let report = dir.report("out");
+            let output = &report["outputs"][0];
+            assert_eq!(
+                (&output["points"], &output["duplicates_dropped"]),
+                (&json!(1_000), &json!(100)),
+                "{file} {step}"
+            );
+            dir.validate("out", &[file]);
+        }
+    }
+    // a dataset that has lost one of the points which are equal on its lattice
+    dir.succeed(["convert", "a.las", "-o", "coarse", "-q", "--duplicates", "drop", "--scale", "1"]);
+    let points = (0..1_100).filter(|i| i % 1_000 != 501).map(|i: i32| las::Point::at([i % 1_000, 3, 0]));
+    let las = Las { scale: [0.001; 3], offset: [0.0; 3], ..Las::new(points.collect()) };
+    dir.write("less.las", &las.bytes());
+    let ended = dir.run(["validate", "coarse", "--against", "less.las"]);
+    assert_eq!(ended.code(), 1, "{}", ended.stdout());
+    assert!(ended.stdout().contains("surplus point"), "{}", ended.stdout());
+}
+
+#[test]
+fn the_same_place_in_files_of_several_kinds_is_one_place() {
+    let dir = Dir::new();
+    let points: Vec<las::Point> = (0..50).map(|i| las::Point::at([7 * i, -i, 3])).collect();
+    let fine = |p: &las::Point| las::Point::at(p.xyz.map(|v| 10 * v));
+    let finer = points.iter().map(fine).collect();
+    dir.write("a.las", &Las { scale: [0.01; 3], offset: [0.0; 3], ..Las::new(points) }.bytes());
+    dir.write("b.las", &Las { scale: [0.001; 3], offset: [0.0; 3], ..Las::new(finer) }.bytes());
+    for step in ["auto", "0.5", "0.003"] {
+        let files = ["a.las", "b.las"];
+        dir.succeed(
+            [&["convert"], &files[..], &["-o", "out", "--overwrite", "-q", "--duplicates", "drop", "--scale", step]]
+                .concat(),
+        );
+        assert_eq!(dir.report("out")["outputs"][0]["points"], 50, "{step}");
+        dir.validate("out", &files);
     }
 }

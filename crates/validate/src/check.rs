@@ -233,7 +233,7 @@ impl Check {
             Self::StorageOrder => "points ascend by Morton code, X, Y, Z, colour, attributes once the swap is undone",
             Self::Levels => "exactly the points nearest to the centres of cells of level 0, 1, 2 have that level",
             Self::Colours => "points below level 3 show the mean of their cell, greys follow from intensities",
-            Self::Originals => "originals ascend and are those of exactly the points below level 3",
+            Self::Originals => "originals ascend and are those of points below level 3 that show another colour",
             Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }
     }

@@ -2,6 +2,7 @@
 
 use pointmill_format::NodeKey;
 
+use super::frames::JobBounds;
 use super::moments::Moments;
 use super::segments::Segments;
 
@@ -15,6 +16,8 @@ pub(crate) struct Cell {
     pub(crate) is_one_place: bool,
     /// Points known to repeat the place of another of the cell: those of places that very many share.
     pub(crate) repeats: u64,
+    /// Extremes of the positions, known for the fullest cells.
+    pub(crate) bounds: Option<JobBounds>,
     /// Sums and extremes of the positions, if some output needs them.
     pub(crate) moments: Moments,
 }

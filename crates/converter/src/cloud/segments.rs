@@ -9,11 +9,6 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    /// The record that is `at` behind the first.
-    pub(crate) fn one(self, at: u32) -> Self {
-        Self { start: self.start + at, count: 1, ..self }
-    }
-
     /// The same records in segments of at most `count`.
     pub(crate) fn split(self, count: u32) -> impl Iterator<Item = Self> {
         let part = move |at: u32| Self { start: self.start + at, count: count.min(self.count - at), ..self };

@@ -30,16 +30,16 @@ pub(super) struct Context<'a> {
     pub(super) intake: &'a Intake,
     /// From the coordinates of each source to the lattice of the pass.
     pub(super) maps: Vec<SourceMap>,
-    /// Axes of each source on which every point has to prove the claim that a grid holds it.
-    pub(super) claims: Vec<[bool; 3]>,
-    /// Points outside are outliers, which are dropped; for each source.
-    pub(super) far_cuts: Vec<Option<Cut>>,
-    /// The lattice of the pass.
-    pub(super) lattice: Lattice,
     /// The filter's box, for each source.
     pub(super) cuts: Vec<Option<Cut>>,
     /// Where the scanners of each source stood.
     pub(super) origins: Vec<Origins>,
+    /// Axes of each source on which every point has to prove the claim that a grid holds it.
+    pub(super) claims: Vec<[bool; 3]>,
+    /// Points outside, in the terms of each source, are outliers, which are dropped.
+    pub(super) far_cuts: Vec<Option<Cut>>,
+    /// The lattice of the pass.
+    pub(super) lattice: Lattice,
     pub(super) partition: Partition,
     pub(super) store: Store,
     pub(super) wants_moments: bool,

@@ -1,7 +1,7 @@
 //! The filter's box in the coordinates of a source, so that its borders are where the user wrote them: 3 steps of 0.1 are
 //! 0.30000000000000004 in doubles, and not outside of a box that ends at 0.3.
 
-use pointmill_format::{Aabb, AxisGrid, Lattice, Positions, Resolution, ScanInfo};
+use pointmill_format::{Aabb, Lattice, Positions, Resolution, ScanInfo};
 
 /// A border that is this part of a step away from a coordinate of the source is meant to be on it.
 const SAME_PLACE: f64 = 1e-6;
@@ -22,19 +22,14 @@ impl Cut {
             let last = std::array::from_fn(|a| border(lattice, a, bounds.max[a], f64::floor));
             return Self::Lattice { first, last };
         }
-        let border = |a: usize, v: f64, outwards: f64| match info.resolution[a] {
-            // The coordinates were rounded to single precision, so are the borders.
-            Resolution::Single => f64::from(v as f32),
-            resolution => {
-                let step = match resolution {
-                    Resolution::Grid(AxisGrid { step, .. }) | Resolution::Step(step) => step,
-                    _ => 0.0,
-                };
-                v + outwards * (4.0 * f64::EPSILON * v.abs()).max(SAME_PLACE * step)
-            }
+        // Coordinates that were rounded to single precision are compared with borders that are.
+        let moved = |axis: usize, border: f64, outwards: f64| match info.resolution[axis] {
+            Resolution::Single => f64::from(border as f32),
+            resolution => border + outwards * slack(border, resolution),
         };
-        let min = std::array::from_fn(|a| border(a, bounds.min[a], -1.0));
-        Self::World { min, max: std::array::from_fn(|a| border(a, bounds.max[a], 1.0)) }
+        let min = std::array::from_fn(|a| moved(a, bounds.min[a], -1.0));
+        let max = std::array::from_fn(|a| moved(a, bounds.max[a], 1.0));
+        Self::World { min, max }
     }
 
     /// True if every position is inside.
@@ -56,6 +51,16 @@ impl Cut {
             _ => false,
         })
     }
+}
+
+/// How far from a border of the box a coordinate of that resolution is still on it.
+fn slack(border: f64, resolution: Resolution) -> f64 {
+    let (step, offset) = match resolution {
+        Resolution::Grid(grid) => (grid.step, grid.offset),
+        Resolution::Step(step) => (step, 0.0),
+        Resolution::Single | Resolution::Double => (0.0, 0.0),
+    };
+    (4.0 * f64::EPSILON * (border.abs() + offset.abs())).max(SAME_PLACE * step)
 }
 
 fn all_within(column: &[i32], first: i64, last: i64) -> bool {

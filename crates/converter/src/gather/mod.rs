@@ -10,6 +10,7 @@ mod batch;
 mod columns;
 mod context;
 mod cut;
+mod exact;
 mod far;
 mod lattice;
 mod moved;
@@ -69,7 +70,10 @@ pub(crate) fn gather<'a>(
         let (stats, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, rt).run()? {
             PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
             PassEnd::Misled(stats) => (stats, None),
-            PassEnd::Complete(gathered) => (Box::new(gathered.stats.clone()), Some(gathered)),
+            PassEnd::Complete(mut gathered) => {
+                gathered.shared_places = places::find(&mut gathered)?;
+                (Box::new(gathered.stats.clone()), Some(gathered))
+            }
         };
         let settled = lattice::settled(plan, sources, &lattice, &stats);
         let read = Read { lattice: &lattice, stats: &stats, complete: complete.as_deref(), settled: settled.as_ref() };
@@ -97,8 +101,7 @@ pub(crate) fn gather<'a>(
                 warn(Warning::ReadAgain);
                 hint = Some(stats.bounds);
             }
-            (_, Some(mut gathered)) => {
-                gathered.shared_places = places::find(&mut gathered)?;
+            (_, Some(gathered)) => {
                 finishing_warnings(plan, sources, &gathered).into_iter().for_each(&mut warn);
                 let known = warnings.len() + gathered.stats.warnings.len();
                 let cloud = Cloud::new(plan, sources, intake, *gathered, far_cut, warnings)?;

@@ -109,6 +109,7 @@ mod tests {
             segments: Segments::default(),
             is_one_place: false,
             repeats: 0,
+            bounds: None,
             moments: Moments::default(),
         }
     }

@@ -49,8 +49,9 @@ impl<'a> Pass<'a> {
         rt: &'a Runtime<'a>,
     ) -> Self {
         let map = |s: &Source| SourceMap::new(s.scan.info().lattice.as_ref(), &lattice.lattice);
-        let cuts =
-            |bounds: Option<Aabb>| sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect();
+        let cuts = |bounds: Option<Aabb>| -> Vec<Option<Cut>> {
+            sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect()
+        };
         let context = Context {
             plan,
             sources,
@@ -86,7 +87,15 @@ impl<'a> Pass<'a> {
             .map(|(packed, CellPart { mut segments, moments })| {
                 segments.sort();
                 let points = segments.points();
-                Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, repeats: 0, moments }
+                Cell {
+                    key: partition.node(packed, &cube),
+                    points,
+                    segments,
+                    is_one_place: false,
+                    repeats: 0,
+                    bounds: None,
+                    moments,
+                }
             })
             .collect();
         cells.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));

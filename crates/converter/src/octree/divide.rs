@@ -61,6 +61,7 @@ fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) 
         segments,
         is_one_place,
         repeats: 0,
+        bounds: None,
         moments: Moments::default(),
     };
     Ok(parts.into_iter().map(part).collect())

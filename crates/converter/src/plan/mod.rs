@@ -98,7 +98,8 @@ pub enum OriginPoints {
     Skip,
 }
 
-/// What to do with points whose position and attributes all repeat.
+/// What to do with points whose position and attributes all repeat, as the sources have them: points that only the
+/// lattice of the run makes equal are different ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Duplicates {
     /// Keep all.

@@ -217,7 +217,8 @@ pub struct GridReport {
     pub why: GridReason,
 }
 
-/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid + at_origin`, and for every output
+/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid + at_origin`, and
+/// for every output
 /// `kept = points + duplicates_dropped`. All are counted, none is a difference; the run fails where a sum is wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]

@@ -14,6 +14,8 @@ pub(crate) struct Block {
     pub(crate) truncated: [Vec<i64>; 3],
     /// For each attribute of the dataset but the position: the bits of its elements, point by point.
     pub(crate) words: Vec<Vec<u64>>,
+    /// What the lattice takes away of the position; filled where equal records count once.
+    pub(crate) residues: Vec<u64>,
     /// Which records take part.
     pub(crate) keep: Vec<bool>,
     /// Of the sources: what the lattice and the format do to each record's position.
@@ -82,6 +84,7 @@ impl Block {
         self.positions.iter_mut().chain(&mut self.truncated).for_each(Vec::clear);
         self.words.resize_with(attributes, Vec::new);
         self.words.iter_mut().for_each(Vec::clear);
+        self.residues.clear();
         self.keep.clear();
         self.moved.clear();
     }

@@ -6,6 +6,7 @@
 //! collisions on purpose). Unequal sums are narrowed down in further passes ([`narrow`]).
 
 pub(crate) mod block;
+mod distinct;
 mod exact;
 mod meaning;
 mod measured;

@@ -121,6 +121,12 @@ impl Rules {
         self.stored.as_ref().map_or_else(|| self.lattice.world(position), |stored| stored.world(position))
     }
 
+    /// World coordinate of a dataset's coordinate, as the job's lattice has it, and the offset in it.
+    pub(super) fn job_point(&self, axis: usize, stored: i64) -> (f64, f64) {
+        let offset = self.lattice_offset[axis];
+        ((stored + self.shift[axis]) as f64 * self.lattice.scale[axis] + offset, offset)
+    }
+
     /// The job lattice's coordinates on an axis.
     pub(crate) fn job_grid(&self, axis: usize) -> AxisGrid {
         AxisGrid { step: self.lattice.scale[axis], offset: self.lattice_offset[axis] }

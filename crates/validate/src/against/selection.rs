@@ -1,7 +1,7 @@
 //! Which points of a scan the filter keeps for their position: "Bounds" and "Points at the scanner's origin" of
 //! docs/inputs.md, in code of our own.
 
-use pointmill_format::{AxisGrid, Lattice, PointBatch, Positions, Resolution, ScanInfo};
+use pointmill_format::{Lattice, PointBatch, Positions, Resolution, ScanInfo};
 
 use super::rules::Rules;
 
@@ -90,7 +90,8 @@ fn steps(lattice: &Lattice, axis: usize, world: f64) -> (f64, f64) {
 /// Borders for coordinates that are stored as numbers of that resolution.
 fn reals(resolution: Resolution, min: f64, max: f64) -> (f64, f64) {
     let slack = |v: f64| match resolution {
-        Resolution::Step(step) | Resolution::Grid(AxisGrid { step, .. }) => rounding(v.abs()).max(1e-6 * step),
+        Resolution::Grid(grid) => rounding(v.abs() + grid.offset.abs()).max(1e-6 * grid.step),
+        Resolution::Step(step) => rounding(v.abs()).max(1e-6 * step),
         _ => rounding(v.abs()),
     };
     match resolution {

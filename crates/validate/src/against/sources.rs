@@ -12,6 +12,7 @@ use pointmill_format::{
 use rayon::prelude::*;
 
 use super::block::{BLOCK_POINTS, Block, append_exact_words, append_words};
+use super::distinct::Residue;
 use super::exact::Exact;
 use super::meaning::{Feed, Meaning, feed};
 use super::rules::Conversion::{self, AsStored, Grey, WholeClass};
@@ -174,6 +175,9 @@ impl Source {
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
+        if rules.drop_duplicates {
+            self.fill_residues(batch, start, points, rules, block);
+        }
         self.selection.apply(batch, start, &mut block.keep);
         if let Some(stored) = &rules.stored {
             for i in 0..points {
@@ -217,6 +221,23 @@ impl Source {
             let count = count_deviating(&batch.columns[*column], start, (meaning, value), &block.keep, is_rgb);
             deviating.fetch_add(count, Relaxed);
         }
+    }
+
+    fn fill_residues(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
+        let own = self.scan.info().lattice;
+        let world = |axis: usize, i: usize| match (&batch.positions, &own) {
+            (Positions::Quantized(p), Some(l)) => f64::from(p[axis][i]) * l.scale[axis] + l.offset[axis],
+            (Positions::Quantized(p), None) => f64::from(p[axis][i]),
+            (Positions::World(p), _) => p[axis][i],
+        };
+        block.residues.extend((0..points).map(|i| {
+            let mut residue = Residue::default();
+            for axis in 0..3 {
+                let stored = block.positions[axis][i];
+                residue.add(rules, own.as_ref(), axis, world(axis, start + i), stored);
+            }
+            residue.word()
+        }));
     }
 
     fn fill_axis(

@@ -3,7 +3,8 @@
 //! # Tolerances
 //! * Boxes and the tight box: 4 ulps of the cube's largest coordinate on the axis; everything else about positions is
 //!   exact, on integers.
-//! * Distances (spacing, coverage): one step of the lattice.
+//! * Distances (spacing, coverage): of datasets that state their sampling, two units of 31-bit fractions of the cube where
+//!   scales differ, else nothing but the last bits of doubles; of others, one step of the lattice.
 //! * Sides of the cube against each other: 10⁻⁹, relative, and two ulps of its largest coordinate; spacing against
 //!   side / 128: 10⁻⁹, relative.
 //! * Attributes, counts, byte ranges, checksums: none.

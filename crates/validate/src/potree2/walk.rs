@@ -240,14 +240,16 @@ impl Walk<'_> {
         let mut next = above;
         while let Some(Above { level, grid, up }) = next {
             let tally = &self.tallies[usize::from(*level)];
-            coverage::check(node.key, positions, *level, grid, &self.task.geometry, tally, self.task.findings);
+            let limit = coverage::limit(&self.task.geometry, self.task.sampling, *level, node.key.level);
+            let drawn = coverage::Drawn { level: *level, limit, grid };
+            coverage::check(node.key, positions, &drawn, &self.task.geometry, tally, self.task.findings);
             next = *up;
         }
     }
 
     fn check_sampling(&self, node: &TreeNode, positions: &[[i32; 3]], grid: &Grid) {
         let tally = &self.tallies[usize::from(node.key.level)];
-        spacing::pairs(node.key, grid, &self.task.geometry, tally, &self.pairs);
+        spacing::pairs(node.key, grid, self.task.sampling, &self.task.geometry, tally, &self.pairs);
         if self.task.sampling != Sampling::Poisson {
             spacing::cells(node.key, positions, &self.task.geometry, &self.cells);
         }

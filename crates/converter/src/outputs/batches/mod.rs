@@ -4,6 +4,7 @@
 mod buckets;
 mod compress;
 mod content;
+mod density;
 mod figures;
 mod finish;
 mod frame;
@@ -83,7 +84,7 @@ impl Output for BatchesSettings {
         let is_usual = plan.attributes == AttributeChoice::Usual;
         let extras = if is_usual { 0 } else { kept.saturating_sub(colour) };
         let planes = u64::from(self.planes.unwrap_or(3));
-        // Colour word, and index and word of an original for points of the coarser levels.
+        // Colour word, and at most an index and word of an original.
         let originals = if self.originals { 8 } else { 0 };
         DiskSize { per_point: 4 * planes + 4 + originals + extras, per_1000_points: BATCH_BYTES }
     }
@@ -173,6 +174,7 @@ fn encode(rt: &Runtime<'_>, shop: &Workshop<'_>, tasks: &[Task]) -> Result<TaskR
     for mut results in each {
         all.ledger.merge(&results.ledger);
         all.lod_points.iter_mut().zip(results.lod_points).for_each(|(a, b)| *a += b);
+        all.changed += results.changed;
         all.edges.append(&mut results.edges);
     }
     all.edges.sort_unstable_by_key(|(index, _)| *index);
