@@ -10,6 +10,7 @@ mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod precision;
 mod reporting;
 mod same_points;
 mod sameness;
