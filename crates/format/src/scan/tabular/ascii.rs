@@ -202,6 +202,7 @@ fn store_checked<T: Number>(
     store(out, index, stored);
     let is_kept = match rule {
         Rule::Unit => (0.0..=1.0).contains(&v),
+        Rule::Harmonic => !v.is_nan(),
         Rule::Shift => stored.as_f64() - 2048.0 == v,
         Rule::Harmonic => true,
         Rule::Keep | Rule::Convert => stored.as_f64() == v,
