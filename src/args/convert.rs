@@ -61,9 +61,6 @@ pub(crate) struct ConvertArgs {
     /// scans without a step, one chosen from their extent and precision
     #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale, help_heading = "Output")]
     pub(crate) scale: Scale,
-    /// Coordinate reference system: a proj4 string, EPSG:n or WKT [default: from the inputs]
-    #[arg(long, value_name = "TEXT", help_heading = "Output")]
-    pub(crate) crs: Option<String>,
 
     /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
     /// [default: all for potree2, classification for bintree, colour for batches]
@@ -95,6 +92,10 @@ pub(crate) struct ConvertArgs {
     /// What to do with points without a valid position
     #[arg(long, value_enum, default_value = "skip", help_heading = "Selecting data")]
     pub(crate) invalid: FaultArg,
+    /// What to do with points exactly at the origin of their scan (where the scanner stood, by the pose of the scan; 0,0,0
+    /// in files without poses): some scanners write them where they measured nothing
+    #[arg(long, value_enum, default_value = "keep", help_heading = "Selecting data")]
+    pub(crate) origin_points: OriginPointsArg,
     /// What to do with inputs, or parts of inputs, that cannot be decoded
     #[arg(long, value_enum, default_value = "fail", help_heading = "Selecting data")]
     pub(crate) unreadable: FaultArg,
@@ -207,6 +208,12 @@ pub(crate) enum SamplingArg {
 pub(crate) enum DuplicatesArg {
     Keep,
     Drop,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OriginPointsArg {
+    Keep,
+    Skip,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -2,13 +2,16 @@
 
 use pointmill_format::Wanted;
 
-use crate::plan::Plan;
+use crate::plan::{Duplicates, Plan};
 use crate::sources::{Recast, Schema, Sources};
 
 /// The attributes that are read, and where each source has them.
 pub(crate) struct Intake {
     /// The layout of stored records.
     pub(crate) schema: Schema,
+    /// Where a stored record has the mark that tells apart points which only the lattice makes equal; needed if duplicates
+    /// are to be dropped. No output writes it.
+    pub(crate) mark: Option<usize>,
     /// Names of the attributes of the inputs that no output needs.
     pub(crate) unread: Vec<String>,
     /// By source.
@@ -36,7 +39,8 @@ impl Intake {
     /// `needed`: for each attribute of the sources, whether some output needs it.
     pub(crate) fn new(plan: &Plan, sources: &Sources, needed: &[bool]) -> Self {
         let all = &sources.attributes;
-        let (schema, places) = all.reduce(needed);
+        let (mut schema, places) = all.reduce(needed);
+        let mark = (plan.duplicates == Duplicates::Drop).then(|| schema.add_mark());
         let unread = all.attributes.iter().zip(needed).filter(|(_, needed)| !**needed);
         let unread = unread.map(|(a, _)| a.name.clone()).collect();
         let of_source = |source: &crate::sources::Source| {
@@ -49,6 +53,6 @@ impl Intake {
             SourceIntake { columns, recasts, wanted }
         };
         let of_sources = sources.all.iter().map(of_source).collect();
-        Self { schema, unread, sources: of_sources }
+        Self { schema, mark, unread, sources: of_sources }
     }
 }

@@ -31,7 +31,13 @@ pub(crate) struct Stats {
     pub(crate) other_class: u64,
     pub(crate) thinned: u64,
     pub(crate) invalid: u64,
+    /// Skipped because they lie exactly at the origin of their scan.
+    pub(crate) origin_skipped: u64,
     pub(crate) unreadable: u64,
+    /// Points whose integers in their scan do not come back from the job lattice.
+    pub(crate) integers_lost: u64,
+    /// Some point moved to the job lattice by more than doubles of its coordinates are rounded.
+    pub(crate) moves: bool,
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -102,6 +108,8 @@ pub(crate) struct SourceStats {
     pub(crate) read: u64,
     /// That go in.
     pub(crate) kept: u64,
+    /// Exactly at the origin of their scan, before any filter.
+    pub(crate) at_origin: u64,
     /// World coordinates, before any filter.
     pub(crate) bounds: Aabb,
     /// Axes on which a point contradicts the grid that the file, or a sample, claims.
@@ -247,6 +255,7 @@ impl Stats {
         let source = SourceStats {
             read: 0,
             kept: 0,
+            at_origin: 0,
             bounds: Aabb::EMPTY,
             off_grid: [false; 3],
             rgb: Range::new(3),
@@ -268,7 +277,10 @@ impl Stats {
             other_class: 0,
             thinned: 0,
             invalid: 0,
+            origin_skipped: 0,
             unreadable: 0,
+            integers_lost: 0,
+            moves: false,
             warnings: Vec::new(),
         }
     }
@@ -287,6 +299,7 @@ impl Stats {
         for (a, b) in self.sources.iter_mut().zip(&other.sources) {
             a.read += b.read;
             a.kept += b.kept;
+            a.at_origin += b.at_origin;
             a.bounds = a.bounds.union(&b.bounds);
             a.off_grid = std::array::from_fn(|axis| a.off_grid[axis] || b.off_grid[axis]);
             a.rgb.merge(&b.rgb);
@@ -301,7 +314,10 @@ impl Stats {
         self.other_class += other.other_class;
         self.thinned += other.thinned;
         self.invalid += other.invalid;
+        self.origin_skipped += other.origin_skipped;
         self.unreadable += other.unreadable;
+        self.integers_lost += other.integers_lost;
+        self.moves |= other.moves;
         self.warnings.extend_from_slice(&other.warnings);
         self.warnings.sort_by_cached_key(Warning::to_string);
     }

@@ -8,11 +8,11 @@ use pointmill_format::{Column, PointBatch, Positions};
 use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{CellParts, Context};
-use super::{partition, ranges, select};
+use super::{exact, moved, partition, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
 use crate::runtime::os_hints;
-use crate::sources::{POSITION_BYTES, Recast};
+use crate::sources::{MARK_BYTES, POSITION_BYTES, Recast};
 
 /// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
 const TILE_POINTS: usize = 512;
@@ -31,6 +31,8 @@ pub(super) struct Worker<'a> {
     pub(super) stats: Stats,
     parts: CellParts,
     q: JobColumns,
+    /// See [`exact::marks`]; empty if they are not needed.
+    marks: Vec<u64>,
     change: [Vec<f64>; 3],
     selection: Vec<u32>,
     cells: Vec<u64>,
@@ -52,6 +54,7 @@ impl<'a> Worker<'a> {
             stats: Stats::new(&pass.intake.schema, pass.sources.all.len()),
             parts: CellParts::default(),
             q: JobColumns::default(),
+            marks: Vec::new(),
             change: Default::default(),
             selection: Vec::new(),
             cells: Vec::new(),
@@ -140,6 +143,18 @@ impl<'a> Worker<'a> {
         if self.pass.misled.load(Ordering::Relaxed) {
             return Ok(()); // the pass will be repeated with the bounds that this one finds
         }
+        if self.pass.intake.mark.is_some() {
+            let own = self.pass.sources.all[source].scan.info().lattice.as_ref();
+            exact::marks(
+                &self.pass.maps[source],
+                own,
+                &self.pass.lattice,
+                batch,
+                &self.q,
+                |i| rows.row(i),
+                &mut self.marks,
+            );
+        }
         let points = self.q.len();
         self.stats.points += points as u64;
         self.stats.sources[source].kept += points as u64;
@@ -210,6 +225,11 @@ impl<'a> Worker<'a> {
             for part in &parts {
                 part.put(tile, stride, rows);
             }
+            if let Some(at) = self.pass.intake.mark {
+                for (record, i) in tile.chunks_exact_mut(stride).zip(order) {
+                    record[at..at + MARK_BYTES].copy_from_slice(&self.marks[*i as usize].to_le_bytes());
+                }
+            }
             self.stats.checksum.add_all(tile, stride);
         }
     }
@@ -233,6 +253,12 @@ impl<'a> Worker<'a> {
             Moved::Each => Err(&self.change[a][..]),
         });
         self.stats.change.add(points, axes);
+        if let Some(own) = &self.pass.sources.all[source].scan.info().lattice {
+            self.stats.integers_lost += moved::integers_lost(&axes, own, points);
+        }
+        if !self.stats.moves {
+            self.stats.moves = moved::is_more_than_rounding(&axes, &self.q, &bounds, &self.pass.lattice);
+        }
         for (a, by) in axes.iter().enumerate().filter(|(a, _)| self.pass.claims[source][*a]) {
             let rounding = self.pass.rounding(source, a, &bounds);
             if by.is_err_and(|column| column.iter().any(|v| v.abs() > rounding)) {
@@ -267,6 +293,16 @@ fn stored_columns<'b>(batch: &'b PointBatch, recast: &'b [(usize, Column)]) -> V
 enum Rows<'a> {
     Consecutive(Range<usize>),
     Selected(&'a [u32]),
+}
+
+impl Rows<'_> {
+    /// The row of the batch that is the `i`th of these.
+    fn row(&self, i: usize) -> usize {
+        match self {
+            Self::Consecutive(range) => range.start + i,
+            Self::Selected(rows) => rows[i] as usize,
+        }
+    }
 }
 
 fn quantize_axis(

@@ -7,6 +7,7 @@ mod number;
 mod origin;
 mod output;
 pub(crate) mod potree2;
+mod recovery;
 mod staging;
 
 pub(crate) use attributes::choose as choose_attributes;

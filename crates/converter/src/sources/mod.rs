@@ -13,7 +13,7 @@ use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 pub(crate) use crs::resolve_all as resolve_crs_of_all;
 pub use crs::{ResolvedCrs, resolve_crs};
 pub(crate) use recast::{Recast, doubled};
-pub(crate) use schema::{POSITION_BYTES, Schema};
+pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema};
 #[cfg(test)]
 pub(crate) use survey::Extent;
 pub(crate) use survey::{Fineness, Survey, far_out, intersection, single_step};
@@ -24,6 +24,9 @@ use crate::error::{ConvertError, InputFault};
 use crate::plan::{OnFault, Plan};
 use crate::runtime::Events;
 use crate::warning::{Warning, reason_of};
+
+/// The description of one file may take this part of the memory while it is opened.
+const DESCRIPTION_SHARE: u64 = 4;
 
 /// A scan, and where its columns are among all attributes.
 pub(crate) struct Source {
@@ -54,10 +57,15 @@ impl Sources {
         paths.sort();
         paths.dedup();
         let mut warnings = Vec::new();
+        if !plan.other_files.is_empty() {
+            warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
+        }
         let mut scans: Vec<Box<dyn Scan>> = Vec::new();
         let mut points_missing = 0u64;
+        let mut options = plan.open.clone();
+        options.description_bytes.get_or_insert(plan.memory_bytes / DESCRIPTION_SHARE);
         for path in &paths {
-            let opened = pointmill_format::open_scan(path, &plan.open);
+            let opened = pointmill_format::open_scan(path, &options);
             match opened.and_then(|scan| Ok((missing_points(&*scan, plan.unreadable)?, scan))) {
                 Ok((missing, scan)) => {
                     let noticed = scan.info().warnings.iter();

@@ -16,6 +16,9 @@ pub(crate) struct Schema {
 /// Bytes of the position at the start of a record.
 pub(crate) const POSITION_BYTES: usize = 12;
 
+/// Bytes of what tells apart points that the lattice of the run makes equal.
+pub(crate) const MARK_BYTES: usize = 8;
+
 impl Schema {
     pub(crate) fn new(attributes: Vec<Attribute>) -> Self {
         let mut stride = POSITION_BYTES;
@@ -41,6 +44,13 @@ impl Schema {
         });
         let places = places.collect();
         (Self::new(kept), places)
+    }
+
+    /// Makes room behind the attributes of a record for a mark of [`MARK_BYTES`], and returns where it is.
+    pub(crate) fn add_mark(&mut self) -> usize {
+        let at = self.stride;
+        self.stride += MARK_BYTES;
+        at
     }
 
     pub(crate) fn find(&self, name: &str) -> Option<usize> {

@@ -143,13 +143,13 @@ fn what_stands_around_the_points_is_told() {
     assert_eq!(scans.bounds_declared, None, "two scans declare none");
     assert_eq!(
         scans.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["scan 2: the rotation is no unit quaternion; it is normalised"]
+        ["scan 3: the rotation is no unit quaternion; it is normalised"]
     );
     let empty = info("empty_scans.e57");
     assert_eq!(empty.crs.wkt.as_deref(), Some("PROJCS[\"Höhe & <Breite>\",GEOGCS[\"WGS 84\"],UNIT[\"metre\",1]]"));
     assert_eq!(
         empty.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["2 images are in the file; they are not read"]
+        ["2 images are in the file; they are not part of its points and not read"]
     );
     assert_eq!(
         info("no_scans.e57").warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
@@ -157,11 +157,11 @@ fn what_stands_around_the_points_is_told() {
     );
     assert_eq!(
         info("no_z.e57").warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["scan 0: its points have no z; it is taken as 0"]
+        ["scan 1: its points have no z; it is taken as 0"]
     );
     assert_eq!(
         info("packets.e57").warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["scan 0: the field note holds text; it is not read"]
+        ["scan 1: the field note holds text; it is not read"]
     );
     for quiet in ["spherical.e57", "both_systems.e57", "normals.e57", "widths.e57", "constant.e57"] {
         assert!(info(quiet).warnings.is_empty(), "{quiet}: {:?}", info(quiet).warnings);

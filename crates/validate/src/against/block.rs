@@ -14,10 +14,37 @@ pub(crate) struct Block {
     pub(crate) truncated: [Vec<i64>; 3],
     /// For each attribute of the dataset but the position: the bits of its elements, point by point.
     pub(crate) words: Vec<Vec<u64>>,
+    /// What the lattice takes away of the position; filled where equal records count once.
+    pub(crate) residues: Vec<u64>,
     /// Which records take part.
     pub(crate) keep: Vec<bool>,
+    /// Of the sources: what the lattice and the format do to each record's position.
+    pub(crate) moved: Moved,
     /// Hash states of what was mixed in so far.
     states: Vec<[u64; 2]>,
+}
+
+/// By how much positions of a block of the sources move, by record.
+#[derive(Debug, Default)]
+pub(crate) struct Moved {
+    /// Index of the block's first point in its file: blocks of a file are added up in this order.
+    pub(crate) first: u64,
+    /// Positions of the sources.
+    pub(crate) world: [Vec<f64>; 3],
+    /// Their points on the job lattice, less these.
+    pub(crate) lattice: [Vec<f64>; 3],
+    /// The integers that the file has do not come back from the job lattice.
+    pub(crate) lost: Vec<bool>,
+    /// Where the dataset's integers are not certain, those of the sources on its lattice; else empty.
+    pub(crate) steps: Vec<[i64; 3]>,
+}
+
+impl Moved {
+    fn clear(&mut self) {
+        self.world.iter_mut().chain(&mut self.lattice).for_each(Vec::clear);
+        self.lost.clear();
+        self.steps.clear();
+    }
 }
 
 /// Odd constants with well-spread bits (hexadecimal digits of π and e).
@@ -57,7 +84,9 @@ impl Block {
         self.positions.iter_mut().chain(&mut self.truncated).for_each(Vec::clear);
         self.words.resize_with(attributes, Vec::new);
         self.words.iter_mut().for_each(Vec::clear);
+        self.residues.clear();
         self.keep.clear();
+        self.moved.clear();
     }
 
     /// Position of a record.

@@ -12,11 +12,16 @@ use pointmill_format::{
 use rayon::prelude::*;
 
 use super::block::{BLOCK_POINTS, Block, append_exact_words, append_words};
+use super::distinct::Residue;
 use super::exact::Exact;
 use super::meaning::{Feed, Meaning, feed};
 use super::rules::Conversion::{self, AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
+use super::selection::Selection;
 use crate::options::{Progress, ProgressFn};
+
+/// A position moved by this part of a step of its scan is neither's: its integer does not come back.
+const HALF: f64 = 0.499_999;
 
 /// A scan, and where its columns go.
 pub(crate) struct Source {
@@ -27,6 +32,7 @@ pub(crate) struct Source {
     columns: Vec<Option<Feed>>,
     /// The column that the filter by class looks at.
     classification: Option<usize>,
+    selection: Selection,
     /// Columns that must have one value, by the metadata: column, what its values mean, value.
     constants: Vec<(usize, Meaning, Vec<f64>)>,
     /// Points whose value differs from the constant, by entry of `constants`.
@@ -122,6 +128,11 @@ impl Sources {
 }
 
 impl Source {
+    /// True if the file says that its colours have 16 bits.
+    pub(crate) fn declares_16_bit_colour(&self) -> bool {
+        self.scan.info().rgb_is_16_bit
+    }
+
     fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
         let info = scan.info();
         let find = |name: &str| info.attributes.iter().position(|a| a.name == name);
@@ -141,7 +152,8 @@ impl Source {
             let own = info.lattice.map(|l| AxisGrid { step: l.scale[a], offset: l.offset[a] });
             own.and_then(|own| Exact::new(own, rules.job_grid(a)))
         });
-        Self { exact, columns, classification, constants, deviating, scan }
+        let selection = Selection::new(info, rules);
+        Self { exact, columns, classification, selection, constants, deviating, scan }
     }
 
     fn wanted(&self) -> Wanted {
@@ -158,12 +170,20 @@ impl Source {
     fn fill(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
         block.reset(rules.attributes.len());
         block.keep.resize(points, true);
+        block.moved.lost.resize(points, false);
+        block.moved.first = batch.first_point + start as u64;
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
+        if rules.drop_duplicates {
+            self.fill_residues(batch, start, points, rules, block);
+        }
+        self.selection.apply(batch, start, &mut block.keep);
         if let Some(stored) = &rules.stored {
             for i in 0..points {
-                let words = stored.stored(block.position(i));
+                let step = block.position(i);
+                let words = stored.stored(step);
+                block.moved.steps.push(step);
                 words.into_iter().enumerate().for_each(|(axis, word)| block.positions[axis][i] = word);
             }
         }
@@ -203,6 +223,23 @@ impl Source {
         }
     }
 
+    fn fill_residues(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
+        let own = self.scan.info().lattice;
+        let world = |axis: usize, i: usize| match (&batch.positions, &own) {
+            (Positions::Quantized(p), Some(l)) => f64::from(p[axis][i]) * l.scale[axis] + l.offset[axis],
+            (Positions::Quantized(p), None) => f64::from(p[axis][i]),
+            (Positions::World(p), _) => p[axis][i],
+        };
+        block.residues.extend((0..points).map(|i| {
+            let mut residue = Residue::default();
+            for axis in 0..3 {
+                let stored = block.positions[axis][i];
+                residue.add(rules, own.as_ref(), axis, world(axis, start + i), stored);
+            }
+            residue.word()
+        }));
+    }
+
     fn fill_axis(
         &self,
         batch: &PointBatch,
@@ -212,23 +249,29 @@ impl Source {
         rules: &Rules,
         block: &mut Block,
     ) {
-        let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
+        let lattice = self.scan.info().lattice;
         let mut take = |i: usize, world: f64, exact: Option<i64>| {
-            let (rounded, truncated) = rules.quantize(axis, world);
-            block.positions[axis].push(exact.unwrap_or(rounded));
+            let steps = rules.job_steps(axis, world);
+            let job = exact.unwrap_or(steps.round_ties_even() as i64);
+            let moved = &mut block.moved;
+            let change = rules.job_world(axis, job as f64) - world;
+            moved.world[axis].push(world);
+            moved.lattice[axis].push(change);
+            moved.lost[i] |= lattice.is_some_and(|own| change.abs() >= HALF * own.scale[axis]);
+            block.positions[axis].push(rules.stored_steps(axis, job));
             if rules.foreign {
-                block.truncated[axis].push(truncated);
+                block.truncated[axis].push(rules.stored_steps(axis, steps as i64));
             }
             // a point without a finite position is none
-            block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
+            block.keep[i] &= world.is_finite();
         };
-        match (&batch.positions, self.scan.info().lattice) {
+        match (&batch.positions, lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();
-                let exact = Some(&self.exact[axis]).filter(|_| rules.compare_positions).copied().flatten();
-                let on_dataset = |v| exact.map(|e| e.nearest(v) - rules.shift[axis]);
-                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_dataset(*v)));
+                let exact = self.exact[axis];
+                let on_job = |v| exact.map(|e| e.nearest(v));
+                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_job(*v)));
             }
             (Positions::World(values), _) => {
                 values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v, None));

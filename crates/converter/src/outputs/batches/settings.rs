@@ -5,7 +5,8 @@ use crate::sources::Schema;
 /// Settings of quantised batches (`docs/formats/batches.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchesSettings {
-    /// Cell of the coarsest level of detail, world units; `None`: from the scene's extent and density.
+    /// Cell of the coarsest level of detail, world units; `None`: the power of two whose occupied cells hold about 64
+    /// points each.
     pub lod_cell: Option<f64>,
     /// Position planes of ten bits to write, 1 to 3; `None`: those that the scene needs.
     pub planes: Option<u8>,
@@ -17,7 +18,7 @@ pub struct BatchesSettings {
 
 impl Default for BatchesSettings {
     fn default() -> Self {
-        Self { lod_cell: Some(1.0), planes: None, zstd_level: None, originals: true }
+        Self { lod_cell: None, planes: None, zstd_level: None, originals: true }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The Potree 2.0 octree: payloads behind one another in `octree.bin`, and the two files around them.
 
+mod accuracy;
 mod layout;
 mod metadata;
 mod payload;
@@ -22,7 +23,7 @@ use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
 use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
-use crate::report::OutputReport;
+use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Runtime};
 use crate::sources::{POSITION_BYTES, Schema};
 
@@ -112,6 +113,7 @@ impl Output for Potree2Settings {
         Ok(OutputReport {
             points: tree.ledger.points(),
             duplicates_dropped: tree.ledger.duplicates_dropped(),
+            accuracy: report::accuracy(cloud, tree.ledger.points(), accuracy::errors(cloud, metadata.lattice.offset)),
             attributes: cloud.names(choice.kept.iter().copied()),
             attributes_dropped: choice.dropped,
             attributes_changed,

@@ -1,5 +1,6 @@
 //! Which columns a point format has, and where their bits lie in a record (LAS 1.4 R15 §2.6).
 
+use super::compatible::{Compatible, Recovered};
 use super::extra_bytes::ExtraBytes;
 use super::header::Header;
 use super::records::Records;
@@ -26,6 +27,8 @@ pub(super) enum FieldKind {
     Bits { shift: u8, mask: u8 },
     /// Little-endian values of the attribute's type, `elements` of them side by side.
     Plain,
+    /// Compatibility mode: the sum of an old field and the extra byte or bytes at [`Field::at`].
+    Recovered(Recovered),
 }
 
 /// The part of a layered LAZ chunk that a field comes from.
@@ -50,6 +53,8 @@ pub(super) enum Layer {
 pub(super) struct Schema {
     pub(super) attributes: Vec<Attribute>,
     pub(super) fields: Vec<Field>,
+    /// The points are those of a format 6–10 in LASzip's compatibility mode.
+    pub(super) compatible: Option<Compatible>,
 }
 
 /// Names that an extra-bytes attribute may not take, whatever the point format: what is joined to a cloud later may
@@ -77,17 +82,19 @@ const STANDARD_NAMES: [&str; 17] = [
 impl Schema {
     /// Standard columns first (colour before the rest), then the documented extra bytes.
     pub(super) fn new(header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) -> Self {
-        let mut schema = Self::default();
+        let mut extra = ExtraBytes::read_all(header, records, warnings);
+        let compatible = Compatible::take(header, records, &mut extra, warnings);
+        let mut schema = Self { compatible, ..Self::default() };
         schema.colours(header.point_format);
-        if header.point_format < 6 {
-            schema.legacy(header.point_format);
-        } else {
-            schema.extended();
+        match compatible {
+            Some(places) => schema.compatible(&places),
+            None if header.point_format < 6 => schema.legacy(header.point_format),
+            None => schema.extended(),
         }
         if matches!(header.point_format, 4 | 5 | 9 | 10) {
             warnings.push(ScanWarning::Waveforms { point_format: header.point_format });
         }
-        schema.extra_bytes(header, records, warnings);
+        schema.extra_bytes(extra);
         schema
     }
 
@@ -138,10 +145,29 @@ impl Schema {
         self.bits("edge of flight line", 15, 7, 1, Layer::Flags);
     }
 
-    fn extra_bytes(&mut self, header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) {
-        let mut found = ExtraBytes::read_all(header, records, warnings);
-        name_normals(&mut found);
-        for ExtraBytes { mut attribute, at } in found {
+    /// Formats 6–10 in records of format 1, 3, 4 or 5: the columns of [`Self::extended`].
+    fn compatible(&mut self, places: &Compatible) {
+        use AttributeType::{Float64, Int16, UInt16};
+        if let Some(nir) = places.nir {
+            self.plain("nir", UInt16, 1, nir, Layer::Base);
+        }
+        self.plain("intensity", UInt16, 1, 12, Layer::Base);
+        self.recovered("return number", AttributeType::UInt8, places.returns, Recovered::ReturnNumber);
+        self.recovered("number of returns", AttributeType::UInt8, places.returns, Recovered::NumberOfReturns);
+        self.recovered("classification flags", AttributeType::UInt8, places.flags, Recovered::ClassificationFlags);
+        self.recovered("classification", AttributeType::UInt8, places.class, Recovered::Classification);
+        self.bits("user data", 17, 0, 0xff, Layer::Base);
+        self.recovered("scan angle", Int16, places.scan_angle, Recovered::ScanAngle);
+        self.plain("point source id", UInt16, 1, 18, Layer::Base);
+        self.plain("gps-time", Float64, 1, 20, Layer::Base);
+        self.bits("scanner channel", places.flags, 1, 0b11, Layer::Base);
+        self.bits("scan direction flag", 14, 6, 1, Layer::Base);
+        self.bits("edge of flight line", 14, 7, 1, Layer::Base);
+    }
+
+    fn extra_bytes(&mut self, mut extra: Vec<ExtraBytes>) {
+        name_normals(&mut extra);
+        for ExtraBytes { mut attribute, at } in extra {
             attribute.name = self.free_name(&attribute.name);
             let (elements, kind) = (attribute.elements, FieldKind::Plain);
             self.push(attribute, Field { at, elements, kind, layer: Layer::ExtraBytes });
@@ -162,6 +188,11 @@ impl Schema {
     fn bits(&mut self, name: &str, at: usize, shift: u8, mask: u8, layer: Layer) {
         let kind = FieldKind::Bits { shift, mask };
         self.push(Attribute::new(name, AttributeType::UInt8, 1), Field { at, elements: 1, kind, layer });
+    }
+
+    fn recovered(&mut self, name: &str, ty: AttributeType, at: usize, from: Recovered) {
+        let kind = FieldKind::Recovered(from);
+        self.push(Attribute::new(name, ty, 1), Field { at, elements: 1, kind, layer: Layer::Base });
     }
 
     fn plain(&mut self, name: &str, ty: AttributeType, elements: usize, at: usize, layer: Layer) {
