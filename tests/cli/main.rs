@@ -15,3 +15,4 @@ mod same_points;
 mod sameness;
 mod several;
 mod support;
+mod units;
