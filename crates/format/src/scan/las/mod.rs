@@ -99,6 +99,8 @@ impl LasScan {
             lattice: header.lattice.is_valid().then_some(header.lattice),
             resolution: Default::default(),
             parts: Vec::new(),
+            images: Vec::new(),
+            rgb_is_16_bit: false,
             attributes: schema.attributes.clone().into(),
             crs,
             file_bytes: source.len(),

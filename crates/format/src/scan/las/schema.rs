@@ -4,6 +4,7 @@ use super::compatible::{Compatible, Recovered};
 use super::extra_bytes::ExtraBytes;
 use super::header::Header;
 use super::records::Records;
+use crate::scan::quantities::{NORMALS, is_normal, normal_axis};
 use crate::{Attribute, AttributeType, ScanWarning};
 
 /// Where the values of a column lie in a record.
@@ -164,7 +165,8 @@ impl Schema {
         self.bits("edge of flight line", 14, 7, 1, Layer::Base);
     }
 
-    fn extra_bytes(&mut self, extra: Vec<ExtraBytes>) {
+    fn extra_bytes(&mut self, mut extra: Vec<ExtraBytes>) {
+        name_normals(&mut extra);
         for ExtraBytes { mut attribute, at } in extra {
             attribute.name = self.free_name(&attribute.name);
             let (elements, kind) = (attribute.elements, FieldKind::Plain);
@@ -203,9 +205,57 @@ impl Schema {
     }
 }
 
+/// Normals get their usual names, whatever the file calls them: three scalars, or the first triple of that name, which
+/// becomes three scalars. Values, scale and offset stay.
+fn name_normals(found: &mut Vec<ExtraBytes>) {
+    let place = |axis: usize| {
+        let is_it = |e: &ExtraBytes| e.attribute.elements == 1 && normal_axis(&e.attribute.name) == Some(axis);
+        found.iter().position(is_it)
+    };
+    if let (Some(x), Some(y), Some(z)) = (place(0), place(1), place(2)) {
+        for (i, name) in [x, y, z].into_iter().zip(NORMALS) {
+            found[i].attribute.name = name.to_owned();
+        }
+        return;
+    }
+    let is_triple = |e: &ExtraBytes| e.attribute.elements == 3 && is_normal(&e.attribute.name);
+    let Some(i) = found.iter().position(is_triple) else { return };
+    let ExtraBytes { attribute: triple, at } = found.remove(i);
+    for (axis, name) in NORMALS.into_iter().enumerate().rev() {
+        let mut attribute = Attribute::new(name, triple.ty, 1);
+        attribute.description.clone_from(&triple.description);
+        attribute.scale = vec![triple.scale[axis]];
+        attribute.offset = vec![triple.offset[axis]];
+        attribute.no_data = triple.no_data.as_ref().map(|values| vec![values[axis]]);
+        found.insert(i, ExtraBytes { attribute, at: at + axis * triple.ty.size() });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn extra(name: &str, elements: usize, at: usize) -> ExtraBytes {
+        ExtraBytes { attribute: Attribute::new(name, AttributeType::Int16, elements), at }
+    }
+
+    fn places(found: &[ExtraBytes]) -> Vec<(&str, usize)> {
+        found.iter().map(|e| (e.attribute.name.as_str(), e.at)).collect()
+    }
+
+    #[test]
+    fn normals_have_one_set_of_names_and_a_part_of_one_is_none() {
+        let mut found =
+            vec![extra("confidence", 1, 36), extra("normal z", 1, 42), extra("Nx", 1, 38), extra("Ny", 1, 40)];
+        name_normals(&mut found);
+        assert_eq!(places(&found), [("confidence", 36), ("NormalZ", 42), ("NormalX", 38), ("NormalY", 40)]);
+        let mut triple = vec![extra("Normals", 3, 36)];
+        name_normals(&mut triple);
+        assert_eq!(places(&triple), [("NormalX", 36), ("NormalY", 38), ("NormalZ", 40)]);
+        let mut part = vec![extra("nx", 1, 36), extra("ny", 1, 38)];
+        name_normals(&mut part);
+        assert_eq!(places(&part), [("nx", 36), ("ny", 38)]);
+    }
 
     #[test]
     fn a_taken_or_empty_name_gets_a_number() {
