@@ -37,11 +37,15 @@ fn advice(advice: &Advice) -> String {
             bounds_value(bounds)
         ),
         Advice::SkipInvalid => "pass --invalid skip to leave such points out".to_owned(),
+        Advice::SkipOriginPoints => "--origin-points skip leaves them out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
+        Advice::CommasSeparate => "pass --decimal point if they separate columns".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
         Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),
-        Advice::Reproject => "reproject the inputs, or name the system with --crs".to_owned(),
+        Advice::Reproject => {
+            "bring the inputs to one system with --reproject, or name the system of all with --crs".to_owned()
+        }
         Advice::NameAttributes => "name the attributes to keep with --attributes".to_owned(),
         Advice::PackLeaves => "--layout packed puts them into one".to_owned(),
         other => other.to_string(),
@@ -77,8 +81,16 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
             "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
         }
         Some(ReadAdvice::MoreMemory) => "convert it with a larger --memory".to_owned(),
+        Some(ReadAdvice::NameCrs) => "name its coordinate reference system with --crs".to_owned(),
+        Some(ReadAdvice::OtherCrs) => {
+            "choose a system for --reproject on the same datum and with the same heights, or reproject the scan elsewhere"
+                .to_owned()
+        }
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
+        }
+        Some(ReadAdvice::DecimalMark) => {
+            "say whether commas are decimal marks: --decimal comma or --decimal point".to_owned()
         }
         Some(advice) => advice.to_string(),
     };

@@ -2,6 +2,7 @@
 
 mod common;
 mod convert;
+mod placing;
 mod values;
 
 use std::num::NonZero;
@@ -12,7 +13,7 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 pub(crate) use common::{InputArgs, ProgressArg, ReadingArgs, TalkArgs};
 pub(crate) use convert::{
     BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
-    OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use values::Attributes;
 
@@ -147,6 +148,8 @@ mod tests {
         let args =
             convert(&["--class", "2,6", "--bounds", "-1,-2,-3..1,2,3", "--attributes", "rgb, intensity"]).unwrap();
         assert_eq!(args.class, Some(vec![2, 6]));
+        assert_eq!(convert(&["--class", "-1"]).unwrap().class, Some(vec![-1]));
+        assert_eq!(convert(&["--class=-1,300"]).unwrap().class, Some(vec![-1, 300]));
         assert_eq!(args.bounds.unwrap().min, [-1.0, -2.0, -3.0]);
         assert_eq!(args.attributes, Some(Attributes::List(vec!["rgb".into(), "intensity".into()])));
         assert_eq!(args.scale, Scale(None));
@@ -155,7 +158,7 @@ mod tests {
     #[test]
     fn nonsense_is_refused() {
         let table: [&[&str]; 10] = [
-            &["--class", "256"],
+            &["--class", "2.5"],
             &["--every", "0"],
             &["--threads", "0"],
             &["--memory", "lots"],

@@ -17,6 +17,7 @@ use crate::scan_choice;
 /// A folder with the outputs of one conversion to several formats is validated one after the other; all are
 /// reported, and the first failure gives the exit code.
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
+    args.reading.placing.refuse_idle_crs()?;
     let datasets = several(&args.dataset);
     if datasets.is_empty() {
         require_dataset(&args.dataset)?;
@@ -52,7 +53,7 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(), Failure> {
         let found = inputs::expand(&args.against, &options.open)?;
         scan_choice::check(&found.files, &options.open)?;
         if !args.talk.quiet {
-            found.notes.iter().for_each(|note| print_line(note));
+            found.all_notes().for_each(|note| print_line(&note));
         }
         options.against = found.files;
     }

@@ -38,6 +38,7 @@ fn datasets(path: &Path) -> Vec<Located> {
 
 /// Describes every path; the exit code is that of the first failure.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    args.reading.placing.refuse_idle_crs()?;
     let options = args.reading.options()?;
     check_choice(&args.paths, &options)?;
     let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };
@@ -52,7 +53,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         match inputs::expand(std::slice::from_ref(path), &options) {
             Err(failure) => out.fail(failure),
             Ok(found) => {
-                found.notes.iter().for_each(|note| print_line(note));
+                found.all_notes().for_each(|note| print_line(&note));
                 for file in &found.files {
                     out.show(scan::describe(file, &options, args.deep))?;
                 }

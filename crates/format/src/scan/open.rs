@@ -5,9 +5,12 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use super::archive::archive;
-use crate::{Advice, Fault, ReadError, Scan, UnknownName};
+use super::mapped::{ScanMaps, mapped};
+use super::other_kind::OtherKind;
+use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
 
 /// Maximum bytes from the start of a file to detect its kind; text needs some lines.
 const SNIFF_BYTES: u64 = 4 << 10;
@@ -33,7 +36,7 @@ pub enum ScanKind {
     Text(crate::scan::text::TextKind),
 }
 
-/// What a file does not say of itself, for the kinds that need it.
+/// What a file does not say of itself, for the kinds that need it, and what becomes of its points.
 ///
 /// ```
 /// use pointmill_format::OpenOptions;
@@ -41,13 +44,15 @@ pub enum ScanKind {
 /// let options = OpenOptions::default().columns(["x", "y", "z", "-", "i"]).separator(';');
 /// assert_eq!(options.separator, Some(';'));
 /// ```
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct OpenOptions {
     /// Text: the names of all columns in file order (`text::TextOptions::columns`); `None`: found.
     pub columns: Option<Vec<String>>,
     /// Text: what stands between two fields; `None`: found. A blank means any blanks.
     pub separator: Option<char>,
+    /// Text: what stands before the decimals of a number.
+    pub decimal: Decimal,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
     /// E57, PTX: the scans within a file that are read, each by name or number ([`crate::scans_named`]); `None`: all.
@@ -56,6 +61,8 @@ pub struct OpenOptions {
     /// Bytes of memory that the description of a file's scans may take while it is opened (the XML section of E57);
     /// `None`: 1 GiB.
     pub description_bytes: Option<u64>,
+    /// What becomes of the points; `None`: they stay where they are.
+    pub maps: Option<Arc<dyn ScanMaps>>,
 }
 
 impl OpenOptions {
@@ -70,6 +77,13 @@ impl OpenOptions {
     #[must_use]
     pub fn separator(mut self, separator: char) -> Self {
         self.separator = Some(separator);
+        self
+    }
+
+    /// Sets [`Self::decimal`].
+    #[must_use]
+    pub fn decimal(mut self, decimal: Decimal) -> Self {
+        self.decimal = decimal;
         self
     }
 
@@ -91,6 +105,13 @@ impl OpenOptions {
     #[must_use]
     pub fn description_bytes(mut self, bytes: u64) -> Self {
         self.description_bytes = Some(bytes);
+        self
+    }
+
+    /// Sets [`Self::maps`].
+    #[must_use]
+    pub fn maps(mut self, maps: impl ScanMaps + 'static) -> Self {
+        self.maps = Some(Arc::new(maps));
         self
     }
 }
@@ -138,7 +159,7 @@ impl ScanKind {
         }
         // last: a binary file may hold lines of numbers, too
         #[cfg(feature = "text")]
-        if let Some(kind) = crate::scan::text::kind(first_bytes) {
+        if let Some(kind) = crate::scan::text::kind(first_bytes).filter(|_| OtherKind::of(first_bytes).is_none()) {
             return Some(Self::Text(kind));
         }
         None
@@ -210,16 +231,26 @@ pub fn supported_scans() -> String {
 /// Opens a scan of any kind that this build reads; the kind is detected from the content, the extension is ignored.
 ///
 /// # Errors
-/// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
-#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+/// A file that is empty, or of no kind that is read here, those of the reader of its kind, and of
+/// [`OpenOptions::maps`].
 pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
-    let path = path.as_ref();
+    let scan = open_as_it_is(path.as_ref(), options)?;
+    match &options.maps {
+        Some(maps) => mapped(scan, &**maps),
+        None => Ok(scan),
+    }
+}
+
+#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
-        // Columns were named for it: then it is text, if it can be.
+        // Columns were named for it, by the user or in it: then it is text, if it can be.
         #[cfg(feature = "text")]
-        None if options.columns.is_some() && !first.is_empty() && !first.contains(&0) => {
+        None if (options.columns.is_some() && !first.is_empty() && !first.contains(&0))
+            || crate::scan::text::has_titles(&first) =>
+        {
             ScanKind::Text(crate::scan::text::TextKind::Xyz)
         }
         None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {
@@ -245,9 +276,8 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
         #[cfg(feature = "text")]
         ScanKind::Text(_) => {
             let choices = options.scans.as_deref();
-            let options =
-                crate::scan::text::TextOptions { columns: options.columns.clone(), separator: options.separator };
-            let scan = crate::scan::text::open(path, &options)?;
+            let OpenOptions { columns, separator, decimal, .. } = options.clone();
+            let scan = crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })?;
             Ok(super::partial::choose(scan, choices))
         }
     }
@@ -271,6 +301,12 @@ fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let supported = Advice::Supported(supported_scans());
     if let Some(what) = archive(first) {
         return ReadError::unsupported(path, Fault::Archive { what }).advise(Advice::Unpack);
+    }
+    if let Some(other) = OtherKind::of(first) {
+        return ReadError::unsupported(path, Fault::OtherKind(other.to_string())).advise(supported);
+    }
+    if cfg!(feature = "text") && (first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff])) {
+        return ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8");
     }
     match ending.filter(|e| is_ending_of_scans(e)) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),

@@ -33,6 +33,8 @@ pub enum ScanWarning {
     /// LAZ: the chunk table cannot be used. `chunks`: as many were found without it; `None`: points are decoded in
     /// sequence.
     ChunkTable { why: String, chunks: Option<usize> },
+    /// LAZ: the chunk table was wrong (`why`) and is mended (`how`); the mended one was proven.
+    ChunkTableMended { why: String, how: String },
     /// LAZ: a LASzip record, but points that are not compressed.
     LaszipIgnored,
     /// LAS: a record (`kind`: VLR or EVLR) starts outside its place.
@@ -51,8 +53,13 @@ pub enum ScanWarning {
     WktEmpty,
     /// LAS: waveform packets are not read.
     Waveforms { point_format: u8 },
-    /// LAS: more than one Extra Bytes record; the first is taken.
-    ExtraBytesRecords,
+    /// LAS: more than one Extra Bytes record, which describe `widths` bytes of a point, of its `extra` ones. Those with
+    /// the numbers `taken`, from 1, are joined.
+    ExtraBytesRecords { widths: Vec<usize>, taken: Vec<usize>, extra: usize },
+    /// LAS: a record of LASzip's compatibility mode that does not fit the points; they are read as they are.
+    CompatibilityIgnored { version: u16, point_format: u8 },
+    /// LAS: the header declares no points, the record of LASzip's compatibility mode that many.
+    CompatibilityCount { count: u64 },
     /// LAS: the Extra Bytes record is not a multiple of its descriptors.
     ExtraBytesLength { bytes: usize, descriptor: usize },
     /// LAS: extra bytes reach beyond the record.
@@ -81,8 +88,30 @@ pub enum ScanWarning {
     PlyVersion { version: String },
     /// No z: it is 0 for every point.
     NoZ,
+    /// The unit of its coordinate reference system is `declared`; its coordinates are taken to be in `given`.
+    UnitsClash { declared: String, given: String },
+    /// A reprojection changes the datum, in this way.
+    DatumChange { by: String },
+    /// Nothing says what heights are above; `target`, to which they are reprojected, has them above the ellipsoid.
+    HeightsAboveNothing { target: String },
+    /// Nothing says the unit of heights, and that of x and y has changed to `beside`.
+    HeightsWithoutUnit { beside: String },
+    /// A reprojection moved the points, but turned neither normals nor the poses of scans.
+    DirectionsProjected,
     /// Text: a column without numbers.
     ColumnIgnored { number: usize, name: String },
+    /// Text: the first column numbers or names the rows.
+    RowNumbersIgnored,
+    /// Text: the first line is numbers, but titles of the columns and no point.
+    TitlesOfNumbers { line: String },
+    /// Text: a column has the title of one that is a coordinate.
+    TitleTwice { number: usize, name: String },
+    /// Text: the values of a column are not what its name or its place says: it is an attribute of its own.
+    ColumnUnusual { number: usize, name: String },
+    /// Text: commas are decimal marks; one of the numbers.
+    DecimalComma { example: String },
+    /// Text: blanks and commas both separate columns.
+    SeparatorsMixed,
     /// E57: what one or more scans of the file share; indices of the scans, from 0. The line has numbers, from 1.
     InScans { scans: Vec<usize>, warning: Box<ScanWarning> },
     /// E57: more warnings of scans than are kept.
@@ -178,9 +207,39 @@ impl ScanWarning {
             }
             Self::Bounds => "the header's bounds are inverted or not finite; they are not used".to_owned(),
             Self::NoZ => "there is no z; it is 0 for every point".to_owned(),
+            Self::UnitsClash { declared, given } => {
+                format!(
+                    "its coordinate reference system is in {declared}; the coordinates are taken as {given} and scaled"
+                )
+            }
+            Self::DatumChange { by } => format!("the datum is changed by {by}"),
+            Self::HeightsAboveNothing { target } => {
+                format!(
+                    "nothing says what its heights are above; {target} has them above the ellipsoid, and so they are taken"
+                )
+            }
+            Self::HeightsWithoutUnit { beside } => {
+                format!("nothing says the unit of its heights; they are left as they are, beside x and y in {beside}")
+            }
+            Self::DirectionsProjected => {
+                "normals and poses are not turned by the reprojection; they keep the directions of the scan's own axes"
+                    .to_owned()
+            }
             Self::ColumnIgnored { number, name } => {
                 format!("column {number} ({name}) holds no numbers; it is omitted")
             }
+            Self::RowNumbersIgnored => {
+                "column 1 numbers or names the rows; it is omitted, unless all columns are named".to_owned()
+            }
+            Self::TitlesOfNumbers { line } => format!("the first line ({line}) has titles of columns, no point"),
+            Self::TitleTwice { number, name } => {
+                format!("column {number} ({name}) is called like a coordinate; it is an attribute")
+            }
+            Self::ColumnUnusual { number, name } => {
+                format!("column {number} ({name}) holds values that are none of that kind; it is an attribute")
+            }
+            Self::DecimalComma { example } => format!("commas are decimal marks, as in {example}"),
+            Self::SeparatorsMixed => "blanks and commas both separate columns".to_owned(),
             Self::ViewpointIgnored { viewpoint } => format!("the sensor's viewpoint ({viewpoint}) is not applied"),
             Self::GridSize { width, height, points, taken } => {
                 format!("WIDTH {width} times HEIGHT {height} is not POINTS {points}; {taken} are taken")
@@ -207,6 +266,11 @@ impl ScanWarning {
             Self::ChunkTable { why, chunks: None } => {
                 format!("the chunk table is unusable ({why}); the points are decoded one after the other")
             }
+            Self::ChunkTableMended { why, how } => {
+                format!(
+                    "the chunk table is wrong ({why}): {how}; mended, and proven by decoding a sample of the chunks"
+                )
+            }
             Self::LaszipIgnored => {
                 "there is a LASzip record, but the points are not marked as compressed; it is ignored".to_owned()
             }
@@ -232,7 +296,14 @@ impl ScanWarning {
             Self::Waveforms { point_format } => {
                 format!("point format {point_format} carries waveform packets; they are not read, all other values are")
             }
-            Self::ExtraBytesRecords => "there is more than one Extra Bytes record; the first is taken".to_owned(),
+            Self::ExtraBytesRecords { widths, taken, extra } => extra_bytes_records(widths, taken, *extra),
+            Self::CompatibilityIgnored { version, point_format } => format!(
+                "a record of LASzip's compatibility mode (version {version}) does not fit the points (format \
+                 {point_format} and its extra bytes); they are read as they are stored"
+            ),
+            Self::CompatibilityCount { count } => format!(
+                "the header declares no points, the record of LASzip's compatibility mode {count}; these are read"
+            ),
             Self::ExtraBytesLength { bytes, descriptor } => {
                 format!("the Extra Bytes record has {bytes} bytes, not a multiple of {descriptor}")
             }
@@ -306,6 +377,26 @@ impl ScanWarning {
             _ => "",
         };
         fixed.to_owned()
+    }
+}
+
+fn extra_bytes_records(widths: &[usize], taken: &[usize], extra: usize) -> String {
+    let join = |numbers: &[usize]| numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    let (there, numbers) = (widths.len(), join(taken));
+    let width: usize = taken.iter().map(|i| widths[i - 1]).sum();
+    match taken.len() {
+        _ if width != extra => format!(
+            "there are {there} Extra Bytes records, of {} bytes per point, which do not add up to its {extra} extra \
+             bytes; number {numbers} is taken",
+            join(widths)
+        ),
+        1 => format!(
+            "there are {there} Extra Bytes records; number {numbers} describes all {extra} extra bytes of a point"
+        ),
+        _ => format!(
+            "there are {there} Extra Bytes records; joined in order, numbers {numbers} describe all {extra} extra \
+             bytes of a point"
+        ),
     }
 }
 

@@ -99,10 +99,10 @@ fn invalid_times_are_nan() {
     let cloud = read("scans.e57");
     let bad = raw("scans.e57", 1, "IsTimeStampInvalid");
     for (i, v) in raw("scans.e57", 1, "TimeStamp").into_iter().enumerate() {
-        let seen = cloud.values("timeStamp")[200 + i];
+        let seen = cloud.values("timestamp")[200 + i];
         assert!(if bad[i] == 0.0 { seen == v } else { seen.is_nan() });
     }
-    assert!(cloud.values("timeStamp")[..200].iter().all(|v| *v == 0.0), "a scan without times");
+    assert!(cloud.values("timestamp")[..200].iter().all(|v| *v == 0.0), "a scan without times");
 }
 
 #[test]

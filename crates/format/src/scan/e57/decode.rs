@@ -190,7 +190,7 @@ impl Values<'_> {
                 plan.pose.rotate(normal.each_mut().map(Vec::as_mut_slice));
                 out.iter_mut().zip(&normal[axis]).for_each(|(out, v)| *out = *v as f32);
             }
-            (Fill::Plain { field, invalid }, column) => self.plain(field, invalid, column, tally),
+            (Fill::Plain { field, invalid, add }, column) => self.plain(field, invalid, add, column, tally),
             (_, column) => {
                 with_column!(column, v => v.fill(Default::default()));
                 (0..self.n).for_each(|i| tally.missing(i));
@@ -227,13 +227,14 @@ impl Values<'_> {
     }
 
     /// A field as it is. Integers that lie outside their declared range (a fault of the file) stay within their type.
-    fn plain(&self, field: usize, invalid: Option<usize>, column: &mut Column, tally: &mut Tally<'_>) {
+    fn plain(&self, field: usize, invalid: Option<usize>, add: i64, column: &mut Column, tally: &mut Tally<'_>) {
         let (encoding, bytes) = (self.fields[field].encoding, self.streams.field(field));
         macro_rules! integers {
             ($out:ident, $ty:ty) => {{
                 each_integer(encoding, bytes, self.n, |i, v| {
                     if let Some(out) = $out.get_mut(i) {
                         // `min` and `max` of the type fit: the schema does not use uint64
+                        let v = v.saturating_add(add);
                         *out = v.clamp(<$ty>::MIN as i64, <$ty>::MAX as i64) as $ty;
                         if i128::from(*out) != i128::from(v) {
                             tally.outside(i, v as f64);
@@ -250,7 +251,7 @@ impl Values<'_> {
             ($out:ident, $ty:ty) => {{
                 each(encoding, bytes, self.n, |i, v| {
                     if let Some(out) = $out.get_mut(i) {
-                        *out = v as $ty;
+                        *out = (v + add as f64) as $ty;
                     }
                 });
                 self.each_invalid(invalid, |i| $out[i] = <$ty>::NAN);
