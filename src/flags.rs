@@ -32,6 +32,10 @@ fn advice(advice: &Advice) -> String {
         Advice::KeepDuplicates => "leave out --duplicates drop, or convert to potree2".to_owned(),
         Advice::CutBounds { bounds: Some(b) } => format!("--bounds {} keeps all others", bounds_value(b)),
         Advice::CutBounds { bounds: None } => "leave them out with --bounds, or correct the input".to_owned(),
+        Advice::CutOutliers { bounds } => format!(
+            "--bounds {} keeps all others, --outliers drop drops them, --outliers keep goes on with the coarser step",
+            bounds_value(bounds)
+        ),
         Advice::SkipInvalid => "pass --invalid skip to leave such points out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),

@@ -80,6 +80,9 @@ pub(crate) struct ConvertArgs {
     /// What to do with points whose position and attributes all repeat those of another point
     #[arg(long, value_enum, default_value = "keep", help_heading = "Selecting data")]
     pub(crate) duplicates: DuplicatesArg,
+    /// What to do with points so far from all others that these lose precision: fail, drop (and count them), or keep
+    #[arg(long, value_enum, default_value = "fail", help_heading = "Selecting data")]
+    pub(crate) outliers: OutliersArg,
     /// What to do with points without a valid position
     #[arg(long, value_enum, default_value = "skip", help_heading = "Selecting data")]
     pub(crate) invalid: FaultArg,
@@ -195,6 +198,13 @@ pub(crate) enum SamplingArg {
 pub(crate) enum DuplicatesArg {
     Keep,
     Drop,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OutliersArg {
+    Keep,
+    Drop,
+    Fail,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -13,7 +13,7 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 pub(crate) use common::{InputArgs, ProgressArg, ReadingArgs, TalkArgs};
 pub(crate) use convert::{
     BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
-    RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use values::Attributes;
 

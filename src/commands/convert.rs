@@ -4,14 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Plan, Potree2Settings,
-    RgbDepth, Sampling, ScaleChoice, Target,
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Outliers, Plan,
+    Potree2Settings, RgbDepth, Sampling, ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
 use crate::args::{
     Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
-    RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
@@ -146,6 +146,7 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         DuplicatesArg::Drop => Duplicates::Drop,
     };
     plan.invalid = on_fault(args.invalid);
+    plan.outliers = outliers(args.outliers);
     plan.unreadable = on_fault(args.unreadable);
     plan.rgb_depth = match args.rgb_depth {
         RgbDepthArg::Auto => RgbDepth::Auto,
@@ -169,6 +170,14 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         plan.temp_dir = Some(dir.clone());
     }
     Ok(plan)
+}
+
+fn outliers(arg: OutliersArg) -> Outliers {
+    match arg {
+        OutliersArg::Keep => Outliers::Keep,
+        OutliersArg::Drop => Outliers::Drop,
+        OutliersArg::Fail => Outliers::Fail,
+    }
 }
 
 fn on_fault(arg: FaultArg) -> OnFault {

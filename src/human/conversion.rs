@@ -67,6 +67,7 @@ fn points_lines(report: &Report) -> Vec<String> {
     }
     let causes = [
         (p.outside_bounds, "outside the bounds"),
+        (p.outliers, "far from all others"),
         (p.other_class, "by class"),
         (p.thinned, "by thinning"),
         (duplicates, "as duplicates"),
@@ -146,7 +147,7 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
 /// Points read that are not in the dataset.
 fn points_not_written(report: &Report) -> u64 {
     let p = &report.points;
-    p.outside_bounds + p.other_class + p.thinned + duplicates_dropped(report) + p.invalid + p.unreadable
+    p.outside_bounds + p.outliers + p.other_class + p.thinned + duplicates_dropped(report) + p.invalid + p.unreadable
 }
 
 /// Only octrees drop duplicates, and there is one octree at most.

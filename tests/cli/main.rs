@@ -10,6 +10,7 @@ mod hostile;
 mod inputs;
 mod interrupted;
 mod placing;
+mod precision;
 mod reporting;
 mod same_points;
 mod sameness;

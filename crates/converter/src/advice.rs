@@ -26,6 +26,11 @@ pub enum Advice {
         /// The box, world units; `None`: the user must choose it.
         bounds: Option<Aabb>,
     },
+    /// Keep only the points inside this box, drop those outside, or go on with the coarser step.
+    CutOutliers {
+        /// The box, world units.
+        bounds: Aabb,
+    },
     /// Skip points without a valid position.
     SkipInvalid,
     /// Use the colour depth that was detected.
@@ -58,6 +63,10 @@ impl fmt::Display for Advice {
             Self::RaiseMemory { mib } => return write!(f, "allow {mib} MiB or more"),
             Self::CutBounds { bounds: Some(b) } => {
                 return write!(f, "keep only the points from {:?} to {:?} to leave them out", b.min, b.max);
+            }
+            Self::CutOutliers { bounds: b } => {
+                let (min, max) = (b.min, b.max);
+                return write!(f, "keep only the points from {min:?} to {max:?}, drop outliers, or keep them");
             }
             Self::ReplaceOutput => "choose another output, or allow it to be replaced",
             Self::FreeDisk => "free some space, or put temporary files elsewhere",

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{DatasetKind, ReadError};
+use pointmill_format::{Aabb, DatasetKind, ReadError};
 
 use crate::advice::Advice;
 use crate::plan::PlanError;
@@ -111,6 +111,17 @@ pub enum InputFault {
         min: [f64; 3],
         /// Upper corner of the points, world units.
         max: [f64; 3],
+    },
+    /// Points so far from all others that these lose precision.
+    CostlyOutliers {
+        /// At least as many.
+        points: u64,
+        /// The box of all others, world units.
+        others: Aabb,
+        /// The step with them, per axis, world units.
+        step: [f64; 3],
+        /// The step without them.
+        without: [f64; 3],
     },
     /// A point without a finite position, and the run was asked to fail at it.
     InvalidPosition {
@@ -291,6 +302,7 @@ impl InputFault {
     fn advice(&self) -> Option<Advice> {
         match self {
             Self::FarPoints { .. } => Some(Advice::CutBounds { bounds: None }),
+            Self::CostlyOutliers { others, .. } => Some(Advice::CutOutliers { bounds: *others }),
             Self::InvalidPosition { .. } => Some(Advice::SkipInvalid),
             Self::DeepColours { .. } => Some(Advice::DetectRgbDepth),
             Self::NoneReadable | Self::NothingLeft { .. } => None,
@@ -310,6 +322,16 @@ impl fmt::Display for InputFault {
             Self::FarPoints { min, max } => {
                 let corner = |c: &[f64; 3]| format!("{:e}, {:e}, {:e}", c[0], c[1], c[2]);
                 write!(f, "there are points from ({}) to ({}), which cannot be coordinates", corner(min), corner(max))
+            }
+            Self::CostlyOutliers { points, step, without, .. } => {
+                let lie = if *points == 1 { "point lies" } else { "or more points lie" };
+                let a = (0..3).fold(0, |a, b| if step[b] / without[b] > step[a] / without[a] { b } else { a });
+                let (axis, step, without) = (["x", "y", "z"][a], step[a], without[a]);
+                write!(
+                    f,
+                    "{points} {lie} so far from all others that the step of {axis} would be {step}, not {without}, and \
+                     all coordinates would be rounded to it"
+                )
             }
             Self::InvalidPosition { path, point } => {
                 write!(f, "{}: point {point} has no finite position", path.display())

@@ -53,7 +53,7 @@ pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
 pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
-    AttributeChoice, Duplicates, Filter, OnFault, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
+    AttributeChoice, Duplicates, Filter, OnFault, Outliers, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
 };
 pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{

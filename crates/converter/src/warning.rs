@@ -55,6 +55,13 @@ pub enum Warning {
         /// Why.
         reason: LatticeReason,
     },
+    /// Points far from all others were dropped.
+    OutliersDropped {
+        /// At least as many.
+        points: u64,
+        /// The box of all others, world units.
+        others: Aabb,
+    },
     /// Single precision does not resolve the coordinates of an input well.
     CoarseSingle {
         /// The input.
@@ -222,6 +229,7 @@ impl Warning {
             Self::ReadAgain => "read_again",
             Self::FinerStep { .. } => "finer_step",
             Self::CoarserStep { .. } => "coarser_step",
+            Self::OutliersDropped { .. } => "outliers_dropped",
             Self::CoarseSingle { .. } => "coarse_single",
             Self::Outliers { .. } => "outliers",
             Self::ValuesChanged { .. } => "values_changed",
@@ -264,6 +272,9 @@ impl Warning {
                 steps(*scale)
             ),
             Self::CoarserStep { scale, reason } => format!("coordinate step {}: {reason}", steps(*scale)),
+            Self::OutliersDropped { points, others: Aabb { min, max } } => format!(
+                "{points} or more points far from all others are dropped: those outside {min:?} to {max:?}; reading again"
+            ),
             Self::CoarseSingle { path, resolution } => format!(
                 "{}: stores coordinates in single precision, which resolves {} here and no finer; no tool can restore \
                  what it lacks",

@@ -38,9 +38,11 @@ pub(crate) use shortfall::Shortfall;
 pub(crate) use stats::{Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 
+use pointmill_format::Aabb;
+
 use crate::error::ConvertError;
-use crate::plan::Plan;
-use crate::sources::{Fineness, Schema, Sources};
+use crate::plan::{Filter, Plan};
+use crate::sources::{Fineness, Schema, Sources, intersection};
 use crate::warning::Warning;
 
 /// All points of a run, and what every output is made from.
@@ -58,6 +60,8 @@ pub(crate) struct Cloud<'a> {
     pub(crate) cells: Vec<Cell>,
     pub(crate) stats: Stats,
     pub(crate) facts: Facts,
+    /// Points outside were dropped as outliers.
+    pub(crate) far_cut: Option<Aabb>,
     /// Of headers and points, in order of discovery.
     pub(crate) warnings: Vec<Warning>,
 }
@@ -82,12 +86,19 @@ impl<'a> Cloud<'a> {
         sources: &'a Sources,
         intake: &'a Intake,
         gathered: Gathered,
+        far_cut: Option<Aabb>,
         mut warnings: Vec<Warning>,
     ) -> Result<Self, ConvertError> {
         let Gathered { lattice, is_lossless, frame, store, cells, stats } = gathered;
         warnings.extend_from_slice(&stats.warnings);
         let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
-        Ok(Self { plan, sources, intake, lattice, is_lossless, frame, store, cells, stats, facts, warnings })
+        Ok(Self { plan, sources, intake, lattice, is_lossless, frame, store, cells, stats, facts, far_cut, warnings })
+    }
+
+    /// The filter with its box as it was applied: without outliers, if they were dropped.
+    pub(crate) fn filter(&self) -> Filter {
+        let cuts = self.plan.filter.bounds.iter().chain(&self.far_cut).copied();
+        Filter { bounds: cuts.reduce(|a, b| intersection(&a, &b)), ..self.plan.filter.clone() }
     }
 
     /// The layout of stored records.

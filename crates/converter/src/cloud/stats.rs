@@ -22,6 +22,8 @@ pub(crate) struct Stats {
     pub(crate) change: Change,
     pub(crate) points: u64,
     pub(crate) outside_bounds: u64,
+    /// Dropped as outliers.
+    pub(crate) outliers: u64,
     pub(crate) other_class: u64,
     pub(crate) thinned: u64,
     pub(crate) invalid: u64,
@@ -249,6 +251,7 @@ impl Stats {
             change: Change::default(),
             points: 0,
             outside_bounds: 0,
+            outliers: 0,
             other_class: 0,
             thinned: 0,
             invalid: 0,
@@ -274,6 +277,7 @@ impl Stats {
         self.change.merge(&other.change);
         self.points += other.points;
         self.outside_bounds += other.outside_bounds;
+        self.outliers += other.outliers;
         self.other_class += other.other_class;
         self.thinned += other.thinned;
         self.invalid += other.invalid;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
-use pointmill_format::Lattice;
+use pointmill_format::{Aabb, Lattice};
 
 use super::axis::SourceMap;
 use super::lattice::ulp;
@@ -30,6 +30,8 @@ pub(super) struct Context<'a> {
     pub(super) maps: Vec<SourceMap>,
     /// Axes of each source on which every point has to prove the claim that a grid holds it.
     pub(super) claims: Vec<[bool; 3]>,
+    /// Points outside are outliers, which are dropped.
+    pub(super) far_cut: Option<Aabb>,
     /// The lattice of the pass.
     pub(super) lattice: Lattice,
     pub(super) partition: Partition,

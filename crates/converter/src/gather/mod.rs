@@ -9,6 +9,7 @@ mod axis;
 mod batch;
 mod columns;
 mod context;
+mod far;
 mod lattice;
 mod outliers;
 mod partition;
@@ -21,16 +22,24 @@ use pointmill_format::{Aabb, AxisGrid, Lattice, ReadError};
 pub(crate) use context::Demand;
 pub(crate) use lattice::from_headers;
 
-use crate::cloud::{Cloud, Intake, JobBounds, JobLattice, JobPoint, Stats};
+use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
-use crate::plan::Plan;
+use crate::plan::{Outliers, Plan};
 use crate::runtime::{Clock, Phase, Runtime};
 use crate::sources::{Fineness, Sources, far_out, intersection};
 use crate::warning::Warning;
+use far::FarPoints;
+use lattice::Loss;
 use pass::{Pass, PassEnd};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
-const MAX_PASSES: usize = 4;
+const MAX_PASSES: usize = 5;
+
+/// Outliers make the extent at least this many times longer.
+const FAR_OUTSIDE: f64 = 10.0;
+
+/// Fewer steps than this over the extent of a scene are a loss whatever the sources resolve.
+const FEWEST_STEPS: f64 = (1 << 20) as f64;
 
 /// Reads every point once; again only if the headers were wrong about the bounds.
 pub(crate) fn gather<'a>(
@@ -45,27 +54,38 @@ pub(crate) fn gather<'a>(
     let mut lattice = from_headers(plan, sources)?;
     let hint = sources.bounds_hint(plan.filter.bounds.as_ref());
     let mut hint = hint.map(|bounds| quantized(&lattice.lattice, &bounds));
+    let mut far_cut = None;
     for pass in 1..=MAX_PASSES {
         clock.begin(Phase::Read, sources.points_declared);
         let mut warn = |warning: Warning| {
             rt.warn(&warning);
             warnings.push(warning);
         };
-        let (stats, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, rt).run()? {
+        let (stats, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, rt).run()? {
             PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
             PassEnd::Misled(stats) => (stats, None),
             PassEnd::Complete(gathered) => (Box::new(gathered.stats.clone()), Some(gathered)),
         };
-        let settled = settled(plan, sources, &lattice, &stats)?;
+        let settled = lattice::settled(plan, sources, &lattice, &stats);
+        let read = Read { lattice: &lattice, stats: &stats, complete: complete.as_deref(), settled: settled.as_ref() };
+        if far_cut.is_none()
+            && let Some((others, points, without)) = read.without_outliers(plan, sources, rt)?
+        {
+            warn(Warning::OutliersDropped { points, others });
+            hint = Some(quantized(&without.lattice, &others));
+            (far_cut, lattice) = (Some(others), without);
+            continue;
+        }
+        read.refuse_far_out()?;
         match (settled, complete) {
             (Some(other), None) => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(measured(plan, &other.lattice, &stats));
+                hint = Some(measured(plan, &other.lattice, &stats, far_cut));
                 lattice = other;
             }
             (Some(other), Some(_)) if pass < MAX_PASSES => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(measured(plan, &other.lattice, &stats));
+                hint = Some(measured(plan, &other.lattice, &stats, far_cut));
                 lattice = other;
             }
             (None, None) => {
@@ -73,16 +93,9 @@ pub(crate) fn gather<'a>(
                 hint = Some(stats.bounds);
             }
             (_, Some(gathered)) => {
-                if let Some(outliers) = outliers::find(&gathered) {
-                    warn(outliers.warning(gathered.lattice.is_held_back()));
-                }
-                for (source, stats) in sources.all.iter().zip(&gathered.stats.sources) {
-                    if let Some(resolution) = source.survey.coarse_single(&stats.bounds) {
-                        warn(Warning::CoarseSingle { path: source.scan.info().path.clone(), resolution });
-                    }
-                }
+                finishing_warnings(sources, &gathered).into_iter().for_each(&mut warn);
                 let known = warnings.len() + gathered.stats.warnings.len();
-                let cloud = Cloud::new(plan, sources, intake, *gathered, warnings)?;
+                let cloud = Cloud::new(plan, sources, intake, *gathered, far_cut, warnings)?;
                 cloud.warnings[known..].iter().for_each(|w| rt.warn(w));
                 return Ok(cloud);
             }
@@ -91,34 +104,127 @@ pub(crate) fn gather<'a>(
     Err(Unsupported::TooFarApart.into())
 }
 
-/// The lattice that the points turned out to need, if it is another one.
-fn settled(
-    plan: &Plan,
-    sources: &Sources,
-    lattice: &JobLattice,
-    stats: &Stats,
-) -> Result<Option<JobLattice>, ConvertError> {
-    let (min, max) = (lattice.lattice.world(stats.bounds.min.0), lattice.lattice.world(stats.bounds.max.0));
-    if far_out(&Aabb { min, max }) {
-        return Err(InputFault::FarPoints { min, max }.into());
+/// What there is to say of the points once all are in.
+fn finishing_warnings(sources: &Sources, gathered: &Gathered) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if let Some(outliers) = outliers::find(gathered) {
+        warnings.push(outliers.warning(gathered.lattice.is_held_back()));
     }
-    Ok(lattice::settled(plan, sources, lattice, stats))
+    for (source, stats) in sources.all.iter().zip(&gathered.stats.sources) {
+        if let Some(resolution) = source.survey.coarse_single(&stats.bounds) {
+            warnings.push(Warning::CoarseSingle { path: source.scan.info().path.clone(), resolution });
+        }
+    }
+    warnings
+}
+
+/// A pass over the sources, and what follows from it.
+struct Read<'a> {
+    lattice: &'a JobLattice,
+    stats: &'a Stats,
+    complete: Option<&'a Gathered>,
+    settled: Option<&'a JobLattice>,
+}
+
+impl Read<'_> {
+    /// Where points far from all others are to be dropped: the box of the others, the number of those outside, and the
+    /// lattice without them.
+    ///
+    /// # Errors
+    /// Such points cost precision, and the plan is to fail at that.
+    fn without_outliers(
+        &self,
+        plan: &Plan,
+        sources: &Sources,
+        rt: &Runtime<'_>,
+    ) -> Result<Option<(Aabb, u64, JobLattice)>, ConvertError> {
+        if plan.outliers == Outliers::Keep {
+            return Ok(None);
+        }
+        if let Some((far, without)) = self.costly_outliers(plan, sources, rt)? {
+            let (FarPoints { points, others }, step) = (far, self.settled.unwrap_or(self.lattice).lattice.scale);
+            if plan.outliers == Outliers::Fail {
+                let without = without.lattice.scale;
+                return Err(InputFault::CostlyOutliers { points, others, step, without }.into());
+            }
+            return Ok(Some((others, points, without)));
+        }
+        // those that cost levels of the tree alone
+        let found = self.complete.filter(|_| plan.outliers == Outliers::Drop).and_then(outliers::find);
+        Ok(found.map(|outliers| {
+            let others = outliers.others();
+            (others, outliers.points, lattice::inside(plan, sources, self.lattice, self.stats, &others))
+        }))
+    }
+
+    /// Points so far from all others that these lose precision, and the lattice without them.
+    fn costly_outliers(
+        &self,
+        plan: &Plan,
+        sources: &Sources,
+        rt: &Runtime<'_>,
+    ) -> Result<Option<(FarPoints, JobLattice)>, ConvertError> {
+        let next = self.settled.unwrap_or(self.lattice);
+        let losses = lattice::losses(plan, sources, self.lattice, next, self.stats);
+        let is_crowded = || self.complete.is_some_and(|g| g.cells.iter().any(|c| 2 * c.points > g.stats.points));
+        let is_suspect = |loss: &Loss| match loss {
+            Loss::Nothing => false,
+            Loss::Of(_) => true,
+            Loss::Unknown => is_crowded(),
+        };
+        if !self.is_far_out() && !losses.iter().any(is_suspect) {
+            return Ok(None);
+        }
+        let enough = losses.map(|loss| match loss {
+            Loss::Of(step) => step * MOST_STEPS,
+            Loss::Nothing => f64::INFINITY,
+            Loss::Unknown => 0.0,
+        });
+        let Some(far) = far::find(sources, plan.filter.bounds.as_ref(), enough, rt)? else { return Ok(None) };
+        let without = lattice::inside(plan, sources, self.lattice, self.stats, &far.others);
+        let (extent, (min, max)) = (far.others.extent(), self.corners());
+        let longest = extent.into_iter().fold(0.0, f64::max);
+        let costs = |a: usize| {
+            let (step, finer) = (next.lattice.scale[a], without.lattice.scale[a]);
+            let is_far = extent[a] * FAR_OUTSIDE <= max[a] - min[a];
+            // an unknown resolution counts as lost where the others keep fewer than 20 bits
+            is_far && step > finer && (losses[a] != Loss::Unknown || step * FEWEST_STEPS > longest)
+        };
+        Ok((self.is_far_out() || (0..3).any(costs)).then_some((far, without)))
+    }
+
+    /// The least and the greatest coordinates.
+    fn corners(&self) -> ([f64; 3], [f64; 3]) {
+        let lattice = &self.lattice.lattice;
+        (lattice.world(self.stats.bounds.min.0), lattice.world(self.stats.bounds.max.0))
+    }
+
+    fn is_far_out(&self) -> bool {
+        let (min, max) = self.corners();
+        far_out(&Aabb { min, max })
+    }
+
+    fn refuse_far_out(&self) -> Result<(), ConvertError> {
+        let (min, max) = self.corners();
+        if self.is_far_out() { Err(InputFault::FarPoints { min, max }.into()) } else { Ok(()) }
+    }
 }
 
 fn change_of_step(before: &JobLattice, after: &JobLattice) -> Warning {
     let (then, now) = (before.lattice.scale, after.lattice.scale);
     let (scale, reason) = (now, after.reason);
-    if (0..3).any(|a| now[a] > then[a]) {
-        Warning::CoarserStep { scale, reason }
-    } else {
+    if (0..3).any(|a| now[a] < then[a]) {
         Warning::FinerStep { scale, reason }
+    } else {
+        Warning::CoarserStep { scale, reason }
     }
 }
 
 /// The box of all points that passed the filter's box, on a lattice.
-fn measured(plan: &Plan, lattice: &Lattice, stats: &Stats) -> JobBounds {
+fn measured(plan: &Plan, lattice: &Lattice, stats: &Stats, far_cut: Option<Aabb>) -> JobBounds {
     let all = stats.sources.iter().fold(Aabb::EMPTY, |all, s| all.union(&s.bounds));
-    quantized(lattice, &plan.filter.bounds.as_ref().map_or(all, |cut| intersection(&all, cut)))
+    let cuts = plan.filter.bounds.iter().chain(&far_cut);
+    quantized(lattice, &cuts.fold(all, |all, cut| intersection(&all, cut)))
 }
 
 /// True if every position of the sources is a point of the lattice, as far as is known.

@@ -25,10 +25,15 @@ pub(super) struct Outliers {
 }
 
 impl Outliers {
+    /// The box of all others in whole world units.
+    pub(super) fn others(&self) -> Aabb {
+        Aabb { min: self.others.min.map(f64::floor), max: self.others.max.map(f64::ceil) }
+    }
+
     /// For the user; the box in whole world units. `holds_back_step`: a smaller extent would allow a finer step.
     pub(super) fn warning(&self, holds_back_step: bool) -> Warning {
-        let others = Aabb { min: self.others.min.map(f64::floor), max: self.others.max.map(f64::ceil) };
-        Warning::Outliers { points: self.points, others, factor: self.factor, holds_back_step }
+        let (points, others, factor) = (self.points, self.others(), self.factor);
+        Warning::Outliers { points, others, factor, holds_back_step }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{Advice, Lattice, Scratch};
+use pointmill_format::{Aabb, Advice, Lattice, Scratch};
 
 use super::axis::SourceMap;
 use super::batch::Worker;
@@ -34,7 +34,8 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// `hint`: the bounds that are believed.
+    /// `hint`: the bounds that are believed; `far_cut`: the box of all points but outliers, which are dropped.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
         plan: &'a Plan,
         sources: &'a Sources,
@@ -42,6 +43,7 @@ impl<'a> Pass<'a> {
         demand: Demand,
         lattice: &'a JobLattice,
         hint: Option<JobBounds>,
+        far_cut: Option<Aabb>,
         rt: &'a Runtime<'a>,
     ) -> Self {
         let map = |s: &Source| SourceMap::new(s.scan.info().lattice.as_ref(), &lattice.lattice);
@@ -52,6 +54,7 @@ impl<'a> Pass<'a> {
             maps: sources.all.iter().map(map).collect(),
             claims: sources.all.iter().map(|s| s.survey.fineness.map(|f| f.is_claim())).collect(),
             lattice: lattice.lattice,
+            far_cut,
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
             store: Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, rt.budget.store_bytes),
             wants_moments: demand.moments,

@@ -19,7 +19,8 @@ pub(super) fn select(
     let filter = &pass.plan.filter;
     let bounds = world_bounds(scan.info().lattice.as_ref(), &batch.positions);
     stats.sources[source].bounds = stats.sources[source].bounds.union(&bounds);
-    let all_inside = filter.bounds.is_none_or(|b| b.contains(bounds.min) && b.contains(bounds.max));
+    let is_inside = |b: Aabb| b.contains(bounds.min) && b.contains(bounds.max);
+    let all_inside = filter.bounds.is_none_or(is_inside) && pass.far_cut.is_none_or(is_inside);
     let all_finite = match &batch.positions {
         Positions::Quantized(_) => true,
         Positions::World(p) => p.iter().all(|axis| axis.iter().all(|v| v.is_finite())),
@@ -53,6 +54,8 @@ pub(super) fn select(
             stats.invalid += 1;
         } else if filter.bounds.is_some_and(|b| !b.contains(p)) {
             stats.outside_bounds += 1;
+        } else if pass.far_cut.is_some_and(|b| !b.contains(p)) {
+            stats.outliers += 1;
         } else if filter
             .classes
             .as_ref()

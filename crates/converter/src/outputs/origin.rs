@@ -13,7 +13,7 @@ pub(super) fn own_key(cloud: &Cloud<'_>, dropped: &[DroppedAttribute]) -> Map<St
     own.insert("latticeOffset".into(), json!(cloud.lattice.lattice.offset));
     own.insert("rgbDepth".into(), plan.rgb_depth.name().into());
     own.insert("duplicates".into(), plan.duplicates.name().into());
-    let filter = filter_settings(&plan.filter);
+    let filter = filter_settings(&cloud.filter());
     if !filter.is_empty() {
         own.insert("filter".into(), filter.into());
     }

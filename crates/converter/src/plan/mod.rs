@@ -36,6 +36,8 @@ pub struct Plan {
     pub filter: Filter,
     /// Points whose position and attributes all repeat.
     pub duplicates: Duplicates,
+    /// Points so far from all others that these lose precision.
+    pub outliers: Outliers,
     /// Points without a valid position.
     pub invalid: OnFault,
     /// Inputs (or parts of inputs) that cannot be decoded.
@@ -100,6 +102,29 @@ impl Duplicates {
     }
 }
 
+/// What to do with points far from all others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Outliers {
+    /// Keep them, however coarse the coordinate step becomes for all.
+    Keep,
+    /// Drop them, and count them.
+    Drop,
+    /// End the run where they cost precision; where they cost levels of the tree alone, keep them with a warning.
+    #[default]
+    Fail,
+}
+
+impl Outliers {
+    /// The word in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Keep => "keep",
+            Self::Drop => "drop",
+            Self::Fail => "fail",
+        }
+    }
+}
+
 /// What to do when something is broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnFault {
@@ -147,6 +172,7 @@ impl Plan {
             temp_dir: None,
             filter: Filter::default(),
             duplicates: Duplicates::Keep,
+            outliers: Outliers::Fail,
             invalid: OnFault::Skip,
             unreadable: OnFault::Fail,
             rgb_depth: RgbDepth::Auto,

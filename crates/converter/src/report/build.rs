@@ -62,12 +62,13 @@ fn points_report(cloud: &Cloud<'_>, outputs: &[OutputReport]) -> Result<PointsRe
         read: stats.sources.iter().map(|s| s.read).sum(),
         kept: stats.points,
         outside_bounds: stats.outside_bounds,
+        outliers: stats.outliers,
         other_class: stats.other_class,
         thinned: stats.thinned,
         invalid: stats.invalid,
         unreadable: stats.unreadable.saturating_add(cloud.sources.points_missing),
     };
-    let filtered = points.outside_bounds + points.other_class + points.thinned + points.invalid;
+    let filtered = points.outside_bounds + points.outliers + points.other_class + points.thinned + points.invalid;
     let is_whole = |o: &OutputReport| o.points + o.duplicates_dropped == points.kept;
     if points.read == points.kept + filtered && outputs.iter().all(is_whole) {
         return Ok(points);
@@ -141,6 +142,7 @@ pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value>
     settings.insert("memory".into(), plan.memory_bytes.into());
     settings.insert("threads".into(), plan.threads.into());
     settings.insert("duplicates".into(), plan.duplicates.name().into());
+    settings.insert("outliers".into(), plan.outliers.name().into());
     settings.insert("rgb-depth".into(), plan.rgb_depth.name().into());
     for (name, value) in plan.open.maps.iter().flat_map(|maps| maps.settings()) {
         settings.insert(name.into(), value.into());

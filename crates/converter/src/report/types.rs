@@ -189,7 +189,7 @@ pub struct GridReport {
     pub why: GridReason,
 }
 
-/// Every point accounted for: `read = kept + outside_bounds + other_class + thinned + invalid`, and for every output
+/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid`, and for every output
 /// `kept = points + duplicates_dropped`. All are counted, none is a difference; the run fails where a sum is wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]
@@ -200,6 +200,8 @@ pub struct PointsReport {
     pub kept: u64,
     /// Outside the bounds.
     pub outside_bounds: u64,
+    /// Far from all others, where these are dropped.
+    pub outliers: u64,
     /// Of other classes than those to keep.
     pub other_class: u64,
     /// Removed by thinning.

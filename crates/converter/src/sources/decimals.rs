@@ -41,12 +41,12 @@ impl Decimals {
     }
 }
 
-/// True if `value` is the double nearest to a number with so many decimals: the quotient of two exact numbers is
-/// correctly rounded.
+/// True if `value` is the double nearest to a number with so many decimals (the quotient of two exact numbers is
+/// correctly rounded), or so large that doubles have no more.
 fn has_at_most(value: f64, decimals: u32) -> bool {
     let power = POWERS[decimals as usize];
     let units = (value * power).round();
-    units.abs() < 2f64.powi(53) && units / power == value
+    units.abs() >= 2f64.powi(53) || units / power == value
 }
 
 #[cfg(test)]
@@ -67,7 +67,7 @@ mod tests {
         assert_eq!(step(&[0.1 + 0.2]), None, "0.30000000000000004");
         assert_eq!(step(&[std::f64::consts::PI, 1.0]), None);
         assert_eq!(step(&[f64::from(0.1f32)]), None);
-        assert_eq!(step(&[1e18]), None, "no double of that size has decimals to go by");
+        assert_eq!(step(&[1e18, 0.25]), Some(0.01), "no double of that size has decimals to go by");
     }
 
     #[test]

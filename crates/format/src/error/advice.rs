@@ -20,6 +20,8 @@ pub enum Advice {
     CheckColumns,
     /// Rows of two numbers: cut short, or x and y alone, which [`crate::OpenOptions::columns`] can say.
     NameColumns,
+    /// An archive: the scans are in it.
+    Unpack,
     /// The kinds of scans that this build reads ([`crate::supported_scans`]).
     Supported(String),
     /// Cut short or damaged, or of another kind than those that this build reads.
@@ -48,6 +50,7 @@ impl fmt::Display for Advice {
             Self::NameColumns => {
                 f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")
             }
+            Self::Unpack => f.write_str("unpack it and name the scans in it"),
             Self::Supported(kinds) if kinds.is_empty() => f.write_str("this build reads no scans; enable a feature"),
             Self::Supported(kinds) => write!(f, "supported are {kinds}"),
             Self::CopyOrSupported(kinds) => {

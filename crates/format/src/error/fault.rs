@@ -14,6 +14,11 @@ pub enum Fault {
         /// The extension of the file, if it is one that scans have: the file is damaged, or misnamed.
         extension: Option<String>,
     },
+    /// An archive or a compressed file: a scan may be in it.
+    Archive {
+        /// "a gzip file", "a ZIP archive", ….
+        what: &'static str,
+    },
     /// The format is known, this version of it is not.
     UnknownVersion {
         /// "LAS", "E57", ….
@@ -98,6 +103,7 @@ impl fmt::Display for Fault {
             Self::UnknownFormat { extension: Some(extension) } => {
                 write!(f, "called .{extension}, but it is no scan that is known here")
             }
+            Self::Archive { what } => write!(f, "this is {what}, not a scan"),
             Self::UnknownVersion { format, found: (major, minor), known } => {
                 write!(f, "{format} version {major}.{minor} is not known ({known})")
             }

@@ -1,5 +1,6 @@
 //! Scans: files of points, of any kind, opened by content and decoded in pieces.
 
+mod archive;
 mod batches;
 #[cfg(any(feature = "e57", feature = "las"))]
 mod catch_panic;

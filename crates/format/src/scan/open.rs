@@ -7,6 +7,7 @@ use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
+use super::archive::archive;
 use super::mapped::{ScanMaps, mapped};
 use crate::{Advice, Fault, ReadError, Scan, UnknownName};
 
@@ -262,6 +263,9 @@ fn is_ending_of_scans(extension: &str) -> bool {
 fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     let supported = Advice::Supported(supported_scans());
+    if let Some(what) = archive(first) {
+        return ReadError::unsupported(path, Fault::Archive { what }).advise(Advice::Unpack);
+    }
     match ending.filter(|e| is_ending_of_scans(e)) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),
         Some(ending) => ReadError::broken(path, 0, Fault::UnknownFormat { extension: Some(ending) })
@@ -312,6 +316,20 @@ mod tests {
         let error = error.err().unwrap();
         assert!(matches!(error.kind(), ErrorKind::Unsupported));
         assert!(error.to_string().contains("LAS, LAZ, E57, PLY, PCD, text"), "{error}");
+    }
+
+    #[test]
+    fn an_archive_is_named_whatever_it_is_called() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["a.ply.gz", "a.ply", "a.laz", "a"] {
+            let path = dir.path().join(name);
+            fs::write(&path, b"\x1f\x8b\x08\x08\0\0\0\0\0\x03a.ply\0").unwrap();
+            let error = open_scan(&path, &OpenOptions::default()).err().unwrap();
+            assert!(matches!(error.kind(), ErrorKind::Unsupported), "{error}");
+            assert!(
+                error.to_string().ends_with(": this is a gzip file, not a scan; unpack it and name the scans in it")
+            );
+        }
     }
 
     #[test]

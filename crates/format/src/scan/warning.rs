@@ -67,8 +67,16 @@ pub enum ScanWarning {
     ExtraBytesUndocumented { bytes: usize },
     /// PCD: the sensor's viewpoint is not applied.
     ViewpointIgnored { viewpoint: String },
-    /// PCD: width times height is not the number of points.
-    GridSize { width: u64, height: u64, points: u64 },
+    /// PCD: width times height is not the number of points; `taken`: what fits the data, else the latter.
+    GridSize { width: u64, height: u64, points: u64, taken: u64 },
+    /// PCD: a line of the header that is not known.
+    HeaderLineIgnored { word: String },
+    /// PCD: neither SIZE nor TYPE.
+    FieldTypesMissing,
+    /// PCD: a field of no values.
+    FieldEmpty { name: String },
+    /// PLY, PCD, text: splats without another colour than that of their spherical harmonics.
+    ColourOfHarmonics,
     /// PLY: a version of the format that is read as 1.0.
     PlyVersion { version: String },
     /// No z: it is 0 for every point.
@@ -81,6 +89,8 @@ pub enum ScanWarning {
     HeightsAboveNothing { target: String },
     /// Nothing says the unit of heights, and that of x and y has changed to `beside`.
     HeightsWithoutUnit { beside: String },
+    /// Points were turned or scaled, but not the shapes of Gaussian splats.
+    SplatsUnturned,
     /// A reprojection moved the points, but turned neither normals nor the poses of scans.
     DirectionsProjected,
     /// Text: a column without numbers.
@@ -178,6 +188,9 @@ impl ScanWarning {
             Self::HeightsWithoutUnit { beside } => {
                 format!("nothing says the unit of its heights; they are left as they are, beside x and y in {beside}")
             }
+            Self::SplatsUnturned => {
+                "the shapes of its splats (rot_*, scale_*, f_rest_*) are as in the file; only their places are moved".to_owned()
+            }
             Self::DirectionsProjected => {
                 "normals and poses are not turned by the reprojection; they keep the directions of the scan's own axes"
                     .to_owned()
@@ -186,8 +199,16 @@ impl ScanWarning {
                 format!("column {number} ({name}) holds no numbers; it is omitted")
             }
             Self::ViewpointIgnored { viewpoint } => format!("the sensor's viewpoint ({viewpoint}) is not applied"),
-            Self::GridSize { width, height, points } => {
-                format!("WIDTH {width} times HEIGHT {height} is not POINTS {points}; the latter is taken")
+            Self::GridSize { width, height, points, taken } => {
+                format!("WIDTH {width} times HEIGHT {height} is not POINTS {points}; {taken} are taken")
+            }
+            Self::HeaderLineIgnored { word } => format!("the header line {word:?} is not known; it is not read"),
+            Self::FieldTypesMissing => "the header has no SIZE and TYPE; all fields are taken as float32".to_owned(),
+            Self::FieldEmpty { name } => format!("the field {name} has COUNT 0: it holds no values"),
+            Self::ColourOfHarmonics => {
+                "there is no rgb; it is made from the splats' harmonics: 0.5 + 0.28209479 · f_dc, \
+                                        cut to 0–1, as 0–255 (f_dc_0 to f_dc_2 are kept)"
+                    .to_owned()
             }
             Self::PlyVersion { version } => format!("the format version {version:?} is read as 1.0"),
             Self::Other(text) => text.clone(),

@@ -6,3 +6,5 @@ mod corpus;
 mod damage;
 mod golden;
 mod hand_made;
+mod pcd;
+mod ply;

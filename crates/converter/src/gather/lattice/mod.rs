@@ -21,6 +21,9 @@ pub(super) use self::steps::ulp;
 /// A step that could be this many times finer, had the headers been right, is worth a second read.
 const WORTH_READING_AGAIN: f64 = 100.0;
 
+/// A step more than this many times coarser than the sources' moves coordinates by more than one of theirs.
+const COSTLY_STEPS: f64 = 2.0;
+
 /// An axis that one step for all axes would leave with fewer steps than this has its own.
 const FEWEST_STEPS: f64 = (1 << 20) as f64;
 
@@ -60,6 +63,44 @@ pub(super) fn settled(plan: &Plan, sources: &Sources, present: &JobLattice, stat
         known.room(a).certain > now || (then < now && then * worth <= now)
     };
     (wanted.lattice.is_valid() && (0..3).any(differs)).then_some(wanted)
+}
+
+/// By axis, what a lattice keeps of the precision of the sources.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Loss {
+    /// All of it.
+    Nothing,
+    /// Less than they have: they resolve this step.
+    Of(f64),
+    /// They resolve more than is known.
+    Unknown,
+}
+
+/// What `lattice` would lose of the points that were read with `present`.
+pub(super) fn losses(
+    plan: &Plan,
+    sources: &Sources,
+    present: &JobLattice,
+    lattice: &JobLattice,
+    stats: &Stats,
+) -> [Loss; 3] {
+    let known = Knowledge::of_points(plan, sources, present, stats);
+    let resolved = finest_of_sources(sources, &known);
+    std::array::from_fn(|a| {
+        // a step that was requested is no loss, one that had to be coarser is
+        let is_requested = matches!(plan.scale, ScaleChoice::Fixed(_)) && lattice.reason.axes[a].coarser.is_none();
+        match resolved[a] {
+            _ if is_requested => Loss::Nothing,
+            Some(step) if lattice.lattice.scale[a] > COSTLY_STEPS * step => Loss::Of(step),
+            Some(_) => Loss::Nothing,
+            None => Loss::Unknown,
+        }
+    })
+}
+
+/// The lattice for the points of `stats`, read with `present`, that are inside a box.
+pub(super) fn inside(plan: &Plan, sources: &Sources, present: &JobLattice, stats: &Stats, bounds: &Aabb) -> JobLattice {
+    choose_for(plan, sources, &Knowledge::of_points(plan, sources, present, stats).inside(bounds))
 }
 
 fn choose_for(plan: &Plan, sources: &Sources, known: &Knowledge) -> JobLattice {

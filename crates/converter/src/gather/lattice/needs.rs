@@ -75,6 +75,12 @@ impl Knowledge {
         }
     }
 
+    /// The same, if only the points inside a box were there.
+    pub(super) fn inside(self, bounds: &Aabb) -> Self {
+        let all = [0, 1, 2].map(|a| Reach::of(bounds, a));
+        Self { bounds: self.bounds.iter().map(|b| intersection(b, bounds)).collect(), all, certain: all, ..self }
+    }
+
     /// The least steps for an axis.
     pub(super) fn room(&self, axis: usize) -> Room {
         Room::new(self.all[axis], self.certain[axis])

@@ -1,11 +1,14 @@
-//! The header: lines of a word and its values, up to DATA.
+//! The header: lines of a word and its values, up to DATA. Words and values count in any case.
 
 use crate::scan::source::Source;
+use crate::scan::tabular::header_lines::{BOM, HeaderLine, LineEnd, data_start, header_lines};
 use crate::scan::tabular::lines;
 use crate::{Advice, AttributeType, Fault, ReadError, ScanWarning};
 
 /// No header is longer; most have 200 bytes.
 const MAX_HEADER: u64 = 1 << 20;
+/// Lines of unknown words that are named in warnings.
+const MAX_IGNORED: usize = 8;
 
 /// How the points are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,19 +23,24 @@ pub(super) enum Encoding {
 pub(super) struct Field {
     pub(super) name: String,
     pub(super) ty: AttributeType,
+    /// At least 1.
     pub(super) count: usize,
 }
 
 /// Everything before the points.
 #[derive(Debug)]
 pub(super) struct Header {
+    /// Empty if it is not given.
     pub(super) version: String,
     pub(super) encoding: Encoding,
+    /// Those that hold anything.
     pub(super) fields: Vec<Field>,
     /// Where the names of the fields stand.
     pub(super) fields_at: u64,
-    /// As declared.
+    /// POINTS, else WIDTH times HEIGHT.
     pub(super) points: u64,
+    /// WIDTH and HEIGHT, if POINTS is another number than their product.
+    pub(super) grid: Option<(u64, u64)>,
     /// First byte of the data.
     pub(super) end: u64,
     pub(super) warnings: Vec<ScanWarning>,
@@ -50,17 +58,21 @@ struct Lines {
     width: Option<u64>,
     height: Option<u64>,
     points: Option<u64>,
+    ignored: usize,
     warnings: Vec<ScanWarning>,
 }
 
 /// True if the first bytes of a file say that it is PCD: a line of its header, behind comments.
 pub fn is_pcd(first_bytes: &[u8]) -> bool {
-    if first_bytes.starts_with(b"# .PCD") {
+    let starts = |line: &[u8], word: &[u8]| line.get(..word.len()).is_some_and(|w| w.eq_ignore_ascii_case(word));
+    if starts(first_bytes.strip_prefix(BOM).unwrap_or(first_bytes), b"# .PCD") {
         return true;
     }
-    let mut lines = lines::lines(first_bytes).map(|(_, line)| line);
-    let first = lines.find(|l| lines::is_filled(l) && !l.starts_with(b"#")).unwrap_or_default();
-    [b"VERSION ".as_slice(), b"FIELDS ", b"COLUMNS "].iter().any(|word| first.starts_with(word))
+    let mut lines = header_lines(first_bytes).map(|line| line.text);
+    let first = lines.find(|l| lines::is_filled(l) && !l.starts_with(b"#")).unwrap_or_default().trim_ascii_start();
+    [b"VERSION".as_slice(), b"FIELDS", b"COLUMNS"]
+        .iter()
+        .any(|word| starts(first, word) && matches!(first.get(word.len()), Some(b' ' | b'\t')))
 }
 
 impl Header {
@@ -73,28 +85,48 @@ impl Header {
                 .advise("if it holds lines of numbers, name it .xyz or .txt"));
         }
         let mut found = Lines::default();
-        for (at, line) in lines::lines(&bytes) {
-            let text = String::from_utf8_lossy(line);
+        let mut all_cr = true;
+        for line in header_lines(&bytes) {
+            let text = String::from_utf8_lossy(line.text);
             let broken = |what: String| {
-                ReadError::broken(source.path(), at as u64, Fault::Header(what)).advise(Advice::ExportAgain)
+                ReadError::broken(source.path(), line.at as u64, Fault::Header(what)).advise(Advice::ExportAgain)
             };
             let mut words = text.split_whitespace();
             let word = words.next().unwrap_or_default();
             let values: Vec<String> = words.map(str::to_owned).collect();
-            if word == "DATA" {
-                let encoding = match values.first().map(String::as_str) {
+            if word.eq_ignore_ascii_case("DATA") {
+                let encoding = match values.first().map(|v| v.to_ascii_lowercase()).as_deref() {
                     Some("ascii") => Encoding::Ascii,
                     Some("binary") => Encoding::Binary,
                     Some("binary_compressed") => Encoding::Compressed,
                     other => return Err(broken(format!("the encoding {:?} is not known", other.unwrap_or("")))),
                 };
-                let newline = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |n| at + n + 1);
-                return found.header(encoding, newline as u64).map_err(broken);
+                let mut header = found.header(encoding).map_err(broken)?;
+                header.end = header.data_start(source, &line, all_cr);
+                return Ok(header);
             }
-            found.line(word, values, at as u64).map_err(broken)?;
+            all_cr &= line.end == LineEnd::Cr;
+            found.line(word, values, line.at as u64).map_err(broken)?;
         }
         let what = format!("the header has no DATA line in its {} bytes", bytes.len());
         Err(ReadError::broken(source.path(), bytes.len() as u64, Fault::Header(what)).advise(Advice::CutShort))
+    }
+
+    /// Bytes of a point.
+    pub(super) fn stride(&self) -> usize {
+        self.fields.iter().map(|f| f.ty.size() * f.count).sum()
+    }
+
+    fn data_start(&self, source: &Source, last: &HeaderLine<'_>, all_cr: bool) -> u64 {
+        let bytes = self.points.checked_mul(self.stride() as u64);
+        data_start(last, all_cr, |start| match self.encoding {
+            Encoding::Ascii => false,
+            Encoding::Binary => bytes.and_then(|n| n.checked_add(start)) == Some(source.len()),
+            Encoding::Compressed => {
+                let decompressed = source.array_at::<4>(start.saturating_add(4)).map(u32::from_le_bytes);
+                decompressed.is_ok_and(|n| bytes == Some(u64::from(n)))
+            }
+        })
     }
 }
 
@@ -104,7 +136,7 @@ impl Lines {
             let value = values.first().map(String::as_str).unwrap_or_default();
             value.parse().map(Some).map_err(|_| format!("{word} {value:?} is not a number"))
         };
-        match word {
+        match word.to_ascii_uppercase().as_str() {
             "VERSION" => self.version = values.concat(),
             "FIELDS" | "COLUMNS" => (self.names, self.names_at) = (values, at),
             "SIZE" => self.sizes = values,
@@ -120,12 +152,19 @@ impl Lines {
                 }
             }
             comment if comment.is_empty() || comment.starts_with('#') => {}
-            _ => return Err(format!("the header line {:?} is not understood", shown(word))),
+            _ if !word.starts_with(char::is_alphabetic) || self.ignored == MAX_IGNORED => {
+                return Err(format!("the header line {:?} is not understood", shown(word)));
+            }
+            _ => {
+                self.ignored += 1;
+                self.warnings.push(ScanWarning::HeaderLineIgnored { word: shown(word) });
+            }
         }
         Ok(())
     }
 
-    fn header(mut self, encoding: Encoding, end: u64) -> Result<Header, String> {
+    /// The header, but for where its data start.
+    fn header(mut self, encoding: Encoding) -> Result<Header, String> {
         let points = match (self.points, self.width, self.height) {
             (Some(points), ..) => points,
             (None, Some(width), height) => {
@@ -133,18 +172,20 @@ impl Lines {
             }
             _ => return Err("there is neither POINTS nor WIDTH".to_owned()),
         };
-        if let (Some(width), Some(height)) = (self.width, self.height)
-            && width.checked_mul(height) != Some(points)
-        {
-            self.warnings.push(ScanWarning::GridSize { width, height, points });
-        }
+        let grid = self.width.zip(self.height).filter(|(w, h)| w.checked_mul(*h) != Some(points));
         let fields = self.fields()?;
         let Self { version, names_at: fields_at, warnings, .. } = self;
-        Ok(Header { version, encoding, fields, fields_at, points, end, warnings })
+        Ok(Header { version, encoding, fields, fields_at, points, grid, end: 0, warnings })
     }
 
-    fn fields(&self) -> Result<Vec<Field>, String> {
+    fn fields(&mut self) -> Result<Vec<Field>, String> {
         let count = self.names.len();
+        if self.sizes.is_empty() && self.types.is_empty() && count > 0 {
+            // the first versions had no other type
+            self.sizes = vec!["4".to_owned(); count];
+            self.types = vec!["F".to_owned(); count];
+            self.warnings.push(ScanWarning::FieldTypesMissing);
+        }
         for (word, list) in [("SIZE", &self.sizes), ("TYPE", &self.types)] {
             if list.len() != count {
                 return Err(format!("there are {count} FIELDS but {} values of {word}", list.len()));
@@ -153,16 +194,19 @@ impl Lines {
         if !self.counts.is_empty() && self.counts.len() != count {
             return Err(format!("there are {count} FIELDS but {} values of COUNT", self.counts.len()));
         }
-        let field = |(i, name): (usize, &String)| {
+        let mut fields = Vec::with_capacity(count);
+        for (i, name) in self.names.iter().enumerate() {
             let (size, ty) = (&self.sizes[i], &self.types[i]);
             let ty = field_type(size, ty)
                 .ok_or_else(|| format!("field {name} has TYPE {ty:?} and SIZE {size:?}, which is no number"))?;
             let declared = self.counts.get(i).map_or("1", String::as_str);
-            let count = declared.parse::<u32>().ok().filter(|n| *n > 0);
-            let count = count.ok_or_else(|| format!("field {name} has COUNT {declared:?}"))? as usize;
-            Ok(Field { name: name.clone(), ty, count })
-        };
-        self.names.iter().enumerate().map(field).collect()
+            match declared.parse::<u32>().map_err(|_| format!("field {name} has COUNT {declared:?}"))? {
+                0 if name == "_" => {}
+                0 => self.warnings.push(ScanWarning::FieldEmpty { name: name.clone() }),
+                n => fields.push(Field { name: name.clone(), ty, count: n as usize }),
+            }
+        }
+        Ok(fields)
     }
 }
 
@@ -172,12 +216,13 @@ fn shown(word: &str) -> String {
 
 /// A field's type from its SIZE and TYPE.
 fn field_type(size: &str, ty: &str) -> Option<AttributeType> {
-    Some(match (ty, size) {
+    Some(match (ty.to_ascii_uppercase().as_str(), size) {
         ("I", "1") => AttributeType::Int8,
         ("I", "2") => AttributeType::Int16,
         ("I", "4") => AttributeType::Int32,
         ("I", "8") => AttributeType::Int64,
-        ("U", "1") => AttributeType::UInt8,
+        // B: a truth value
+        ("U" | "B", "1") => AttributeType::UInt8,
         ("U", "2") => AttributeType::UInt16,
         ("U", "4") => AttributeType::UInt32,
         ("U", "8") => AttributeType::UInt64,

@@ -1,6 +1,7 @@
 //! The header: elements and their properties.
 
 use crate::scan::source::Source;
+use crate::scan::tabular::header_lines::{BOM, HeaderLine, LineEnd, data_start, header_lines};
 use crate::{Advice, AttributeType, Fault, ReadError, ScanWarning};
 
 /// No header is longer; most have some hundred bytes.
@@ -39,6 +40,16 @@ pub(super) struct Element {
     pub(super) properties: Vec<Property>,
 }
 
+impl Element {
+    /// Bytes of a row, if all have as many.
+    pub(super) fn stride(&self) -> Option<u64> {
+        self.properties.iter().try_fold(0u64, |sum, p| match p.kind {
+            Kind::Scalar(ty) => Some(sum + ty.size() as u64),
+            Kind::List { .. } => None,
+        })
+    }
+}
+
 /// Everything before the data.
 #[derive(Debug)]
 pub(super) struct Header {
@@ -49,9 +60,11 @@ pub(super) struct Header {
     pub(super) warnings: Vec<ScanWarning>,
 }
 
-/// True if the first bytes of a file say that it is PLY.
+/// True if the first bytes of a file say that it is PLY; a BOM may stand before.
 pub fn is_ply(first_bytes: &[u8]) -> bool {
-    first_bytes.strip_prefix(b"ply").is_some_and(|rest| rest.first().is_none_or(|b| *b <= b' '))
+    let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);
+    let (word, rest) = text.split_at(text.len().min(3));
+    word.eq_ignore_ascii_case(b"ply") && rest.first().is_none_or(|b| *b <= b' ')
 }
 
 impl Header {
@@ -63,23 +76,17 @@ impl Header {
             return Err(ReadError::broken(source.path(), 0, Fault::Header(what.to_owned())).advise(Advice::WrongFile));
         }
         let mut parser = Parser { encoding: None, elements: Vec::new(), warnings: Vec::new() };
-        for (at, line) in crate::scan::tabular::lines::lines(&bytes).skip(1) {
-            let text = String::from_utf8_lossy(line);
-            let broken = |what: String| {
-                ReadError::broken(source.path(), at as u64, Fault::Header(what)).advise(Advice::ExportAgain)
-            };
-            if text.trim() == "end_header" {
-                // its line ends with LF or CR LF; the data follows at once
-                let newline = at + line.len();
-                let ending = bytes[newline..].iter().take(2).take_while(|b| matches!(b, b'\r' | b'\n')).count();
-                let end = newline + if bytes[newline..].first() == Some(&b'\n') { 1 } else { ending };
-                let Some(encoding) = parser.encoding else {
-                    return Err(broken("the header has no format line".to_owned()));
-                };
-                let Parser { elements, warnings, .. } = parser;
-                return Ok(Self { encoding, elements, end: end as u64, warnings });
+        let mut all_cr = true;
+        for line in header_lines(&bytes).skip(1) {
+            let text = String::from_utf8_lossy(line.text);
+            let at = line.at as u64;
+            let broken =
+                |what: String| ReadError::broken(source.path(), at, Fault::Header(what)).advise(Advice::ExportAgain);
+            if text.trim().eq_ignore_ascii_case("end_header") {
+                return parser.header(&line, all_cr, source.len()).map_err(broken);
             }
-            parser.line(&text, at as u64).map_err(broken)?;
+            all_cr &= line.end == LineEnd::Cr;
+            parser.line(&text, at).map_err(broken)?;
         }
         let what = format!("the header has no end_header in its {} bytes", bytes.len());
         Err(ReadError::broken(source.path(), bytes.len() as u64, Fault::Header(what)).advise(Advice::CutShort))
@@ -107,31 +114,42 @@ struct Parser {
 }
 
 impl Parser {
+    /// The header that ends with `last`; `all_cr`: the lines before end with CR alone.
+    fn header(self, last: &HeaderLine<'_>, all_cr: bool, file_bytes: u64) -> Result<Header, String> {
+        let Self { encoding, elements, warnings } = self;
+        let encoding = encoding.ok_or("the header has no format line")?;
+        let bytes = elements.iter().try_fold(0u64, |sum, e| sum.checked_add(e.count.checked_mul(e.stride()?)?));
+        let end = data_start(last, all_cr, |start| bytes.and_then(|n| n.checked_add(start)) == Some(file_bytes));
+        Ok(Header { encoding, elements, end, warnings })
+    }
+
+    /// Keywords, encodings and types count in any case.
     fn line(&mut self, line: &str, at: u64) -> Result<(), String> {
         let words: Vec<&str> = line.split_whitespace().collect();
-        match words.as_slice() {
-            [] | ["comment" | "obj_info", ..] => {}
-            ["format", kind, rest @ ..] => {
-                self.encoding = Some(match *kind {
+        let keyword = words.first().map(|w| w.to_ascii_lowercase()).unwrap_or_default();
+        match (keyword.as_str(), words.get(1..).unwrap_or_default()) {
+            ("" | "comment" | "obj_info", _) => {}
+            ("format", [kind, rest @ ..]) => {
+                self.encoding = Some(match kind.to_ascii_lowercase().as_str() {
                     "ascii" => Encoding::Ascii,
                     "binary_little_endian" => Encoding::BinaryLittle,
                     "binary_big_endian" => Encoding::BinaryBig,
-                    other => return Err(format!("the encoding {other:?} is not known")),
+                    _ => return Err(format!("the encoding {kind:?} is not known")),
                 });
                 if rest != ["1.0"] {
                     self.warnings.push(ScanWarning::PlyVersion { version: rest.join(" ") });
                 }
             }
-            ["element", name, count] => {
+            ("element", [name, count]) => {
                 let count = count.parse().map_err(|_| format!("the count {count:?} of element {name} is no number"))?;
                 self.elements.push(Element { name: (*name).to_owned(), count, at, properties: Vec::new() });
             }
-            ["property", "list", count, item, name] => {
+            ("property", [list, count, item, name]) if list.eq_ignore_ascii_case("list") => {
                 let kind = Kind::List { count: count_type(count)?, item: scalar_type(item)? };
                 self.property(name, kind)?;
             }
             // names with blanks exist
-            ["property", ty, name @ ..] if !name.is_empty() => {
+            ("property", [ty, name @ ..]) if !name.is_empty() => {
                 self.property(&name.join(" "), Kind::Scalar(scalar_type(ty)?))?;
             }
             _ => return Err(format!("the header line {:?} is not understood", line.trim())),
@@ -154,7 +172,7 @@ fn count_type(name: &str) -> Result<AttributeType, String> {
 }
 
 fn scalar_type(name: &str) -> Result<AttributeType, String> {
-    Ok(match name {
+    Ok(match name.to_ascii_lowercase().as_str() {
         "char" | "int8" => AttributeType::Int8,
         "uchar" | "uint8" => AttributeType::UInt8,
         "short" | "int16" => AttributeType::Int16,

@@ -1,5 +1,8 @@
 //! PLY, the Stanford polygon format: ascii and binary of both byte orders.
 //!
+//! Lines of the header may end with LF, CR LF or CR, and words in it count in any case. An ascii body is a stream of
+//! numbers: as a rule a row has its line, but it may take several or share one.
+//!
 //! [`open`] reads the header, finds the vertices among the elements (others may stand before and behind, lists
 //! included) and cuts them into pieces; faces are not read.
 //!
@@ -8,6 +11,9 @@
 //!   0–1 as 0–65535. Floats above 1 in a sample of the file mean that all are integers.
 //! * `nx`, `ny`, `nz` become "NormalX", "NormalY", "NormalZ" in single precision; `intensity` stays `uint16` or becomes a
 //!   float; `classification` becomes `uint8`. What else there is keeps name and type (also CloudCompare's `scalar_*`).
+//! * Gaussian splats keep all that they have (`f_dc_*`, `f_rest_*`, `opacity`, `scale_*`, `rot_*`). Without another colour
+//!   "rgb" is 0.5 + 0.28209479177387814 · `f_dc`, cut to 0–1, as 0–255, with a warning. Compressed ones (`packed_position`, …,
+//!   and an element `chunk`) are unpacked to these, with `alpha` of 0–255 in place of `opacity`.
 //! * Fewer vertices than declared are reported in [`ScanInfo::warnings`](crate::ScanInfo::warnings), and read.
 //!
 //! ```no_run
@@ -29,13 +35,16 @@
 //! Source: G. Turk, "The PLY Polygon File Format", 1994; the type names of both its generations.
 
 mod header;
+mod splats;
 mod vertices;
 
 use std::path::Path;
 
 use crate::scan::source::Source;
-use crate::scan::tabular::{Property, RowScan, Schema, precision, resolutions, settle_float_colours};
-use crate::{Advice, AttributeType, Fault, ReadError, Scan};
+use crate::scan::tabular::{
+    Property, RowScan, Schema, Storage, binary, precision, reconcile, resolutions, settle_float_colours,
+};
+use crate::{Advice, AttributeType, Fault, ReadError, Resolution, Scan};
 use header::{Encoding, Header, Kind};
 
 pub use header::is_ply;
@@ -51,6 +60,9 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     let header = Header::read(&source)?;
     let mut warnings = header.warnings.clone();
     let vertices = header.vertices(&source)?;
+    if splats::are_compressed(&header.elements[vertices]) {
+        return compressed_splats(source, &header, vertices);
+    }
     let properties = properties(&header.elements[vertices].properties);
     let schema = Schema::new(&properties, &mut warnings).map_err(|what| {
         ReadError::broken(
@@ -71,6 +83,24 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
     scan.info.warnings = warnings;
     scan.info.resolution = resolutions(&properties);
     settle_float_colours(&mut scan);
+    Ok(Box::new(scan))
+}
+
+/// Splats that are unpacked as they are read.
+fn compressed_splats(source: Source, header: &Header, vertices: usize) -> Result<Box<dyn Scan>, ReadError> {
+    let splats = splats::Splats::find(&source, header, vertices)?;
+    let declared = header.elements[vertices].count;
+    let mut warnings = header.warnings.clone();
+    let points = reconcile(declared, splats.there(&source), &mut warnings);
+    let (start, stride) = splats.rows();
+    let schema = Schema::new(&splats.properties(), &mut warnings)
+        .map_err(|what| ReadError::broken(source.path(), header.end, what).advise(Advice::ExportAgain))?;
+    let format = format!("PLY 1.0, {}, compressed splats", header.encoding.name());
+    let mut scan = RowScan::new(source, format, declared, schema, Storage::Unpacked(Box::new(splats)));
+    scan.pieces = binary::pieces(start, stride, points);
+    scan.info.warnings = warnings;
+    // between bounds in single precision
+    scan.info.resolution = [Resolution::Single; 3];
     Ok(Box::new(scan))
 }
 

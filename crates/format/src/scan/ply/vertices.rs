@@ -1,8 +1,9 @@
 //! Where the vertices lie, behind the elements before them.
 
-use super::header::{Element, Encoding, Header, Kind};
+use super::header::{Element, Encoding, Header, Kind, Property};
 use crate::scan::source::Source;
-use crate::scan::tabular::{self, Endian, LineRule, Part, Storage, binary, lines, reconcile};
+use crate::scan::tabular::stream::{RowShape, Rows};
+use crate::scan::tabular::{self, Endian, Part, Storage, binary, lines, reconcile, text_rows, warn_of_bytes_behind};
 use crate::{Advice, Piece, ReadError, ScanWarning};
 
 /// Bytes that are read at once while lists are followed.
@@ -28,7 +29,7 @@ pub(super) fn place(
 ) -> Result<Placed, ReadError> {
     let (before, vertex) = (&header.elements[..vertices], &header.elements[vertices]);
     let endian = match header.encoding {
-        Encoding::Ascii => return ascii(source, header.end, before, vertex, warnings),
+        Encoding::Ascii => return ascii(source, header, vertices, warnings),
         Encoding::BinaryLittle => Endian::Little,
         Encoding::BinaryBig => Endian::Big,
     };
@@ -41,6 +42,10 @@ pub(super) fn place(
     if let [Part::Plain(_)] = parts.as_slice() {
         let there = (source.len() - walker.at) / stride as u64;
         let points = reconcile(vertex.count, there, warnings);
+        if there > points && vertices + 1 == header.elements.len() {
+            let bytes = source.len() - walker.at - points * stride as u64;
+            warnings.push(ScanWarning::BytesIgnored { declared: points, bytes });
+        }
         let pieces = binary::pieces(walker.at, stride as u64, points);
         return Ok(Placed { pieces, storage: Storage::Records { stride, endian } });
     }
@@ -51,22 +56,24 @@ pub(super) fn place(
 
 fn ascii(
     source: &Source,
-    start: u64,
-    before: &[Element],
-    vertex: &Element,
+    header: &Header,
+    vertices: usize,
     warnings: &mut Vec<ScanWarning>,
 ) -> Result<Placed, ReadError> {
-    let rows = before.iter().filter(|e| !e.properties.is_empty()).map(|e| e.count);
-    let rows = rows.fold(0, u64::saturating_add);
-    let (from, missing) = lines::skip(source, start, rows)?;
-    if missing > 0 {
-        let what = format!("{missing} of {rows} lines before the vertices are missing");
-        return Err(ReadError::broken(source.path(), from, what).advise(Advice::CutShort));
+    let rows: Vec<Rows> = header.elements.iter().map(rows).collect();
+    let (before, points, after) = (&rows[..vertices], &rows[vertices], &rows[vertices + 1..]);
+    let found = text_rows::place(source, header.end, lines::is_filled, before, points, after)?;
+    reconcile(points.count, found.rows, warnings);
+    if after.is_empty() {
+        warn_of_bytes_behind(source, found.end, points.count, warnings)?;
     }
-    let index = lines::index(source, from, vertex.count, lines::is_filled)?;
-    reconcile(vertex.count, index.rows, warnings);
-    let rule = LineRule::new(None, lines::is_filled);
-    Ok(Placed { pieces: index.pieces, storage: Storage::Lines(rule) })
+    Ok(Placed { pieces: found.pieces, storage: found.storage })
+}
+
+/// The rows of an element as text.
+fn rows(element: &Element) -> Rows {
+    let is_list = |p: &Property| matches!(p.kind, Kind::List { .. });
+    Rows { shape: RowShape(element.properties.iter().map(is_list).collect()), count: element.count }
 }
 
 /// The bytes of a row: runs of scalars, and lists between them.

@@ -1,9 +1,9 @@
 //! Rows written as text to columns.
 
-use super::binary::{Misfit, out_of_range, unpack};
+use super::binary::{Misfit, harmonic_colour, out_of_range, unpack};
 use super::number::{Number, unit_to_u16};
 use super::schema::{Field, Rule, Target};
-use crate::{AttributeType, Column, Element, PointBatch, Positions, Wanted};
+use crate::{AttributeType, Changes, Column, Element, PointBatch, Positions, Wanted};
 
 /// How the numbers of a line are set apart: by blanks, and by this byte if there is one.
 pub(crate) type Separator = Option<u8>;
@@ -23,10 +23,26 @@ impl RowParser<'_> {
     /// Writes a line to row `row` of the batch, whose columns have room.
     pub(crate) fn row(&self, line: &[u8], row: usize, batch: &mut PointBatch) -> Result<(), Misfit> {
         let mut tokens = Tokens { line, at: 0, separator: self.separator };
+        self.numbers(&mut tokens, row, batch)?;
+        let at = tokens.start();
+        if !tokens.is_empty() {
+            let need = self.fields.len();
+            return Err(Misfit {
+                row,
+                at,
+                what: format!("the line has more than the {need} numbers that are expected"),
+            });
+        }
+        Ok(())
+    }
+
+    /// Writes the next numbers, as many as a row has.
+    #[inline]
+    pub(crate) fn numbers(&self, tokens: &mut Tokens<'_>, row: usize, batch: &mut PointBatch) -> Result<(), Misfit> {
         let fail = |at, what| Misfit { row, at, what };
         for (i, field) in self.fields.iter().enumerate() {
             let at = tokens.start();
-            let is_missing = at == line.len();
+            let is_missing = at == tokens.line.len();
             if is_missing && i >= self.least {
                 let mut zero = Tokens { line: b"0", at: 0, separator: None };
                 self.field(field, &mut zero, row, batch).map_err(|what| fail(at, what))?;
@@ -36,12 +52,7 @@ impl RowParser<'_> {
                 let need = self.fields.len();
                 return Err(fail(at, format!("the line has {i} numbers, {need} are expected")));
             }
-            self.field(field, &mut tokens, row, batch).map_err(|what| fail(at, what))?;
-        }
-        let at = tokens.start();
-        if !tokens.is_empty() {
-            let need = self.fields.len();
-            return Err(fail(at, format!("the line has more than the {need} numbers that are expected")));
+            self.field(field, tokens, row, batch).map_err(|what| fail(at, what))?;
         }
         Ok(())
     }
@@ -62,10 +73,27 @@ impl RowParser<'_> {
                 self.value(field.ty, rule, tokens, index, &mut batch.columns[column])?;
             }
             Target::Packed { column, alpha } => {
-                let (rgb, a) = unpack(packed_bits(tokens.number()?, field.ty));
+                let start = tokens.start();
+                let v = tokens.number()?;
+                let bits = packed_bits(&tokens.line[start..tokens.at], v, field.ty);
+                if bits.is_none() && self.wanted.is_wanted(column) {
+                    batch.count_changes(column, &Changes { not_finite: 1, ..Changes::default() });
+                }
+                let (rgb, a) = unpack(bits.unwrap_or(0));
                 put(&mut batch.columns[column], row * 3, rgb);
                 if let Some(alpha) = alpha {
                     put(&mut batch.columns[alpha], row, [a]);
+                }
+            }
+            Target::Harmonic { value, colour, element } => {
+                let v = tokens.number()?;
+                match &mut batch.columns[value] {
+                    Column::Float32(out) => store(out, row, v as f32),
+                    Column::Float64(out) => store(out, row, v),
+                    _ => {}
+                }
+                if let Column::UInt16(out) = &mut batch.columns[colour] {
+                    store(out, row * 3 + element, harmonic_colour(v));
                 }
             }
             Target::List => {
@@ -121,15 +149,19 @@ impl RowParser<'_> {
     }
 }
 
-/// The bits of a packed colour that was written as a number.
+/// The bits of a packed colour that was written as the number `v`, which `text` starts with.
 ///
-/// PCL writes a float's colour as that float, or as the integer of its bits under the type F; colours without alpha are
-/// denormal floats, so that a value of 1 and more is the integer.
-fn packed_bits(v: f64, ty: AttributeType) -> u32 {
-    if ty == AttributeType::Float32 && v < 1.0 {
-        return (v as f32).to_bits();
+/// PCL writes a float's colour as that float, or as the integer of its bits under the type F: digits alone are the bits.
+/// `None`: NaN, which has lost them.
+#[inline]
+fn packed_bits(text: &[u8], v: f64, ty: AttributeType) -> Option<u32> {
+    let is_digits = !text.iter().any(|b| matches!(b, b'.' | b'a'..=b'z' | b'A'..=b'Z'));
+    if ty == AttributeType::Float32 && !is_digits {
+        // not by way of a double: that would round twice
+        let single = fast_float2::parse_partial::<f32, _>(text).map_or(v as f32, |(v, _)| v);
+        return (!single.is_nan()).then(|| single.to_bits());
     }
-    if v < 0.0 { v as i32 as u32 } else { v as u32 }
+    Some(if v < 0.0 { v as i32 as u32 } else { v as u32 })
 }
 
 fn store<T>(out: &mut [T], index: usize, v: T) {
@@ -347,9 +379,19 @@ mod tests {
 
     #[test]
     fn packed_colours_are_read_as_float_and_as_integer() {
-        assert_eq!(packed_bits(4.2108e6, AttributeType::Float32), 4_210_800);
-        assert_eq!(packed_bits(f64::from(f32::from_bits(0x0001_0203)), AttributeType::Float32), 0x0001_0203);
-        assert_eq!(packed_bits(-1.0, AttributeType::Int32), u32::MAX);
+        let bits =
+            |text: &str, ty| packed_bits(text.as_bytes(), parse(text.trim().as_bytes()).unwrap(), ty).unwrap_or(7);
+        let float = |text: &str| bits(text, AttributeType::Float32);
+        assert_eq!((float("4.2108e+06"), float("4210800.0")), (0x4a80_80e0, 0x4a80_80e0));
+        assert_eq!((float("4210800 "), float("-8355712")), (4_210_800, (-8_355_712i32) as u32));
+        assert_eq!(float("8.206463e-39"), 0x0059_5c48);
+        assert_eq!((float("0"), float("1.4e-45"), float("-1.7146522e+38")), (0, 1, 0xff00_ff00));
+        assert_eq!((float("nan"), float("inf"), float("-inf")), (7, 0x7f80_0000, 0xff80_0000));
+        assert_eq!(bits("-1", AttributeType::Int32), u32::MAX);
+        assert_eq!(
+            (bits("4286611584", AttributeType::UInt32), bits("16777215.0", AttributeType::UInt32)),
+            (4_286_611_584, 0xff_ffff)
+        );
     }
 
     #[test]

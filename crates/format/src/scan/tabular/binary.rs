@@ -107,6 +107,13 @@ pub(crate) fn field_to_column(
             packed(rows, field.at, wanted, first, batch);
             Ok(())
         }
+        Target::Harmonic { value, colour, element } => {
+            let kept = Target::Value { column: value, element: 0, rule: Rule::Keep };
+            let seen = Target::Value { column: colour, element, rule: Rule::Harmonic };
+            [kept, seen]
+                .into_iter()
+                .try_for_each(|target| field_to_column(rows, &Field { target, ..*field }, wanted, first, batch))
+        }
         Target::Value { column, .. } if !is_wanted(column) => Ok(()),
         Target::Value { column, element, rule } => {
             let elements = batch.columns[column].len().checked_div(batch.len()).unwrap_or(1).max(1);
@@ -142,6 +149,9 @@ impl Place {
                 None
             }
             (Rule::Unit, Column::UInt16(out)) => self.checked(out, numbers(), |v| unit_to_u16(v.as_f64())),
+            (Rule::Harmonic, Column::UInt16(out)) => {
+                self.checked(out, numbers(), |v| Some(harmonic_colour(v.as_f64())))
+            }
             (Rule::Shift, Column::UInt16(out)) => self.checked(out, numbers(), |v| (v.as_f64() + 2048.0).as_u16()),
             (_, Column::UInt16(out)) => self.checked(out, numbers(), T::as_u16),
             (_, Column::UInt8(out)) => self.checked(out, numbers(), T::as_u8),
@@ -181,6 +191,16 @@ impl Place {
         }
         wrong
     }
+}
+
+/// The first spherical harmonic, which is the same in all directions: ½ √(1/π).
+pub(crate) const BAND_0: f64 = 0.282_094_791_773_878_14;
+
+/// A splat's colour of 0–255 from its constant harmonic; NaN is 0.
+#[inline]
+pub(crate) fn harmonic_colour(v: f64) -> u16 {
+    // NaN becomes 0 in the cast
+    ((0.5 + BAND_0 * v).clamp(0.0, 1.0) * 255.0 + 0.5) as u16
 }
 
 /// For people: why a value does not fit.
@@ -260,6 +280,15 @@ mod tests {
         let field = value(0, AttributeType::Int16, 0, Rule::Convert);
         let misfit = fill(rows, &[field], &Wanted::from_iter([true]), 0, &mut b).unwrap_err();
         assert_eq!((misfit.row, misfit.what.as_str()), (1, "the value 300 does not fit its column"));
+    }
+
+    #[test]
+    fn harmonics_become_colours_of_a_byte() {
+        let colours = [-9.0, -1.772_453_8, 0.0, 1.0, 1.772_453_9, 9.0, f64::NAN].map(harmonic_colour);
+        assert_eq!(colours, [0, 0, 128, 199, 255, 255, 0]);
+        for byte in 0..=255u8 {
+            assert_eq!(harmonic_colour(f64::from(((f64::from(byte) / 255.0 - 0.5) / BAND_0) as f32)), u16::from(byte));
+        }
     }
 
     #[test]

@@ -8,20 +8,24 @@
 
 pub(crate) mod ascii;
 pub(crate) mod binary;
+pub(crate) mod header_lines;
 pub(crate) mod lines;
 mod names;
-mod number;
+pub(crate) mod number;
 mod probe;
 mod scan;
 mod schema;
+pub(crate) mod stream;
+pub(crate) mod text_rows;
 
 pub(crate) use names::{Role, las_type, role};
 pub(crate) use number::Endian;
 pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};
-pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage};
+pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage, Unpack};
 pub(crate) use schema::{Field, MAX_FIELDS, Property, Rule, Schema, Target};
 
-use crate::{Counted, ScanWarning};
+use crate::scan::source::Source;
+use crate::{Counted, ReadError, ScanWarning};
 
 /// Warns if the file holds another number of points than it declares; returns the number to read.
 pub(crate) fn reconcile(declared: u64, there: u64, warnings: &mut Vec<ScanWarning>) -> u64 {
@@ -29,6 +33,22 @@ pub(crate) fn reconcile(declared: u64, there: u64, warnings: &mut Vec<ScanWarnin
         warnings.push(ScanWarning::PointsMissing { declared, found: there, counted: Counted::Rows });
     }
     declared.min(there)
+}
+
+/// Bytes behind the points of a text that are looked at: blank lines are nothing.
+const BEHIND: u64 = 64 << 10;
+
+/// Warns if more than blanks follows the `declared` points of a text, which end before byte `end`.
+pub(crate) fn warn_of_bytes_behind(
+    source: &Source,
+    end: u64,
+    declared: u64,
+    warnings: &mut Vec<ScanWarning>,
+) -> Result<(), ReadError> {
+    if source.vec_at(end, BEHIND)?.iter().any(|b| *b > b' ') {
+        warnings.push(ScanWarning::BytesIgnored { declared, bytes: source.len() - end });
+    }
+    Ok(())
 }
 
 /// How finely the positions among `properties` are stored, per axis; an axis that is not there is zero.

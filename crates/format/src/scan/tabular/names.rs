@@ -15,6 +15,8 @@ pub(crate) enum Role {
     Classification,
     /// Three colours (and alpha) in the bits of one 32-bit number, as PCL stores them.
     PackedColour,
+    /// The constant part of red, green or blue of a splat's spherical harmonics.
+    Harmonic(usize),
     /// Nothing: it is skipped.
     Padding,
     /// Anything else: the name under which it is kept.
@@ -51,6 +53,9 @@ pub(crate) fn role(name: &str) -> Role {
         "intensity" => Role::Intensity,
         "classification" => Role::Classification,
         "rgb" | "rgba" => Role::PackedColour,
+        "f_dc_0" => Role::Harmonic(0),
+        "f_dc_1" => Role::Harmonic(1),
+        "f_dc_2" => Role::Harmonic(2),
         _ => Role::Other(name.trim().to_owned()),
     }
 }

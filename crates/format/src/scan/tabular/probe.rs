@@ -74,11 +74,7 @@ pub(crate) fn probe_rows(scan: &RowScan, picks: &[usize], mut visit: impl FnMut(
     let step = scan.pieces.len().div_ceil(PLACES).max(1);
     let last = scan.pieces.len().checked_sub(1);
     for (_, piece) in scan.pieces.iter().enumerate().filter(|(i, _)| i % step == 0 || Some(*i) == last) {
-        let part = if matches!(scan.storage, Storage::Lines(_)) {
-            shortened(piece)
-        } else {
-            Piece { points: piece.points.min(ROWS), ..*piece }
-        };
+        let part = if is_text(scan) { shortened(piece) } else { Piece { points: piece.points.min(ROWS), ..*piece } };
         // an error here is one in the decode, too, which reports it
         let _ = decoder.piece(&part, &mut scratch, &mut |batch| {
             if let [Column::Float64(values)] = batch.columns.as_slice() {
@@ -104,6 +100,10 @@ fn probe_schema(schema: &Schema, picks: &[usize]) -> Schema {
         fields: schema.fields.iter().enumerate().map(field).collect(),
         flat: false,
     }
+}
+
+fn is_text(scan: &RowScan) -> bool {
+    matches!(scan.storage, Storage::Lines(_) | Storage::Stream)
 }
 
 /// The first lines of a piece of text, few enough to lie inside the bytes for certain.

@@ -3,7 +3,7 @@
 use crate::{Advice, Fault};
 use std::sync::Arc;
 
-use super::ascii::{RowParser, Separator};
+use super::ascii::{RowParser, Separator, Tokens};
 use super::binary::{self, Misfit, Rows};
 use super::lines;
 use super::number::Endian;
@@ -32,6 +32,23 @@ pub(crate) enum Storage {
     Planes(Planes),
     /// Lines of numbers.
     Lines(LineRule),
+    /// Records that are made from what lies in the file.
+    Unpacked(Box<dyn Unpack>),
+    /// Numbers set apart by blanks, among which line ends count.
+    Stream,
+}
+
+/// Makes records of rows that are packed otherwise.
+pub(crate) trait Unpack: std::fmt::Debug + Send + Sync {
+    /// Replaces `out` by the little-endian records of `points` points; returns the bytes of one. `raw` is for its use.
+    fn unpack(
+        &self,
+        source: &Source,
+        first_point: u64,
+        points: usize,
+        raw: &mut Vec<u8>,
+        out: &mut Vec<u8>,
+    ) -> Result<usize, ReadError>;
 }
 
 /// A run of bytes of a record.
@@ -168,6 +185,8 @@ impl Decoder<'_> {
             }
             Storage::Planes(planes) => self.planes(piece, planes, raw, decoded, batch, sink),
             Storage::Lines(rule) => self.lines(piece, rule, raw, batch, sink),
+            Storage::Unpacked(unpack) => self.unpacked(piece, unpack.as_ref(), raw, decoded, batch, sink),
+            Storage::Stream => self.stream(piece, raw, batch, sink),
         }
     }
 
@@ -221,6 +240,28 @@ impl Decoder<'_> {
             self.prepare(batch, first_point, points);
             let filled = Rows { bytes: decoded, stride: rows.stride, endian: rows.endian };
             binary::fill(filled, &self.schema.fields, self.wanted, 0, batch)
+                .map_err(|m| self.misfit(piece.byte_offset, m))?;
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn unpacked(
+        &self,
+        piece: &Piece,
+        unpack: &dyn Unpack,
+        raw: &mut Vec<u8>,
+        decoded: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        for (first_point, points) in batches(piece, self.schema) {
+            let stride = unpack.unpack(self.source, first_point, points, raw, decoded)?;
+            self.prepare(batch, first_point, points);
+            let rows = Rows { bytes: decoded, stride, endian: Endian::Little };
+            binary::fill(rows, &self.schema.fields, self.wanted, 0, batch)
                 .map_err(|m| self.misfit(piece.byte_offset, m))?;
             if sink(batch).is_break() {
                 break;
@@ -284,6 +325,30 @@ impl Decoder<'_> {
                 parser.row(line, row, batch).map_err(|m| self.misfit(piece.byte_offset + (at + m.at) as u64, m))?;
             }
             self.pose(rule, batch);
+            if sink(batch).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn stream(
+        &self,
+        piece: &Piece,
+        raw: &mut Vec<u8>,
+        batch: &mut PointBatch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let line = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
+        let elements: Vec<_> = self.schema.attributes.iter().map(|a| a.elements).collect();
+        let (fields, wanted) = (&self.schema.fields, self.wanted);
+        let parser = RowParser { fields, wanted, separator: None, least: usize::MAX, elements: &elements };
+        let mut tokens = Tokens { line, at: 0, separator: None };
+        for (first_point, points) in batches(piece, self.schema) {
+            self.prepare(batch, first_point, points);
+            for row in 0..points {
+                parser.numbers(&mut tokens, row, batch).map_err(|m| self.misfit(piece.byte_offset + m.at as u64, m))?;
+            }
             if sink(batch).is_break() {
                 break;
             }

@@ -46,6 +46,8 @@ pub(crate) enum Target {
     Axis(usize),
     /// Element of a column.
     Value { column: usize, element: usize, rule: Rule },
+    /// The constant part of a splat's spherical harmonics: to its own column, and as element `element` of a colour.
+    Harmonic { value: usize, colour: usize, element: usize },
     /// The bits of one number to three elements of a column, and to an alpha column.
     Packed { column: usize, alpha: Option<usize> },
 }
@@ -59,6 +61,8 @@ pub(crate) enum Rule {
     Convert,
     /// 0–1 becomes 0–65535; an error if out of range.
     Unit,
+    /// A splat's harmonic becomes a colour of 0–255.
+    Harmonic,
     /// −2048…2047 becomes 0–4095 (PTS intensity).
     Shift,
 }
@@ -81,9 +85,13 @@ impl Schema {
         if count.is_none_or(|n| n > MAX_FIELDS) {
             return Err(format!("a row has more than {MAX_FIELDS} numbers"));
         }
-        let mut builder = Builder { properties, schema: Self::default(), targets: vec![Vec::new(); properties.len()] };
+        let targets = vec![Vec::new(); properties.len()];
+        let mut builder = Builder { properties, schema: Self::default(), targets, harmonics: None };
         builder.axes(warnings)?;
         builder.colours();
+        if builder.harmonics.is_some() {
+            warnings.push(ScanWarning::ColourOfHarmonics);
+        }
         builder.singles();
         builder.normals();
         builder.rest();
@@ -96,6 +104,8 @@ struct Builder<'a> {
     schema: Schema,
     /// Of each property, one for each element; empty until it is assigned.
     targets: Vec<Vec<Target>>,
+    /// The column of colours that are made of harmonics, and the properties of these.
+    harmonics: Option<(usize, [usize; 3])>,
 }
 
 impl Builder<'_> {
@@ -138,7 +148,24 @@ impl Builder<'_> {
             let with_alpha = self.properties[i].name.eq_ignore_ascii_case("rgba");
             let alpha = with_alpha.then(|| self.add("alpha", AttributeType::UInt8, 1));
             self.targets[i] = vec![Target::Packed { column, alpha }];
+        } else if let Some(i) = self.colour_array() {
+            let column = self.add("rgb", AttributeType::UInt16, 3);
+            let value = |element| Target::Value { column, element, rule: Rule::Convert };
+            self.targets[i] = (0..3).map(value).collect();
+        } else if let Some(found) = self.find_three(Role::Harmonic).filter(|found| self.are_floats(found)) {
+            self.harmonics = Some((self.add("rgb", AttributeType::UInt16, 3), found));
         }
+    }
+
+    fn are_floats(&self, properties: &[usize]) -> bool {
+        let is_float = |ty| matches!(ty, AttributeType::Float32 | AttributeType::Float64);
+        properties.iter().all(|i| is_float(self.properties[*i].ty))
+    }
+
+    /// Three small integers side by side that are called "rgb".
+    fn colour_array(&self) -> Option<usize> {
+        let is_small = |ty| matches!(ty, AttributeType::UInt8 | AttributeType::UInt16);
+        self.properties.iter().position(|p| p.role == Role::PackedColour && p.elements == 3 && is_small(p.ty))
     }
 
     fn singles(&mut self) {
@@ -174,6 +201,12 @@ impl Builder<'_> {
                 continue;
             }
             let column = self.add(names::other_name(name, *ty), *ty, *elements);
+            if let Some((colour, harmonics)) = self.harmonics
+                && let Some(element) = harmonics.iter().position(|h| *h == i)
+            {
+                self.targets[i] = vec![Target::Harmonic { value: column, colour, element }];
+                continue;
+            }
             let value = |element| Target::Value { column, element, rule: Rule::Keep };
             self.targets[i] = (0..*elements).map(value).collect();
         }

@@ -169,7 +169,7 @@ fn value_type(column: &Column, range: &ColumnRange, unit_colours: bool) -> Attri
             };
             las_type(name).filter(fits).unwrap_or(AttributeType::Float64)
         }
-        Role::Axis(_) | Role::PackedColour | Role::Padding => AttributeType::Float64,
+        Role::Axis(_) | Role::Harmonic(_) | Role::PackedColour | Role::Padding => AttributeType::Float64,
     }
 }
 

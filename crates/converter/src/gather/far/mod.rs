@@ -1,0 +1,111 @@
+//! Points so far from all others that these lose precision: 31 bits then hold the distance and not the scene.
+//!
+//! The points are looked at once more, positions alone, and only where precision was lost. What cells of the partition
+//! show ([`super::outliers`]) is too coarse for that: with one point at 1e18 all others share a cell.
+
+mod spread;
+
+use std::ops::ControlFlow;
+
+use pointmill_format::{Aabb, PointBatch, Positions, Scratch, Wanted};
+
+use self::spread::Spread;
+use crate::error::ConvertError;
+use crate::runtime::Runtime;
+use crate::sources::Sources;
+
+/// Points far from all others, and where these others are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FarPoints {
+    /// At least as many.
+    pub(super) points: u64,
+    /// The box of all others, a little larger, in round numbers.
+    pub(super) others: Aabb,
+}
+
+/// Looks for points far from all others. `cut`: only points inside are looked at; `enough`: the extent, by axis, that
+/// costs no precision.
+pub(super) fn find(
+    sources: &Sources,
+    cut: Option<&Aabb>,
+    enough: [f64; 3],
+    rt: &Runtime<'_>,
+) -> Result<Option<FarPoints>, ConvertError> {
+    let pieces =
+        sources.all.iter().enumerate().flat_map(|(s, source)| (0..source.scan.pieces().len()).map(move |p| (s, p)));
+    let pieces: Vec<(usize, usize)> = pieces.collect();
+    let parts = rt.in_parallel(
+        pieces.len(),
+        || (Default::default(), Scratch::default()),
+        |(spreads, scratch), unit| {
+            let (source, piece) = pieces[unit];
+            add_piece(sources, source, piece, cut, scratch, spreads);
+            Ok(())
+        },
+        |(spreads, _): ([Spread; 3], Scratch)| spreads,
+    )?;
+    let mut all: [Spread; 3] = Default::default();
+    for part in parts {
+        all.iter_mut().zip(part).for_each(|(a, b)| a.merge(b));
+    }
+    let mut others = Aabb::EMPTY;
+    let mut points = 0;
+    for a in 0..3 {
+        let Some(trimmed) = all[a].trimmed(enough[a]) else { return Ok(None) };
+        (others.min[a], others.max[a]) = (trimmed.min, trimmed.max);
+        points = points.max(trimmed.points);
+    }
+    let is_one_place = others.min == others.max;
+    Ok((points > 0 && !is_one_place).then(|| FarPoints { points, others: rounded_outwards(&others) }))
+}
+
+/// Pieces that cannot be decoded were reported when the points were read.
+fn add_piece(
+    sources: &Sources,
+    source: usize,
+    piece: usize,
+    cut: Option<&Aabb>,
+    scratch: &mut Scratch,
+    spreads: &mut [Spread; 3],
+) {
+    let scan = &sources.all[source].scan;
+    let wanted = Wanted::positions(scan.info());
+    let _ = scan.decode(piece, &wanted, scratch, &mut |batch: &PointBatch| {
+        let lattice = scan.info().lattice;
+        for i in 0..batch.len() {
+            let p: [f64; 3] = std::array::from_fn(|a| match (&batch.positions, &lattice) {
+                (Positions::Quantized(q), Some(l)) => f64::from(q[a][i]) * l.scale[a] + l.offset[a],
+                (Positions::Quantized(q), None) => f64::from(q[a][i]),
+                (Positions::World(w), _) => w[a][i],
+            });
+            if p.iter().all(|v| v.is_finite()) && cut.is_none_or(|cut| cut.contains(p)) {
+                spreads.iter_mut().zip(p).for_each(|(spread, v)| spread.add(v));
+            }
+        }
+        ControlFlow::Continue(())
+    });
+}
+
+/// The box with numbers of few digits: a thousandth of its longest side is the last one.
+fn rounded_outwards(b: &Aabb) -> Aabb {
+    let longest = b.extent().into_iter().fold(0.0, f64::max);
+    let decimals = if longest > 0.0 { (3.0 - longest.log10().floor()).clamp(0.0, 15.0) as usize } else { 3 };
+    let grain = 10f64.powi(-(decimals as i32));
+    let tidy = |v: f64| format!("{v:.decimals$}").parse().unwrap_or(v);
+    let down = |v: f64| tidy((v / grain).floor() * grain).min(v);
+    let up = |v: f64| tidy((v / grain).ceil() * grain).max(v);
+    Aabb { min: b.min.map(down), max: b.max.map(up) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_is_rounded_outwards_to_few_digits() {
+        let b = Aabb { min: [345_678.123, -0.1, 13.4], max: [346_678.9, 900.0, 13.4] };
+        assert_eq!(rounded_outwards(&b), Aabb { min: [345_678.0, -1.0, 13.0], max: [346_679.0, 900.0, 14.0] });
+        let degrees = Aabb { min: [13.012_345, 52.0, 0.0], max: [13.032_345, 52.01, 0.0] };
+        assert_eq!(rounded_outwards(&degrees).min[0], 13.012_34);
+    }
+}
