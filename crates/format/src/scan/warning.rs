@@ -189,7 +189,8 @@ impl ScanWarning {
                 format!("nothing says the unit of its heights; they are left as they are, beside x and y in {beside}")
             }
             Self::SplatsUnturned => {
-                "the shapes of its splats (rot_*, scale_*, f_rest_*) are as in the file; only their places are moved".to_owned()
+                "the shapes of its splats (rot_*, scale_*, f_rest_*) are as in the file; only their places are moved"
+                    .to_owned()
             }
             Self::DirectionsProjected => {
                 "normals and poses are not turned by the reprojection; they keep the directions of the scan's own axes"
