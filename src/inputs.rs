@@ -3,6 +3,8 @@
 //! The file type is detected from the content, or from the extension if the content is not recognised. A file that was
 //! named must be a scan; other files in a folder or a glob are skipped and reported.
 
+mod kind;
+
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::ffi::OsStr;
@@ -10,29 +12,38 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use pointmill_format::scan::text::TextKind;
-use pointmill_format::{ErrorKind, OpenOptions, ScanKind, supported_scans};
+use pointmill_format::{OpenOptions, supported_scans};
 
 use crate::args::InputArgs;
 use crate::exit::Failure;
 use crate::human::quantities::plural;
+use kind::{is_other, kind_by_ending, kind_in_folder};
+
+use crate::scan_choice;
+pub(crate) use kind::{Kind, kind};
 
 /// The scans to read, and notes about the search for them.
 #[derive(Debug, Default)]
 pub(crate) struct Inputs {
     /// Sorted by path, each file once.
     pub(crate) files: Vec<PathBuf>,
+    /// Files that a folder or a glob brought along and that are no scans, in order of path.
+    pub(crate) other_files: Vec<PathBuf>,
     /// One line each.
     pub(crate) notes: Vec<String>,
 }
 
-/// Whether a file is a scan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// A scan, or a file with the extension of one: its reader decides.
-    Scan,
-    /// Anything else.
-    NoScan,
+impl Inputs {
+    /// The notes, and a line for the other files: for commands that write no report.
+    pub(crate) fn all_notes(&self) -> impl Iterator<Item = String> {
+        let other = (!self.other_files.is_empty()).then(|| other_files(&self.other_files));
+        self.notes.iter().cloned().chain(other)
+    }
+}
+
+/// Says which files were skipped.
+fn other_files(files: &[PathBuf]) -> String {
+    pointmill_converter::Warning::OtherFiles { files: files.to_vec() }.to_string()
 }
 
 impl InputArgs {
@@ -48,7 +59,9 @@ impl InputArgs {
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        expand(&typed, &options)
+        let found = expand(&typed, &options)?;
+        scan_choice::check(&found.files, &options)?;
+        Ok(found)
     }
 }
 
@@ -97,10 +110,11 @@ impl Search {
     /// A file that a folder or a glob brought along.
     fn add_met_file(&mut self, path: &Path, kind: fn(&Path) -> io::Result<Kind>) {
         // A file that cannot be opened but has the extension of a scan is kept: its reader reports why, and --unreadable
-        // decides.
+        // decides. So is one of named columns.
+        let is_other = || self.options.columns.is_none() && is_other(path).unwrap_or(false);
         match kind(path).unwrap_or_else(|_| kind_by_ending(path)) {
-            Kind::Scan => self.add_scan(path),
-            Kind::NoScan => self.no_scans.push(path.to_path_buf()),
+            Kind::Scan if !is_other() => self.add_scan(path),
+            _ => self.no_scans.push(path.to_path_buf()),
         }
     }
 
@@ -112,6 +126,9 @@ impl Search {
                 Err(e) => match (e.path(), e.io_error()) {
                     (Some(path), Some(error)) if error.kind() == io::ErrorKind::NotFound => {
                         self.add_met_file(path, kind_in_folder);
+                    }
+                    (Some(path), Some(error)) if is_of_the_system(path, error) => {
+                        self.no_scans.push(path.to_path_buf())
                     }
                     (Some(path), Some(error)) => return Err(Failure::io(path, "searching the folder", error)),
                     // A link that leads back to a folder above it: what is there is found anyway.
@@ -160,75 +177,38 @@ impl Search {
         };
         let name = |path: &PathBuf| path.display().to_string();
         let examples = |paths: &[PathBuf]| paths.iter().take(3).map(name).collect();
-        note(self.no_scans.len(), "other file", "skipped, not scans", examples(&self.no_scans));
         note(self.repeated.len(), "input", "named more than once, read once", examples(&self.repeated));
 
         let mut files: Vec<PathBuf> = self.found.into_values().collect();
         files.sort();
         if files.is_empty() {
             let places: Vec<String> = typed.iter().take(3).map(name).collect();
-            let skipped = if notes.is_empty() { String::new() } else { format!("; {}", notes.join("; ")) };
+            let others = self.no_scans.first().map(|_| format!("; {}", other_files(&self.no_scans)));
+            let skipped = others.unwrap_or_default();
             return Err(Failure::Input(format!(
                 "{}: no scan found (supported: {}){skipped}",
                 places.join(", "),
                 supported_scans()
             )));
         }
-        Ok(Inputs { files, notes })
+        let mut other_files = self.no_scans;
+        other_files.sort();
+        other_files.dedup();
+        Ok(Inputs { files, other_files, notes })
     }
+}
+
+/// True for a folder that the operating system keeps on a disk and does not open.
+fn is_of_the_system(path: &Path, error: &io::Error) -> bool {
+    let names = ["lost+found", "System Volume Information", "$RECYCLE.BIN"];
+    error.kind() == io::ErrorKind::PermissionDenied
+        && path.file_name().is_some_and(|name| names.iter().any(|system| name == *system))
 }
 
 /// One path for all spellings of a file; for a broken link its own place in its folder's.
 fn identity(path: &Path) -> PathBuf {
     let in_folder = || Some(fs::canonicalize(path.parent()?).ok()?.join(path.file_name()?));
     fs::canonicalize(path).ok().or_else(in_folder).unwrap_or_else(|| path.to_path_buf())
-}
-
-/// Says what a file is, by its first bytes, else by its ending.
-pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
-    match content(path)? {
-        Some(_) => Ok(Kind::Scan),
-        None if fs::metadata(path)?.is_file() => Ok(kind_by_ending(path)),
-        None => Ok(Kind::NoScan), // a pipe, say
-    }
-}
-
-/// [`kind`] of a file that a folder brought along. Lines of numbers are many things (matrices, tracks, logs): they count
-/// as a scan if the ending says so too.
-fn kind_in_folder(path: &Path) -> io::Result<Kind> {
-    match content(path)? {
-        Some(ScanKind::Text(TextKind::Xyz | TextKind::Pts)) if !ends_with(path, &TEXT_ENDINGS) => Ok(Kind::NoScan),
-        _ => kind(path),
-    }
-}
-
-fn content(path: &Path) -> io::Result<Option<ScanKind>> {
-    ScanKind::of_file(path).map_err(|e| {
-        let line = e.to_string();
-        match e.into_kind() {
-            ErrorKind::Io(error) => error,
-            _ => io::Error::other(line),
-        }
-    })
-}
-
-/// Extensions of scans whose content may be too damaged to be recognised.
-const SCAN_ENDINGS: [&str; 8] = ["las", "laz", "e57", "ply", "pcd", "pts", "ptx", "xyz"];
-
-/// Extensions with which lines of numbers count as a scan. `txt` is not among them: name such files, or use a glob.
-const TEXT_ENDINGS: [&str; 7] = ["xyz", "asc", "csv", "xyzi", "xyzrgb", "pts", "ptx"];
-
-fn kind_by_ending(path: &Path) -> Kind {
-    // macOS leaves `._tile.laz` beside `tile.laz` on foreign disks: metadata of the Finder, no points.
-    if path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with("._")) {
-        return Kind::NoScan;
-    }
-    if ends_with(path, &SCAN_ENDINGS) { Kind::Scan } else { Kind::NoScan }
-}
-
-fn ends_with(path: &Path, endings: &[&str]) -> bool {
-    let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
-    ending.is_some_and(|e| endings.contains(&e.as_str()))
 }
 
 /// The paths in `list`, one per line; `-` is standard input.
@@ -298,9 +278,41 @@ mod tests {
         let dir = folder();
         let inputs = find(&[dir.path().to_path_buf()]).unwrap();
         assert_eq!(names(&inputs), ["b.dat", "c.ply", "a.LAZ"]);
-        let [note] = inputs.notes.as_slice() else { panic!("{:?}", inputs.notes) };
+        let [note] = &inputs.all_notes().collect::<Vec<_>>()[..] else { panic!("{:?}", inputs.other_files) };
         assert!(note.starts_with("4 other files skipped, not scans"), "{note}");
         assert!(["._b.laz", "counted.log", "matrix.txt"].iter().all(|name| note.contains(name)), "{note}");
+    }
+
+    #[test]
+    fn what_is_called_like_a_scan_and_is_none_is_skipped_in_a_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, text) in [
+            ("scan.xyz", "1 2 3\n4 5 6\n"),
+            ("scan.csv", "a,b,x,y,z\n1,2,3,4,5\n"),
+            ("broken.pts", "2\n1 2 3\n4 5\n"),
+            ("dem.asc", "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n"),
+            ("weather.csv", "time,temperature,humidity\n1,20.5,40\n2,21,41\n"),
+            ("well.las", "~Version Information\n VERS. 2.0\n"),
+            ("face.pts", "version: 1\nn_points: 2\n{\n1 2\n}\n"),
+            ("water.xyz", "3\nwater\nO 0 0 0\nH 0 0 1\nH 0 1 0\n"),
+            ("tile.las", "<html>not found</html>\n"),
+            ("tile.tfw", "1\n0\n0\n-1\n500\n600\n"),
+            ("tile.prj", "PROJCS[\"a\"]"),
+        ] {
+            fs::write(dir.path().join(name), text).unwrap();
+        }
+        fs::write(dir.path().join("cut.xyz"), [0; 20]).unwrap();
+        let inputs = find(&[dir.path().to_path_buf()]).unwrap();
+        assert_eq!(names(&inputs), ["broken.pts", "cut.xyz", "scan.csv", "scan.xyz", "tile.las"]);
+        assert_eq!(inputs.other_files.len(), 7, "{:?}", inputs.other_files);
+        let named = OpenOptions::default().columns(["t", "x", "y"]);
+        assert!(names(&expand(&[dir.path().to_path_buf()], &named).unwrap()).contains(&"weather.csv"));
+        let line = |name: &str| match find(&[dir.path().join(name)]) {
+            Err(Failure::Unsupported(line)) => line,
+            other => panic!("{name}: {other:?}"),
+        };
+        assert!(line("dem.asc").contains("an Arc/Info ASCII grid, a raster, not a scan"));
+        assert!(line("well.las").contains("a well log"));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use pointmill_format::OpenOptions;
+use pointmill_format::{Decimal, OpenOptions};
 
 use super::placing::PlacingArgs;
 use super::values::parse_separator;
@@ -40,6 +40,18 @@ pub(crate) struct ReadingArgs {
     /// Field separator of text scans: one character, or tab, space, comma, semicolon [default: detected]
     #[arg(long, value_name = "CHAR", value_parser = parse_separator, help_heading = "Reading scans")]
     pub(crate) separator: Option<char>,
+    /// Decimal mark of text scans; auto looks at a sample of the rows, and fails where it cannot tell
+    #[arg(long, value_enum, default_value = "auto", value_name = "MARK", help_heading = "Reading scans")]
+    pub(crate) decimal: DecimalArg,
+    /// Reads only this scan within the files (E57, PTX): its exact name, or its number in the file, from 1; repeat it for
+    /// more scans. Other kinds of files are read whole [default: all scans]
+    #[arg(
+        long = "scan",
+        value_name = "NAME|N",
+        value_parser = clap::builder::NonEmptyStringValueParser::new(),
+        help_heading = "Reading scans"
+    )]
+    pub(crate) scans: Vec<String>,
     /// Keeps rowIndex and columnIndex of E57 scans as attributes
     #[arg(long, help_heading = "Reading scans")]
     pub(crate) row_column: bool,
@@ -56,10 +68,31 @@ impl ReadingArgs {
         }
         let mut options = OpenOptions::default().keep_row_column(self.row_column);
         (options.columns, options.separator) = (self.columns.clone(), self.separator);
+        options.decimal = self.decimal.into();
+        options.scans = (!self.scans.is_empty()).then(|| self.scans.clone());
         if let Some(placing) = self.placing.placing()? {
             options = options.maps(placing);
         }
         Ok(options)
+    }
+}
+
+/// What stands before the decimals of a number.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DecimalArg {
+    #[default]
+    Auto,
+    Point,
+    Comma,
+}
+
+impl From<DecimalArg> for Decimal {
+    fn from(arg: DecimalArg) -> Self {
+        match arg {
+            DecimalArg::Auto => Self::Auto,
+            DecimalArg::Point => Self::Point,
+            DecimalArg::Comma => Self::Comma,
+        }
     }
 }
 

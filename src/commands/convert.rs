@@ -4,14 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Outliers, Plan,
-    Potree2Settings, RgbDepth, Sampling, ScaleChoice, Target,
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, OriginPoints, Outliers,
+    Plan, Potree2Settings, RgbDepth, Sampling, ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
 use crate::args::{
     Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
-    OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
@@ -131,6 +131,7 @@ fn batches_settings(args: &BatchesArgs) -> BatchesSettings {
 fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
     let mut plan = Plan::new(inputs.files, args.output.clone());
+    plan.other_files = inputs.other_files;
     plan.open = args.inputs.options()?;
     plan.name = name;
     plan.attributes = match &args.attributes {
@@ -140,7 +141,11 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         Some(Attributes::List(names)) => AttributeChoice::List(names.clone()),
     };
     plan.scale = args.scale.0.map_or(ScaleChoice::Auto, ScaleChoice::Fixed);
-    plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every };
+    let origin_points = match args.origin_points {
+        OriginPointsArg::Keep => OriginPoints::Keep,
+        OriginPointsArg::Skip => OriginPoints::Skip,
+    };
+    plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every, origin_points };
     plan.duplicates = match args.duplicates {
         DuplicatesArg::Keep => Duplicates::Keep,
         DuplicatesArg::Drop => Duplicates::Drop,
@@ -243,7 +248,7 @@ mod tests {
         let args = Args::parse_from(["pointmill", "convert", "a.las", "-o", "out"]);
         let Command::Convert(args) = args.command else { panic!() };
         let files = vec![PathBuf::from("a.las")];
-        let inputs = Inputs { files: files.clone(), notes: Vec::new() };
+        let inputs = Inputs { files: files.clone(), ..Inputs::default() };
         let given = plan(&args, inputs).unwrap();
         let octree: Target = Potree2Settings::default().into();
         assert_eq!(format!("{:?}", targets(&args).unwrap()), format!("{:?}", [octree]));

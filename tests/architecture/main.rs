@@ -32,7 +32,13 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
     ),
     (
         "pointmill-validate",
-        &[&["check", "place"], &["finding"], &["options", "outcome"], &["against"], &["potree2", "bintree", "batches"]],
+        &[
+            &["check", "place"],
+            &["finding"],
+            &["options", "accuracy", "outcome"],
+            &["against"],
+            &["potree2", "bintree", "batches"],
+        ],
     ),
     (
         "pointmill-converter",

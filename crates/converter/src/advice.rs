@@ -33,10 +33,14 @@ pub enum Advice {
     },
     /// Skip points without a valid position.
     SkipInvalid,
+    /// Skip points exactly at the origin of their scan.
+    SkipOriginPoints,
     /// Use the colour depth that was detected.
     DetectRgbDepth,
     /// State the colour depth.
     SetRgbDepth,
+    /// State that commas of a text separate columns.
+    CommasSeparate,
     /// Name the coordinate reference system by its EPSG code.
     NameEpsg,
     /// Give the coordinate reference system as a proj4 definition.
@@ -74,8 +78,10 @@ impl fmt::Display for Advice {
             Self::KeepDuplicates => "keep duplicates, or convert to potree2",
             Self::CutBounds { bounds: None } => "limit the bounds to leave them out, or correct the input",
             Self::SkipInvalid => "skip invalid points to leave such points out",
+            Self::SkipOriginPoints => "skip points at the origin of their scan to leave them out",
             Self::DetectRgbDepth => "let the colour depth be detected",
             Self::SetRgbDepth => "state the colour depth to override this",
+            Self::CommasSeparate => "say so if they separate columns",
             Self::NameEpsg => "name the EPSG code if viewers need the projection",
             Self::GiveProj4 => "give a proj4 definition if viewers need the projection",
             Self::Reproject => "reproject the inputs, or name one system for all",

@@ -8,7 +8,7 @@ use crate::error::ConvertError;
 use crate::gather::{Demand, gather};
 use crate::outputs::{self, StagedFolder, Target};
 use crate::plan::Plan;
-use crate::report::{self, Account, Report};
+use crate::report::{self, Account, OtherFilesReport, Report};
 use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemDisk, TempFiles};
 use crate::sources::{Sources, resolve_crs_of_all};
 
@@ -61,8 +61,13 @@ pub fn convert_on(
     }
 
     clock.begin(Phase::Finish, 0);
-    let account =
-        Account { settings: settings(plan, targets), outputs, phases: clock.finish(), seconds: clock.seconds() };
+    let account = Account {
+        settings: settings(plan, targets),
+        other_files: OtherFilesReport::new(&plan.other_files),
+        outputs,
+        phases: clock.finish(),
+        seconds: clock.seconds(),
+    };
     let report = report::report(&cloud, account)?;
     let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
     staged.write_report(&text)?;

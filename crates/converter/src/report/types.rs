@@ -7,6 +7,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::accuracy::Accuracy;
 use crate::reason::GridReason;
 use crate::warning::Warning;
 
@@ -20,12 +21,14 @@ pub struct Report {
     pub options: Map<String, Value>,
     /// One entry per input, in order of path.
     pub inputs: Vec<InputReport>,
+    /// Files that were found with the inputs and are no scans.
+    pub other_files: OtherFilesReport,
     /// The lattice of the output.
     pub grid: GridReport,
     /// Every point accounted for.
     pub points: PointsReport,
-    /// Largest and RMS change of a coordinate, per axis, world units.
-    pub coordinate_change: CoordinateChange,
+    /// Places that very many points share (16 or more, and at least one in a hundred), the fullest first.
+    pub shared_places: Vec<SharedPlaceReport>,
     /// One entry per attribute that was read, in the order of the stored records.
     pub attributes: Vec<AttributeReport>,
     /// One entry per dataset written, in the order requested.
@@ -58,6 +61,8 @@ pub struct OutputReport {
     pub points: u64,
     /// Points that were dropped because all of their values repeat.
     pub duplicates_dropped: u64,
+    /// How far the positions that a reader decodes are from those of the sources.
+    pub accuracy: Accuracy,
     /// Attributes that were kept.
     pub attributes: Vec<String>,
     /// Attributes that were omitted, and why.
@@ -94,6 +99,9 @@ pub struct InputReport {
     pub points_declared: u64,
     /// Decoded.
     pub points_read: u64,
+    /// Decoded, and exactly at the origin of their scan: where the scanner stood, by the pose of the scan; (0, 0, 0) in
+    /// files without poses.
+    pub points_at_origin: u64,
     /// Claimed by the header: min x y z, max x y z.
     pub bounds_declared: Option<[f64; 6]>,
     /// Of the points decoded, before any filter.
@@ -170,6 +178,26 @@ impl From<Changes> for ChangedValues {
     }
 }
 
+/// Files that were found with the inputs and are no scans.
+#[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
+pub struct OtherFilesReport {
+    /// How many.
+    pub count: u64,
+    /// The first hundred in order of path, with U+FFFD for what is no Unicode in a name.
+    pub paths: Vec<String>,
+}
+
+impl OtherFilesReport {
+    /// Paths that are listed.
+    const LISTED: usize = 100;
+
+    pub(crate) fn new(files: &[PathBuf]) -> Self {
+        let paths = files.iter().take(Self::LISTED).map(|f| f.to_string_lossy().into_owned());
+        Self { count: files.len() as u64, paths: paths.collect() }
+    }
+}
+
 /// File names need not be Unicode, JSON must be.
 fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
@@ -189,7 +217,8 @@ pub struct GridReport {
     pub why: GridReason,
 }
 
-/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid`, and for every output
+/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid + at_origin`, and
+/// for every output
 /// `kept = points + duplicates_dropped`. All are counted, none is a difference; the run fails where a sum is wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]
@@ -208,18 +237,20 @@ pub struct PointsReport {
     pub thinned: u64,
     /// Without a valid position.
     pub invalid: u64,
+    /// Exactly at the origin of their scan, and skipped for it.
+    pub at_origin: u64,
     /// Declared, but in parts of inputs that could not be decoded.
     pub unreadable: u64,
 }
 
-/// Coordinate change by moving to the output lattice.
+/// A place that very many points share.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]
-pub struct CoordinateChange {
-    /// Largest, world units.
-    pub max: [f64; 3],
-    /// Root of the mean square, world units.
-    pub rms: [f64; 3],
+pub struct SharedPlaceReport {
+    /// World coordinates.
+    pub position: [f64; 3],
+    /// Points of the cloud that lie there.
+    pub points: u64,
 }
 
 /// An attribute that is not in the dataset. Serialises to its name, why as text, and the constant if there is one.

@@ -19,6 +19,8 @@ pub enum Fault {
         /// "a gzip file", "a ZIP archive", ….
         what: &'static str,
     },
+    /// The file is something else, not a scan: "an Arc/Info ASCII grid, a raster".
+    OtherKind(String),
     /// The format is known, this version of it is not.
     UnknownVersion {
         /// "LAS", "E57", ….
@@ -104,6 +106,7 @@ impl fmt::Display for Fault {
                 write!(f, "called .{extension}, but it is no scan that is known here")
             }
             Self::Archive { what } => write!(f, "this is {what}, not a scan"),
+            Self::OtherKind(what) => write!(f, "this is {what}, not a scan"),
             Self::UnknownVersion { format, found: (major, minor), known } => {
                 write!(f, "{format} version {major}.{minor} is not known ({known})")
             }

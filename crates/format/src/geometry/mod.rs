@@ -3,6 +3,7 @@
 mod aabb;
 mod affine;
 mod axis_grid;
+mod deviations;
 mod lattice;
 pub(crate) mod morton;
 mod node_key;
@@ -10,5 +11,6 @@ mod node_key;
 pub use aabb::Aabb;
 pub use affine::{Affine, AffineFault};
 pub use axis_grid::AxisGrid;
+pub use deviations::Deviations;
 pub use lattice::Lattice;
 pub use node_key::NodeKey;

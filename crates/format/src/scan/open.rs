@@ -9,7 +9,8 @@ use std::sync::Arc;
 
 use super::archive::archive;
 use super::mapped::{ScanMaps, mapped};
-use crate::{Advice, Fault, ReadError, Scan, UnknownName};
+use super::other_kind::OtherKind;
+use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
 
 /// Maximum bytes from the start of a file to detect its kind; text needs some lines.
 const SNIFF_BYTES: u64 = 4 << 10;
@@ -50,8 +51,16 @@ pub struct OpenOptions {
     pub columns: Option<Vec<String>>,
     /// Text: what stands between two fields; `None`: found. A blank means any blanks.
     pub separator: Option<char>,
+    /// Text: what stands before the decimals of a number.
+    pub decimal: Decimal,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
+    /// E57, PTX: the scans within a file that are read, each by name or number ([`crate::scans_named`]); `None`: all.
+    /// Files of other kinds have no scans within them and are read whole.
+    pub scans: Option<Vec<String>>,
+    /// Bytes of memory that the description of a file's scans may take while it is opened (the XML section of E57);
+    /// `None`: 1 GiB.
+    pub description_bytes: Option<u64>,
     /// What becomes of the points; `None`: they stay where they are.
     pub maps: Option<Arc<dyn ScanMaps>>,
 }
@@ -71,10 +80,31 @@ impl OpenOptions {
         self
     }
 
+    /// Sets [`Self::decimal`].
+    #[must_use]
+    pub fn decimal(mut self, decimal: Decimal) -> Self {
+        self.decimal = decimal;
+        self
+    }
+
     /// Sets [`Self::keep_row_column`].
     #[must_use]
     pub fn keep_row_column(mut self, keep: bool) -> Self {
         self.keep_row_column = keep;
+        self
+    }
+
+    /// Sets [`Self::scans`].
+    #[must_use]
+    pub fn scans<N: Into<String>>(mut self, choices: impl IntoIterator<Item = N>) -> Self {
+        self.scans = Some(choices.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Sets [`Self::description_bytes`].
+    #[must_use]
+    pub fn description_bytes(mut self, bytes: u64) -> Self {
+        self.description_bytes = Some(bytes);
         self
     }
 
@@ -129,7 +159,7 @@ impl ScanKind {
         }
         // last: a binary file may hold lines of numbers, too
         #[cfg(feature = "text")]
-        if let Some(kind) = crate::scan::text::kind(first_bytes) {
+        if let Some(kind) = crate::scan::text::kind(first_bytes).filter(|_| OtherKind::of(first_bytes).is_none()) {
             return Some(Self::Text(kind));
         }
         None
@@ -216,9 +246,11 @@ fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, Re
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
-        // Columns were named for it: then it is text, if it can be.
+        // Columns were named for it, by the user or in it: then it is text, if it can be.
         #[cfg(feature = "text")]
-        None if options.columns.is_some() && !first.is_empty() && !first.contains(&0) => {
+        None if (options.columns.is_some() && !first.is_empty() && !first.contains(&0))
+            || crate::scan::text::has_titles(&first) =>
+        {
             ScanKind::Text(crate::scan::text::TextKind::Xyz)
         }
         None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {
@@ -230,19 +262,23 @@ fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, Re
         #[cfg(feature = "las")]
         ScanKind::Las => crate::scan::las::open(path),
         #[cfg(feature = "e57")]
-        ScanKind::E57 => crate::scan::e57::open_with(
-            path,
-            crate::scan::e57::E57Options::default().keep_row_column(options.keep_row_column),
-        ),
+        ScanKind::E57 => {
+            let e57 = crate::scan::e57::E57Options::default()
+                .keep_row_column(options.keep_row_column)
+                .scans(options.scans.clone());
+            let max_xml = options.description_bytes.unwrap_or(e57.max_xml);
+            crate::scan::e57::open_with(path, e57.max_xml(max_xml))
+        }
         #[cfg(feature = "ply")]
         ScanKind::Ply => crate::scan::ply::open(path),
         #[cfg(feature = "pcd")]
         ScanKind::Pcd => crate::scan::pcd::open(path),
         #[cfg(feature = "text")]
         ScanKind::Text(_) => {
-            let options =
-                crate::scan::text::TextOptions { columns: options.columns.clone(), separator: options.separator };
-            crate::scan::text::open(path, &options)
+            let choices = options.scans.as_deref();
+            let OpenOptions { columns, separator, decimal, .. } = options.clone();
+            let scan = crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })?;
+            Ok(super::partial::choose(scan, choices))
         }
     }
 }
@@ -265,6 +301,12 @@ fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let supported = Advice::Supported(supported_scans());
     if let Some(what) = archive(first) {
         return ReadError::unsupported(path, Fault::Archive { what }).advise(Advice::Unpack);
+    }
+    if let Some(other) = OtherKind::of(first) {
+        return ReadError::unsupported(path, Fault::OtherKind(other.to_string())).advise(supported);
+    }
+    if cfg!(feature = "text") && (first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff])) {
+        return ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8");
     }
     match ending.filter(|e| is_ending_of_scans(e)) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),

@@ -8,3 +8,4 @@ mod golden;
 mod hand_made;
 mod pcd;
 mod ply;
+mod text_kinds;

@@ -1,7 +1,7 @@
 //! Rows written as text to columns.
 
 use super::binary::{Misfit, harmonic_colour, out_of_range, unpack};
-use super::number::{Number, unit_to_u16};
+use super::number::{Number, count_change, unit_to_u16};
 use super::schema::{Field, Rule, Target};
 use crate::{AttributeType, Changes, Column, Element, PointBatch, Positions, Wanted};
 
@@ -13,6 +13,8 @@ pub(crate) struct RowParser<'a> {
     pub(crate) fields: &'a [Field],
     pub(crate) wanted: &'a Wanted,
     pub(crate) separator: Separator,
+    /// See [`Tokens::strict`].
+    pub(crate) strict: bool,
     /// Least fields per line; missing ones are 0.
     pub(crate) least: usize,
     /// Elements of each column.
@@ -22,7 +24,7 @@ pub(crate) struct RowParser<'a> {
 impl RowParser<'_> {
     /// Writes a line to row `row` of the batch, whose columns have room.
     pub(crate) fn row(&self, line: &[u8], row: usize, batch: &mut PointBatch) -> Result<(), Misfit> {
-        let mut tokens = Tokens { line, at: 0, separator: self.separator };
+        let mut tokens = Tokens { line, at: 0, separator: self.separator, strict: self.strict };
         self.numbers(&mut tokens, row, batch)?;
         let at = tokens.start();
         if !tokens.is_empty() {
@@ -44,8 +46,12 @@ impl RowParser<'_> {
             let at = tokens.start();
             let is_missing = at == tokens.line.len();
             if is_missing && i >= self.least {
-                let mut zero = Tokens { line: b"0", at: 0, separator: None };
-                self.field(field, &mut zero, row, batch).map_err(|what| fail(at, what))?;
+                self.field(field, &mut Tokens::of(b"0"), row, batch).map_err(|what| fail(at, what))?;
+                continue;
+            }
+            if is_missing && i + 1 == self.fields.len() && tokens.ends_with_separator() {
+                // the last field is empty, which is NaN as anywhere else in the line
+                self.field(field, &mut Tokens::of(b""), row, batch).map_err(|what| fail(at, what))?;
                 continue;
             }
             if is_missing {
@@ -70,7 +76,11 @@ impl RowParser<'_> {
             }
             Target::Value { column, element, rule } if self.wanted.is_wanted(column) => {
                 let index = row * self.elements[column] + element;
-                self.value(field.ty, rule, tokens, index, &mut batch.columns[column])?;
+                if let Some(v) = self.value(field.ty, rule, tokens, index, &mut batch.columns[column])? {
+                    let mut changes = Changes::default();
+                    count_change(v, rule == Rule::Unit, &mut changes);
+                    batch.count_changes(column, &changes);
+                }
             }
             Target::Packed { column, alpha } => {
                 let start = tokens.start();
@@ -108,6 +118,7 @@ impl RowParser<'_> {
         Ok(())
     }
 
+    /// Stores the next number; `Some` if its column cannot hold it as it is.
     #[inline]
     fn value(
         &self,
@@ -116,10 +127,13 @@ impl RowParser<'_> {
         tokens: &mut Tokens<'_>,
         index: usize,
         column: &mut Column,
-    ) -> Result<(), String> {
+    ) -> Result<Option<f64>, String> {
         macro_rules! integer {
             ($out:ident, $t:ty) => {{
-                let v = tokens.integer(ty)?;
+                let Some(v) = tokens.integer(ty)? else {
+                    store($out, index, 0);
+                    return Ok(Some(f64::NAN));
+                };
                 store(
                     $out,
                     index,
@@ -130,12 +144,18 @@ impl RowParser<'_> {
         match (rule, column) {
             (_, Column::Float64(out)) => store(out, index, tokens.number()?),
             (_, Column::Float32(out)) => store(out, index, tokens.number()? as f32),
-            (Rule::Unit, Column::UInt16(out)) => store_checked(out, index, tokens.number()?, rule, unit_to_u16)?,
-            (Rule::Shift, Column::UInt16(out)) => {
-                store_checked(out, index, tokens.number()?, rule, |v| (v + 2048.0).as_u16())?;
+            (Rule::Unit, Column::UInt16(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, unit_to_u16);
             }
-            (Rule::Convert, Column::UInt16(out)) => store_checked(out, index, tokens.number()?, rule, f64::as_u16)?,
-            (Rule::Convert, Column::UInt8(out)) => store_checked(out, index, tokens.number()?, rule, f64::as_u8)?,
+            (Rule::Shift, Column::UInt16(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, |v| (v + 2048.0).as_u16());
+            }
+            (Rule::Convert, Column::UInt16(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, f64::as_u16);
+            }
+            (Rule::Convert, Column::UInt8(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, f64::as_u8);
+            }
             (_, Column::Int8(out)) => integer!(out, i8),
             (_, Column::UInt8(out)) => integer!(out, u8),
             (_, Column::Int16(out)) => integer!(out, i16),
@@ -145,7 +165,7 @@ impl RowParser<'_> {
             (_, Column::Int64(out)) => integer!(out, i64),
             (_, Column::UInt64(out)) => integer!(out, u64),
         }
-        Ok(())
+        Ok(None)
     }
 }
 
@@ -170,15 +190,23 @@ fn store<T>(out: &mut [T], index: usize, v: T) {
     }
 }
 
-fn store_checked<T>(
+/// Stores a converted number; `Some` if that is not the number itself.
+fn store_checked<T: Number>(
     out: &mut [T],
     index: usize,
     v: f64,
     rule: Rule,
     convert: impl Fn(f64) -> Option<T>,
-) -> Result<(), String> {
-    store(out, index, convert(v).ok_or_else(|| out_of_range(v, rule))?);
-    Ok(())
+) -> Result<Option<f64>, String> {
+    let stored = convert(v).ok_or_else(|| out_of_range(v, rule))?;
+    store(out, index, stored);
+    let is_kept = match rule {
+        Rule::Unit => (0.0..=1.0).contains(&v),
+        Rule::Shift => stored.as_f64() - 2048.0 == v,
+        Rule::Harmonic => true,
+        Rule::Keep | Rule::Convert => stored.as_f64() == v,
+    };
+    Ok((!is_kept).then_some(v))
 }
 
 /// Values side by side, if the column is of their type and not omitted.
@@ -193,9 +221,21 @@ pub(crate) struct Tokens<'a> {
     pub(crate) line: &'a [u8],
     pub(crate) at: usize,
     pub(crate) separator: Separator,
+    /// Blanks alone do not separate where there is a separator: text may hold them, numbers may not.
+    pub(crate) strict: bool,
 }
 
 impl<'a> Tokens<'a> {
+    /// Numbers between blanks.
+    pub(crate) fn of(line: &'a [u8]) -> Self {
+        Self { line, at: 0, separator: None, strict: false }
+    }
+
+    /// True if the line ends with a separator, so that its last field is empty.
+    fn ends_with_separator(&self) -> bool {
+        self.strict && self.separator.is_some() && self.line.trim_ascii_end().last().copied() == self.separator
+    }
+
     /// Passes over blanks; where the next token starts.
     #[inline]
     fn start(&mut self) -> usize {
@@ -218,24 +258,35 @@ impl<'a> Tokens<'a> {
     /// The bytes up to the next separator, which is skipped; without quotes.
     pub(crate) fn token(&mut self) -> &'a [u8] {
         let start = self.start();
-        if self.line.get(start) == Some(&b'"') {
-            let rest = &self.line[start + 1..];
-            let len = memchr::memchr(b'"', rest).unwrap_or(rest.len());
+        let rest = &self.line[start..];
+        if rest.first() == Some(&b'"') {
+            let len = quoted_len(&rest[1..]);
             self.at = (start + len + 2).min(self.line.len());
             self.pass_separator();
-            return &rest[..len];
+            return &rest[1..=len];
         }
-        let rest = &self.line[start..];
-        let len = rest.iter().position(|b| self.ends_token(*b)).unwrap_or(rest.len());
+        let len = match self.separator.filter(|_| self.strict) {
+            Some(separator) => memchr::memchr(separator, rest).unwrap_or(rest.len()),
+            None => rest.iter().position(|b| self.ends_token(*b)).unwrap_or(rest.len()),
+        };
         self.at = start + len;
         self.pass_separator();
-        &rest[..len]
+        rest[..len].trim_ascii_end()
     }
 
+    /// False if a strict line goes on without a separator.
     #[inline]
-    fn pass_separator(&mut self) {
-        if self.separator.is_some() && self.line.get(self.start()).copied() == self.separator {
-            self.at += 1;
+    fn pass_separator(&mut self) -> bool {
+        if self.separator.is_none() {
+            return true;
+        }
+        match self.line.get(self.start()).copied() {
+            None => true,
+            next if next == self.separator => {
+                self.at += 1;
+                true
+            }
+            Some(_) => !self.strict,
         }
     }
 
@@ -249,8 +300,10 @@ impl<'a> Tokens<'a> {
         let start = self.start();
         if let Some((v, len)) = short_decimal(&self.line[start..], self.separator) {
             self.at = start + len;
-            self.pass_separator();
-            return Ok(v);
+            if self.pass_separator() {
+                return Ok(v);
+            }
+            self.at = start;
         }
         self.any_number(start)
     }
@@ -261,28 +314,31 @@ impl<'a> Tokens<'a> {
             let end = start + len;
             if self.line.get(end).is_none_or(|b| self.ends_token(*b)) {
                 self.at = end;
-                self.pass_separator();
-                return Ok(v);
+                if self.pass_separator() {
+                    return Ok(v);
+                }
+                self.at = start;
             }
         }
         parse(self.token())
     }
 
-    /// The next number as an integer of up to 64 bits; "255.0" is one.
-    fn integer(&mut self, ty: AttributeType) -> Result<i128, String> {
-        if ty.size() < 8 {
-            let v = self.number()?;
-            if v.fract() != 0.0 {
-                return Err(format!("{v} is not an integer"));
+    /// The next number as an integer of up to 64 bits; "255.0" is one. `None`: not a number, or an empty field.
+    fn integer(&mut self, ty: AttributeType) -> Result<Option<i128>, String> {
+        let v = if ty.size() < 8 {
+            self.number()?
+        } else {
+            let token = self.token();
+            if let Some(v) = std::str::from_utf8(token).ok().and_then(|t| t.parse().ok()) {
+                return Ok(Some(v));
             }
-            return Ok(v as i128);
+            parse(token)?
+        };
+        match v {
+            v if v.is_nan() => Ok(None),
+            v if v.fract() != 0.0 => Err(format!("{v} is not an integer")),
+            v => Ok(Some(v as i128)),
         }
-        let token = self.token();
-        if let Some(v) = std::str::from_utf8(token).ok().and_then(|t| t.parse().ok()) {
-            return Ok(v);
-        }
-        let v = parse(token)?;
-        if v.fract() != 0.0 { Err(format!("{v} is not an integer")) } else { Ok(v as i128) }
     }
 }
 
@@ -319,12 +375,27 @@ fn short_decimal(bytes: &[u8], separator: Separator) -> Option<(f64, usize)> {
     Some((if negative { -v } else { v }, at))
 }
 
+/// Bytes up to the closing quote; a doubled quote is one of the text.
+fn quoted_len(rest: &[u8]) -> usize {
+    let mut at = 0;
+    while let Some(quote) = memchr::memchr(b'"', rest.get(at..).unwrap_or_default()) {
+        if rest.get(at + quote + 1) != Some(&b'"') {
+            return at + quote;
+        }
+        at += quote + 2;
+    }
+    rest.len()
+}
+
+/// What R, pandas and databases write for "no value".
+const NO_VALUE: [&[u8]; 8] = [b"NA", b"N/A", b"#N/A", b"<NA>", b"NULL", b"Null", b"null", b"None"];
+
 /// A number in any spelling; Microsoft's runtime writes NaN and infinity as "1.#IND", "-1.#INF".
 pub(crate) fn parse(token: &[u8]) -> Result<f64, String> {
     if let Ok(v) = fast_float2::parse::<f64, _>(token) {
         return Ok(v);
     }
-    if token.is_empty() {
+    if token.is_empty() || NO_VALUE.contains(&token) {
         return Ok(f64::NAN);
     }
     let unsigned = token.strip_prefix(b"-").unwrap_or(token);
@@ -345,7 +416,14 @@ mod tests {
     use super::*;
 
     fn numbers(line: &str, separator: Separator) -> Result<Vec<f64>, String> {
-        let mut tokens = Tokens { line: line.as_bytes(), at: 0, separator };
+        read(&mut Tokens { line: line.as_bytes(), at: 0, separator, strict: false })
+    }
+
+    fn strict(line: &str) -> Result<Vec<f64>, String> {
+        read(&mut Tokens { line: line.as_bytes(), at: 0, separator: Some(b','), strict: true })
+    }
+
+    fn read(tokens: &mut Tokens<'_>) -> Result<Vec<f64>, String> {
         let mut list = Vec::new();
         while !tokens.is_empty() {
             list.push(tokens.number()?);
@@ -375,6 +453,24 @@ mod tests {
         assert_eq!(numbers("1 two", None), Err("\"two\" is not a number".to_owned()));
         assert_eq!(numbers("1.5x", None), Err("\"1.5x\" is not a number".to_owned()));
         assert_eq!(numbers("1,2", None), Err("\"1,2\" is not a number".to_owned()));
+    }
+
+    #[test]
+    fn blanks_alone_separate_only_where_the_line_is_not_strict() {
+        assert_eq!(strict("1 , 2,3 ").unwrap(), [1.0, 2.0, 3.0]);
+        assert_eq!(numbers("1,5 2", Some(b',')).unwrap(), [1.0, 5.0, 2.0]);
+        for line in ["1,5 2", "1,1e3 2", "1,\"5\" 2"] {
+            assert!(strict(line).is_err(), "{line}");
+        }
+        let mut tokens =
+            Tokens { line: b"\"a \"\"b\"\", c\", 1 Jan 2020 , 7", at: 0, separator: Some(b','), strict: true };
+        assert_eq!([tokens.token(), tokens.token(), tokens.token()], [&b"a \"\"b\"\", c"[..], b"1 Jan 2020", b"7"]);
+    }
+
+    #[test]
+    fn what_stands_for_no_value_is_nan() {
+        assert!(strict("NA,,NULL,<NA>,None,N/A").unwrap().iter().all(|v| v.is_nan()));
+        assert!(numbers("NAN1", None).is_err());
     }
 
     #[test]
@@ -412,8 +508,8 @@ mod tests {
 
     #[test]
     fn wide_integers_keep_every_bit() {
-        let mut tokens = Tokens { line: b"18446744073709551615 2.0", at: 0, separator: None };
-        assert_eq!(tokens.integer(AttributeType::UInt64), Ok(i128::from(u64::MAX)));
-        assert_eq!(tokens.integer(AttributeType::Int64), Ok(2));
+        let mut tokens = Tokens::of(b"18446744073709551615 2.0");
+        assert_eq!(tokens.integer(AttributeType::UInt64), Ok(Some(i128::from(u64::MAX))));
+        assert_eq!(tokens.integer(AttributeType::Int64), Ok(Some(2)));
     }
 }

@@ -27,7 +27,18 @@ pub(crate) fn is_filled(line: &[u8]) -> bool {
     line.first().is_some_and(|b| *b > b' ') || line.iter().any(|b| *b > b' ')
 }
 
-/// Without the line end (LF or CR LF).
+/// Bytes that show how lines end.
+const END_BYTES: usize = 4 << 10;
+
+/// The last byte of each line: CR where most of the first lines end with it alone (old Macintosh), else LF.
+pub(crate) fn line_end(bytes: &[u8]) -> u8 {
+    let head = &bytes[..bytes.len().min(END_BYTES)];
+    let is_alone = |at: &usize| head.get(at + 1).is_none_or(|next| *next != b'\n');
+    let alone = memchr_iter(b'\r', head).filter(is_alone).count();
+    if alone > memchr_iter(b'\n', head).count() { b'\r' } else { b'\n' }
+}
+
+/// Without the line end (LF, CR LF or CR).
 pub(crate) fn trim_end(line: &[u8]) -> &[u8] {
     let line = line.strip_suffix(b"\n").unwrap_or(line);
     line.strip_suffix(b"\r").unwrap_or(line)
@@ -41,11 +52,12 @@ pub(crate) fn walk(
     from: u64,
     mut visit: impl FnMut(u64, &[u8]) -> Result<bool, ReadError>,
 ) -> Result<u64, ReadError> {
-    let (mut at, mut buf, mut size) = (from, Vec::new(), FIRST_WINDOW);
+    let (mut at, mut buf, mut size, mut known) = (from, Vec::new(), FIRST_WINDOW, None);
     while at < source.len() {
         let window = source.slice_at(at, size.min(source.len() - at), &mut buf)?;
         let is_last = at + window.len() as u64 == source.len();
-        let whole = match memrchr(b'\n', window) {
+        let line_end = known.unwrap_or_else(|| line_end(window));
+        let whole = match memrchr(line_end, window) {
             _ if is_last => window.len(),
             Some(newline) => newline + 1,
             None if size < WINDOW => {
@@ -54,10 +66,11 @@ pub(crate) fn walk(
             }
             None => return Err(endless_line(source, at)),
         };
+        known = Some(line_end);
         size = (size * 4).min(WINDOW);
         let mut start = 0;
-        let ends = memchr_iter(b'\n', &window[..whole]).map(|n| n + 1);
-        for end in ends.chain((is_last && !window.ends_with(b"\n")).then_some(whole)) {
+        let ends = memchr_iter(line_end, &window[..whole]).map(|n| n + 1);
+        for end in ends.chain((is_last && !window.ends_with(&[line_end])).then_some(whole)) {
             if !visit(at + start as u64, trim_end(&window[start..end]))? {
                 return Ok(at + start as u64);
             }
@@ -155,10 +168,10 @@ impl Cutter {
 
 /// The lines of `bytes`, each with its place and without its line end.
 pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
-    let mut start = 0;
+    let (mut start, line_end) = (0, line_end(bytes));
     std::iter::from_fn(move || {
         let rest = bytes.get(start..).filter(|r| !r.is_empty())?;
-        let end = memchr(b'\n', rest).map_or(rest.len(), |n| n + 1);
+        let end = memchr(line_end, rest).map_or(rest.len(), |n| n + 1);
         let line = (start, trim_end(&rest[..end]));
         start += end;
         Some(line)
@@ -187,6 +200,17 @@ mod tests {
         assert_eq!((index.rows, index.end), (3, text.len() as u64));
         assert_eq!(index.pieces, [Piece { first_point: 0, points: 3, byte_offset: 0, byte_len: text.len() as u64 }]);
         assert_eq!(lines(text).map(|(_, l)| l.len()).collect::<Vec<_>>(), [1, 0, 1, 2, 1]);
+    }
+
+    #[test]
+    fn lines_may_end_with_cr_alone() {
+        let text = b"1 2\r3 4\r\r5 6";
+        let found: Vec<_> = lines(text).map(|(at, line)| (at, line.len())).collect();
+        assert_eq!(found, [(0, 3), (4, 3), (8, 0), (9, 3)]);
+        assert_eq!(index(&source(text), 0, u64::MAX, is_filled).unwrap().rows, 3);
+        let long = [b"1".repeat(5000), b"\r2\r".to_vec()].concat();
+        assert_eq!(index(&source(&long), 0, u64::MAX, is_filled).unwrap().rows, 2);
+        assert_eq!((line_end(b"1\r\n2\r\n3\r"), line_end(b"1 2"), line_end(b"1\r2\r3\n")), (b'\n', b'\n', b'\r'));
     }
 
     #[test]

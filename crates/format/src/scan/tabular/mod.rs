@@ -8,6 +8,7 @@
 
 pub(crate) mod ascii;
 pub(crate) mod binary;
+mod decimal_mark;
 pub(crate) mod header_lines;
 pub(crate) mod lines;
 mod names;
@@ -18,6 +19,7 @@ mod schema;
 pub(crate) mod stream;
 pub(crate) mod text_rows;
 
+pub(crate) use decimal_mark::DecimalMark;
 pub(crate) use names::{Role, las_type, role};
 pub(crate) use number::Endian;
 pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};

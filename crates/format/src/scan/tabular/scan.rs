@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::ascii::{RowParser, Separator, Tokens};
 use super::binary::{self, Misfit, Rows};
+use super::decimal_mark::{DecimalMark, NO_NUMBER};
 use super::lines;
 use super::number::Endian;
 use super::schema::Schema;
@@ -79,6 +80,11 @@ pub(crate) type Decompress = fn(&[u8], usize, &mut Vec<u8>) -> Result<(), String
 #[derive(Debug)]
 pub(crate) struct LineRule {
     pub(crate) separator: Separator,
+    /// Blanks alone do not separate where there is a separator.
+    pub(crate) strict: bool,
+    pub(crate) decimal: DecimalMark,
+    /// Separator and decimal mark were told by a sample of the rows.
+    pub(crate) sampled: bool,
     pub(crate) is_row: fn(&[u8]) -> bool,
     /// Least numbers per line; missing ones are 0.
     pub(crate) least: usize,
@@ -91,7 +97,32 @@ pub(crate) struct LineRule {
 impl LineRule {
     /// Every number of every line, as it stands there.
     pub(crate) fn new(separator: Separator, is_row: fn(&[u8]) -> bool) -> Self {
-        Self { separator, is_row, least: usize::MAX, poses: Vec::new(), scan_column: None }
+        Self {
+            separator,
+            strict: false,
+            decimal: DecimalMark::Point,
+            sampled: false,
+            is_row,
+            least: usize::MAX,
+            poses: Vec::new(),
+            scan_column: None,
+        }
+    }
+}
+
+impl LineRule {
+    /// What is wrong with a row, with the decimal marks of the file.
+    fn in_its_marks(&self, what: String) -> String {
+        if self.decimal == DecimalMark::Point || !what.ends_with("is not a number") {
+            return what;
+        }
+        let marks = what.replace('.', ",").replace(char::from(NO_NUMBER), ".");
+        format!("{marks} with a decimal comma")
+    }
+
+    /// What to do about a row that does not fit. A comma in it may be meant otherwise than the sample of rows said.
+    fn advice(&self, line: &[u8]) -> Advice {
+        if self.sampled && line.contains(&b',') { Advice::DecimalMark } else { Advice::CheckColumns }
     }
 }
 
@@ -123,6 +154,8 @@ impl RowScan {
             lattice: None,
             resolution: [Resolution::Double; 3],
             parts: Vec::new(),
+            images: Vec::new(),
+            rgb_is_16_bit: false,
             attributes: schema.attributes.clone().into(),
             crs: Default::default(),
             file_bytes: source.len(),
@@ -311,8 +344,9 @@ impl Decoder<'_> {
         let bytes = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
         let elements: Vec<_> = self.schema.attributes.iter().map(|a| a.elements).collect();
         let Schema { fields, .. } = self.schema;
-        let (wanted, separator, least) = (self.wanted, rule.separator, rule.least);
-        let parser = RowParser { fields, wanted, separator, least, elements: &elements };
+        let LineRule { separator, strict, least, .. } = *rule;
+        let parser = RowParser { fields, wanted: self.wanted, separator, strict, least, elements: &elements };
+        let mut points_line = Vec::new();
         let mut lines = lines::lines(bytes).filter(|(_, line)| (rule.is_row)(line));
         for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
@@ -322,7 +356,11 @@ impl Decoder<'_> {
                     ReadError::broken(self.source.path(), piece.byte_offset, what)
                         .advise("convert it once nothing writes to it")
                 })?;
-                parser.row(line, row, batch).map_err(|m| self.misfit(piece.byte_offset + (at + m.at) as u64, m))?;
+                let points = rule.decimal.to_points(line, &mut points_line);
+                parser.row(points, row, batch).map_err(|m| {
+                    let place = piece.byte_offset + (at + m.at) as u64;
+                    self.misfit(place, Misfit { what: rule.in_its_marks(m.what), ..m }).advise(rule.advice(line))
+                })?;
             }
             self.pose(rule, batch);
             if sink(batch).is_break() {
@@ -342,8 +380,9 @@ impl Decoder<'_> {
         let line = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
         let elements: Vec<_> = self.schema.attributes.iter().map(|a| a.elements).collect();
         let (fields, wanted) = (&self.schema.fields, self.wanted);
-        let parser = RowParser { fields, wanted, separator: None, least: usize::MAX, elements: &elements };
-        let mut tokens = Tokens { line, at: 0, separator: None };
+        let parser =
+            RowParser { fields, wanted, separator: None, strict: false, least: usize::MAX, elements: &elements };
+        let mut tokens = Tokens::of(line);
         for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for row in 0..points {

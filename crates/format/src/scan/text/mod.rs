@@ -3,23 +3,24 @@
 //! [`open`] detects the four kinds by content ([`kind`]), counts the lines (one pass over the newlines, so that
 //! every piece knows the number of its first point) and looks at some thousand rows to learn what the columns hold.
 //!
-//! **Separator**: `;` if the first row has one, else `,`, else blanks and tabs. Blanks around a separator do not count,
-//! an empty field is NaN, quotes around a field are dropped. Lines that start with `#`, `//` or `%` are comments.
+//! **Separator and decimal mark** (`dialect.rs`), by a sample of the rows: `;` if the first row has one, else `,`, else
+//! blanks and tabs; a comma is a decimal mark where that alone makes numbers of all fields, and an error where it may be
+//! both. An empty field is NaN, quotes around a field are dropped. Lines that start with `#`, `//` or `%` are comments.
 //!
 //! **Columns**, first what applies:
 //! 1. [`TextOptions::columns`];
-//! 2. a header line (its first field is no number; also as the last comment before the data, as CloudCompare writes
-//!    it) that names x and y;
+//! 2. titles (`titles.rs`): a line with less than two numbers, or a comment that names x and y. A first column that
+//!    numbers the rows and has no title is skipped (`index_column.rs`);
 //! 3. their number: 3 are x y z; 4 x y z intensity; 6 x y z and r g b, or a normal where all sampled ones have length
 //!    1; 7 x y z intensity r g b, or x y z r g b intensity where columns 4–6 are whole numbers of 0–255 and one of 5–7
-//!    is not; 9 x y z r g b and a normal; 10 x y z intensity r g b and a normal. With any other number those from the
-//!    fourth on become attributes "column 4", ….
+//!    is not; 9 x y z r g b and a normal; 10 x y z intensity r g b and a normal. With any other number, and where the
+//!    values are no colours, those from the fourth on become attributes "column 4", ….
 //!
 //! **Values**: positions are doubles. Colours are "rgb" of `uint16`, as they are (rounded) or, where no sample is
 //! above 1 and one is no whole number, 0–1 as 0–65535. Intensity is `uint16` if all samples are whole numbers of
-//! 0–65535, else `float`. In PTS whole numbers of −2048…2047 become 0–4095. Classification is `uint8`, everything
-//! else `double`, or what the name says after a colon (`quality:uint8`, Potree's type names). A later row that does not
-//! fit is an error, never a guess.
+//! 0–65535, else `float`. In PTS whole numbers of −2048…2047 become 0–4095 if one is negative. Classification is
+//! `uint8`, everything else `double`, or what the name says after a colon (`quality:uint8`, Potree's type names). A
+//! later row that does not fit is an error, never a guess.
 //!
 //! **PTS**: lines with one whole number are counts (a file may have several). **PTX**: the matrix of each scan is applied
 //! in double precision; grid cells at 0 0 0 are places without a point, not points; with more than one scan, "point
@@ -28,12 +29,19 @@
 //!
 //! Sources: Leica Geosystems, "PTS File Format", "PTX File Format"; Geomview manual, "OFF Files".
 
-mod columns;
+mod column;
+mod commas;
+mod dialect;
+mod head;
+mod index_column;
 mod off;
 mod options;
 mod pts;
 mod ptx;
 mod rows;
+mod table;
+mod title_names;
+mod titles;
 mod xyz;
 
 use std::path::Path;
@@ -80,9 +88,23 @@ pub fn is_off(first_bytes: &[u8]) -> bool {
     off::Keyword::find(first_bytes).is_some()
 }
 
-/// True for PTS: a line of one whole number, then one of three numbers or more.
+/// True for PTS: a line of one whole number, then one of three numbers or more; comments and a line of titles may stand
+/// before either.
 pub fn is_pts(first_bytes: &[u8]) -> bool {
-    matches!(filled(first_bytes).as_slice(), [first, second, ..] if is_count(first) && number_count(second) >= 3)
+    let (mut counts, mut titles) = (0, 0);
+    for line in filled(first_bytes).into_iter().filter(|line| !is_comment(line)) {
+        if is_count(line) {
+            counts += 1;
+        } else if number_count(line) >= 3 {
+            return counts == 1;
+        } else {
+            titles += 1;
+        }
+        if counts > 1 || titles > 1 {
+            break;
+        }
+    }
+    false
 }
 
 /// True for PTX: two lines of one whole number each, then one of three numbers.
@@ -101,6 +123,27 @@ pub fn is_xyz(first_bytes: &[u8]) -> bool {
     let data: Vec<_> = lines.iter().filter(|l| !is_comment(l)).collect();
     let rows = data.iter().filter(|l| number_count(l) >= 3).count();
     rows > 0 && rows * 2 >= data.len().saturating_sub(1)
+}
+
+/// True for text whose first line has the titles x and y: points also where [`kind`] does not say so, because words come
+/// first in each row or there are only two numbers.
+pub fn has_titles(first_bytes: &[u8]) -> bool {
+    !first_bytes.contains(&0) && head::titles_name_x_and_y(&filled(first_bytes)) == Some(true)
+}
+
+/// True for text that is no scan: a table whose titles are not those of points, or lines without a row of numbers.
+///
+/// A file that a user names may be opened all the same, with [`TextOptions::columns`].
+pub fn is_other_text(first_bytes: &[u8]) -> bool {
+    if first_bytes.is_empty() || first_bytes.contains(&0) {
+        return false;
+    }
+    match kind(first_bytes) {
+        Some(TextKind::Xyz) => head::titles_name_x_and_y(&filled(first_bytes)) == Some(false),
+        Some(_) => false,
+        // comments may be long, and the rows behind them
+        None => filled(first_bytes).iter().any(|line| !is_comment(line)),
+    }
 }
 
 /// Opens a file of any of the four kinds. One that is none of them by content is tried as XYZ.
@@ -134,7 +177,7 @@ pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Sca
 /// # Errors
 /// What is wrong with them, for people: x or y is missing, a name stands twice, a type is not known.
 pub fn check_columns(names: &[String]) -> Result<(), String> {
-    columns::check(names)
+    column::check(names)
 }
 
 #[cfg(test)]
@@ -159,6 +202,34 @@ mod tests {
         ];
         for (bytes, expected) in cases {
             assert_eq!(kind(bytes), expected, "{:?}", String::from_utf8_lossy(bytes));
+        }
+        for pts in ["//X Y Z\n2\n1 2 3\n", "X;Y;Z\n2\n1;2;3\n", "2\nX Y Z\n1 2 3\n", "# a\n2\n1,5 2,5 3,5\n"] {
+            assert_eq!(kind(pts.as_bytes()), Some(TextKind::Pts), "{pts}");
+        }
+        assert_eq!(kind(b"1,5;2,5;3,5\n"), Some(TextKind::Xyz));
+    }
+
+    #[test]
+    fn tables_and_prose_are_told_from_points() {
+        for other in [
+            "time,temperature,humidity\n1,20.5,40\n2,21,41\n",
+            "version: 1\nn_points: 2\n{\n}\n",
+            "3\nwater\nO 0 0 0\nH 0 0 1\nH 0 1 0\n",
+            "name;date\na;2020\n",
+        ] {
+            assert!(is_other_text(other.as_bytes()), "{other}");
+        }
+        for scan in [
+            "x,y,q\n1,2,3\n",
+            "1,2,3\n",
+            ",0,1,2\n0,1.5,2,3\n",
+            "# a\n",
+            "",
+            "1 2\0",
+            "2\n1 2 3\n",
+            "lat lon h\n1 2 3\n",
+        ] {
+            assert!(!is_other_text(scan.as_bytes()), "{scan}");
         }
     }
 }

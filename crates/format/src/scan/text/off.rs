@@ -1,7 +1,8 @@
 //! OFF: a keyword, three counts, the vertices. Faces and edges are not read.
 
-use super::columns::{Column, Table};
+use super::column::Column;
 use super::rows::{BOM, fields, is_data, is_number};
+use super::table::Table;
 use crate::scan::source::Source;
 use crate::scan::tabular::{LineRule, lines, reconcile};
 use crate::{Advice, ReadError, Scan};
@@ -89,7 +90,9 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
         rule: LineRule::new(None, is_data),
         warnings,
         numeric: vec![true; names.len()],
+        row_numbers: false,
         pts_intensity: false,
+        unit_colours: false,
         first_row,
         source,
     };

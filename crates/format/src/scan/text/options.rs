@@ -1,5 +1,7 @@
 //! Options of the reader.
 
+use crate::Decimal;
+
 /// What the file does not say of itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -10,6 +12,8 @@ pub struct TextOptions {
     pub columns: Option<Vec<String>>,
     /// Between two fields; `None`: found. A blank means any blanks.
     pub separator: Option<char>,
+    /// Before the decimals of a number. Ignored in PTX and OFF files, which have points.
+    pub decimal: Decimal,
 }
 
 impl TextOptions {
@@ -24,6 +28,13 @@ impl TextOptions {
     #[must_use]
     pub fn separator(mut self, separator: char) -> Self {
         self.separator = Some(separator);
+        self
+    }
+
+    /// Sets [`Self::decimal`].
+    #[must_use]
+    pub fn decimal(mut self, decimal: Decimal) -> Self {
+        self.decimal = decimal;
         self
     }
 }

@@ -1,52 +1,37 @@
-//! PTS: a count, then as many rows; that may repeat.
+//! PTS: a count, then as many rows; that may repeat. Titles may stand before or behind the first count.
 
 use std::cell::Cell;
 
-use super::columns::Table;
+use super::head::Head;
 use super::options::TextOptions;
-use super::rows::{BOM, fields, is_count, is_data, is_number, separator};
-use super::xyz::{named, wanted_separator};
+use super::rows::{count, is_count, is_data};
+use super::table::Table;
 use crate::scan::source::Source;
-use crate::scan::tabular::{LineRule, lines, reconcile};
-use crate::{Advice, ReadError, Scan, ScanWarning};
+use crate::scan::tabular::{lines, reconcile};
+use crate::{ReadError, Scan, ScanWarning};
 
 pub(super) fn open(source: Source, options: &TextOptions) -> Result<Box<dyn Scan>, ReadError> {
-    let from = if source.vec_at(0, 3)? == BOM { 3 } else { 0 };
-    let (declared, counts) = (Cell::new(0u64), Cell::new(0u64));
-    let index = lines::index(&source, from, u64::MAX, |line| {
+    let mut head = Head::read(&source, options, true)?;
+    let columns = head.columns(&source, options)?;
+    let (declared, counts) = (Cell::new(head.counts.0), Cell::new(head.counts.1));
+    let index = lines::index(&source, head.start, u64::MAX, |line| {
         if is_data(line) && is_count(line) {
-            let count = std::str::from_utf8(line.trim_ascii()).ok().and_then(|t| t.parse().ok()).unwrap_or(u64::MAX);
-            declared.set(declared.get().saturating_add(count));
+            declared.set(declared.get().saturating_add(count(line).unwrap_or(u64::MAX)));
             counts.set(counts.get() + 1);
         }
         is_row(line)
     })?;
-    let mut warnings = Vec::new();
     let (declared, counts) = (declared.get(), counts.get());
+    let mut warnings = Vec::new();
     reconcile(declared, index.rows, &mut warnings);
     if index.rows > declared {
-        let rows = index.rows;
-        warnings.push(ScanWarning::PointsUndeclared { declared, found: rows });
+        warnings.push(ScanWarning::PointsUndeclared { declared, found: index.rows });
     }
-    let first = lines::first_filled(&source, from, 64)?;
-    let Some((first_row, row)) = first.into_iter().find(|(_, line)| is_row(line)) else {
-        return Err(ReadError::broken(source.path(), from, "there are no rows of points").advise(Advice::WrongFile));
-    };
-    let separator = wanted_separator(options).unwrap_or_else(|| separator(&row));
-    let numeric: Vec<bool> = fields(&row, separator).iter().map(|f| is_number(f)).collect();
-    let columns = named(&source, first_row, options, None, numeric.len())?;
+    head.warnings.extend(warnings);
     let scans = if counts > 1 { format!(", {counts} scans") } else { String::new() };
-    let table = Table {
-        format: format!("PTS, {} columns{scans}", numeric.len()),
-        declared,
-        pieces: index.pieces,
-        rule: LineRule::new(separator, is_row),
-        warnings,
-        numeric,
-        pts_intensity: true,
-        first_row,
-        source,
-    };
+    let mark = if head.dialect.has_decimal_commas() { ", decimal commas" } else { "" };
+    let format = format!("PTS, {} columns{scans}{mark}", head.numeric.len());
+    let table = Table { declared, pts_intensity: true, ..Table::new(source, format, head, index, is_row) };
     Ok(Box::new(table.scan(columns)?))
 }
 

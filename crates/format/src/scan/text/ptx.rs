@@ -3,8 +3,9 @@
 //! Columns, rows, scanner position, three scanner axes, then the four rows of the matrix that turns (x, y, z, 1) into
 //! world coordinates. Cell by cell follow x, y, z, intensity and perhaps red, green, blue.
 
-use super::columns::{Column, Table};
+use super::column::Column;
 use super::rows::{fields, is_number};
+use super::table::Table;
 use crate::scan::source::Source;
 use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::{LineRule, Pose, lines, reconcile};
@@ -50,7 +51,9 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
         rule: LineRule { least, poses: grids.poses, ..LineRule::new(None, is_point) },
         warnings,
         numeric: vec![true; most],
+        row_numbers: false,
         pts_intensity: false,
+        unit_colours: false,
         first_row: grids.first_row,
         source,
     };
@@ -141,7 +144,7 @@ fn is_point(line: &[u8]) -> bool {
     if first.is_some_and(|b| (b'1'..=b'9').contains(b)) {
         return true;
     }
-    let mut tokens = Tokens { line, at: 0, separator: None };
+    let mut tokens = Tokens::of(line);
     !(0..3).all(|_| !tokens.is_empty() && parse(tokens.token()) == Ok(0.0))
 }
 

@@ -1,5 +1,7 @@
 //! Lines and their fields, as all kinds of text have them.
 
+use super::dialect::usual_separator;
+use crate::scan::tabular::DecimalMark;
 use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::lines;
 
@@ -7,7 +9,7 @@ use crate::scan::tabular::lines;
 pub(super) fn filled(first_bytes: &[u8]) -> Vec<&[u8]> {
     let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);
     let mut lines: Vec<_> = lines::lines(text).map(|(_, l)| l).filter(|l| lines::is_filled(l)).take(64).collect();
-    if lines.len() > 3 && lines.len() < 64 && !text.ends_with(b"\n") {
+    if lines.len() > 3 && lines.len() < 64 && !text.ends_with(&[lines::line_end(text)]) {
         lines.pop();
     }
     lines
@@ -33,20 +35,24 @@ pub(super) fn is_data(line: &[u8]) -> bool {
     lines::is_filled(line) && !is_comment(line)
 }
 
-/// A line of one whole number without sign.
-pub(super) fn is_count(line: &[u8]) -> bool {
+/// The value of a line of one whole number without sign; quotes do not count.
+pub(super) fn count(line: &[u8]) -> Option<u64> {
     let line = line.trim_ascii();
-    (1..=20).contains(&line.len()) && line.iter().all(u8::is_ascii_digit)
+    let bare = line.strip_prefix(b"\"").and_then(|l| l.strip_suffix(b"\"")).unwrap_or(line);
+    if !(1..=20).contains(&bare.len()) || !bare.iter().all(u8::is_ascii_digit) {
+        return None;
+    }
+    Some(std::str::from_utf8(bare).ok().and_then(|t| t.parse().ok()).unwrap_or(u64::MAX))
 }
 
-/// `;` before `,` before blanks: a decimal comma needs another separator.
-pub(super) fn separator(line: &[u8]) -> Option<u8> {
-    [b';', b','].into_iter().find(|s| line.contains(s))
+pub(super) fn is_count(line: &[u8]) -> bool {
+    // a row has a blank or a separator among its first bytes, mostly
+    line.len() <= 24 && count(line).is_some()
 }
 
 /// The fields of a line.
 pub(super) fn fields(line: &[u8], separator: Option<u8>) -> Vec<&[u8]> {
-    let mut tokens = Tokens { line, at: 0, separator };
+    let mut tokens = Tokens { line, at: 0, separator, strict: false };
     std::iter::from_fn(|| (!tokens.is_empty()).then(|| tokens.token())).collect()
 }
 
@@ -54,7 +60,14 @@ pub(super) fn is_number(field: &[u8]) -> bool {
     parse(field).is_ok()
 }
 
-/// Fields up to the first that is no number.
+/// Numbers of a line up to the first field that is none; commas separate, or stand before decimals.
 pub(super) fn number_count(line: &[u8]) -> usize {
-    fields(line, separator(line)).iter().take_while(|f| !f.is_empty() && is_number(f)).count()
+    let count = |line: &[u8], separator| fields(line, separator).iter().take_while(|f| is_number(f)).count();
+    let mut buffer = Vec::new();
+    let points = count(line, usual_separator(line));
+    if points > 0 || !line.contains(&b',') {
+        return points;
+    }
+    let line = DecimalMark::Comma.to_points(line, &mut buffer);
+    count(line, usual_separator(line))
 }

@@ -1,84 +1,14 @@
 //! What the columns of a text hold: by name, by number, by value.
 
+use super::column::Column;
+use super::head::Head;
 use crate::scan::source::Source;
+use crate::scan::tabular::lines::Index;
 use crate::scan::tabular::{
     ColumnRange, Field, LineRule, MAX_FIELDS, Property, Role, RowScan, Rule, Schema, Storage, Target, las_type,
-    probe_rows, role,
+    probe_rows,
 };
 use crate::{Advice, AttributeType, Piece, ReadError, ScanWarning};
-
-/// Advice for types.
-const TYPES: &str = "types are int8, uint8, int16, uint16, int32, uint32, int64, uint64, float, double";
-
-/// A column before its type is known.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Column {
-    pub(super) role: Role,
-    pub(super) name: String,
-    /// If it is requested.
-    pub(super) ty: Option<AttributeType>,
-}
-
-impl Column {
-    /// A column of that name, with a type behind a colon if there is one.
-    pub(super) fn named(name: &str) -> Result<Self, String> {
-        let (name, ty) = match name.rsplit_once(':') {
-            None => (name, None),
-            Some((name, ty)) => {
-                let found = AttributeType::from_potree_name(ty.trim());
-                (name, Some(found.ok_or_else(|| format!("the type {ty:?} of column {name} is not known; {TYPES}"))?))
-            }
-        };
-        Ok(Self { role: text_role(name), name: name.trim().to_owned(), ty })
-    }
-
-    fn all(names: &[&str]) -> Vec<Self> {
-        let column = |name: &&str| Self { role: text_role(name), name: (*name).to_owned(), ty: None };
-        names.iter().map(column).collect()
-    }
-
-    fn padding() -> Self {
-        Self { role: Role::Padding, name: String::new(), ty: None }
-    }
-}
-
-/// [`super::check_columns`].
-pub(super) fn check(names: &[String]) -> Result<(), String> {
-    let columns: Vec<Column> = names.iter().map(|n| Column::named(n)).collect::<Result<_, _>>()?;
-    let count = |role: &Role| columns.iter().filter(|c| c.role == *role).count();
-    for (axis, name) in ["x", "y"].into_iter().enumerate() {
-        if count(&Role::Axis(axis)) == 0 {
-            return Err(format!("there is no {name}; name every column in order, as in x,y,z,r,g,b,i"));
-        }
-    }
-    let mut seen: Vec<&Column> = Vec::new();
-    for column in columns.iter().filter(|c| c.role != Role::Padding) {
-        if seen.iter().any(|c| c.role == column.role) {
-            return Err(format!("{} stands twice; write - for columns to leave out", column.name));
-        }
-        seen.push(column);
-    }
-    Ok(())
-}
-
-/// Text has shorter and longer names than the other formats; a unit in brackets does not count.
-fn text_role(name: &str) -> Role {
-    let bare = name.split(['[', '(']).next().unwrap_or(name).trim();
-    match bare.to_ascii_lowercase().as_str() {
-        "-" | "_" | "skip" => Role::Padding,
-        "i" => Role::Intensity,
-        "c" | "class" => Role::Classification,
-        "easting" => Role::Axis(0),
-        "northing" => Role::Axis(1),
-        "elevation" | "height" => Role::Axis(2),
-        // packed colours are PCL's
-        "rgb" | "rgba" => Role::Other(name.trim().to_owned()),
-        _ => match role(bare) {
-            Role::Other(_) => Role::Other(name.trim().to_owned()),
-            role => role,
-        },
-    }
-}
 
 /// Lines of a text whose columns are not yet determined.
 pub(super) struct Table {
@@ -90,8 +20,12 @@ pub(super) struct Table {
     pub(super) warnings: Vec<ScanWarning>,
     /// For each column, whether its first value is a number.
     pub(super) numeric: Vec<bool>,
+    /// The first column numbers the rows.
+    pub(super) row_numbers: bool,
     /// −2048…2047 is shifted to 0–4095.
     pub(super) pts_intensity: bool,
+    /// Colours are of 0–1 by their titles.
+    pub(super) unit_colours: bool,
     /// Where the first row stands.
     pub(super) first_row: u64,
 }
@@ -104,6 +38,23 @@ struct Sample {
 }
 
 impl Table {
+    /// The rows behind `head`; `index` has them.
+    pub(super) fn new(source: Source, format: String, head: Head, index: Index, is_row: fn(&[u8]) -> bool) -> Self {
+        Self {
+            source,
+            format,
+            declared: index.rows,
+            pieces: index.pieces,
+            rule: head.dialect.rule(is_row),
+            row_numbers: head.row_numbers,
+            pts_intensity: false,
+            unit_colours: head.have_unit_colours(),
+            first_row: head.start,
+            numeric: head.numeric,
+            warnings: head.warnings,
+        }
+    }
+
     /// The scan: `columns` by name, or (`None`) by number and values.
     pub(super) fn scan(mut self, columns: Option<Vec<Column>>) -> Result<RowScan, ReadError> {
         if self.numeric.len() > MAX_FIELDS {
@@ -115,17 +66,19 @@ impl Table {
         let mut scan = RowScan::new(self.source, self.format, self.declared, raw, Storage::Lines(self.rule));
         scan.pieces = self.pieces;
         let sample = sample(&scan, &self.numeric);
-        let mut columns = columns.unwrap_or_else(|| by_number(&sample));
+        let mut columns = columns.unwrap_or_else(|| sample.by_number(&self.numeric));
         for (i, column) in columns.iter_mut().enumerate().filter(|(i, _)| self.numeric.get(*i) == Some(&false)) {
-            if column.role != Role::Padding {
+            if column.role != Role::Padding && !(self.row_numbers && i == 0) {
                 self.warnings.push(ScanWarning::ColumnIgnored { number: i + 1, name: column.name.clone() });
             }
             *column = Column::padding();
         }
-        let shift =
-            |i: usize| self.pts_intensity && columns[i].ty.is_none() && sample.ranges[i].is_integer_in(-2048.0, 2047.0);
+        doubt(&mut columns, &sample.ranges, &mut self.warnings);
+        // without a negative value nothing speaks for Leica's range: other scanners write reflectances from 0 on
+        let is_leica = |r: &ColumnRange| r.is_integer_in(-2048.0, 2047.0) && r.min < 0.0;
+        let shift = |i: usize| self.pts_intensity && columns[i].ty.is_none() && is_leica(&sample.ranges[i]);
         let intensity = columns.iter().position(|c| c.role == Role::Intensity).filter(|i| shift(*i));
-        let unit = has_unit_colours(&columns, &sample.ranges);
+        let unit = has_unit_colours(&columns, &sample.ranges, self.unit_colours);
         let property = |(column, range): (&Column, &ColumnRange)| {
             let ty = column.ty.unwrap_or_else(|| value_type(column, range, unit));
             Property { role: column.role.clone(), ..Property::new(&column.name, ty) }
@@ -148,10 +101,29 @@ impl Table {
     }
 }
 
-/// Colours of 0–1: none is above, and one is between.
-fn has_unit_colours(columns: &[Column], ranges: &[ColumnRange]) -> bool {
+/// Columns whose values are not what their names or places say become attributes of their own.
+fn doubt(columns: &mut [Column], ranges: &[ColumnRange], warnings: &mut Vec<ScanWarning>) {
+    let is_none = |i: usize| ranges[i] == ColumnRange::EMPTY;
+    let colours = of_role(columns, |role| matches!(role, Role::Colour(_)));
+    let no_colours = colours.iter().any(|i| !is_none(*i) && !ranges[*i].is_in(0.0, 65535.0));
+    let classes = of_role(columns, |role| *role == Role::Classification);
+    let no_class = |i: &usize| !is_none(*i) && !ranges[*i].is_integer_in(0.0, 255.0);
+    let doubtful = colours.into_iter().filter(|_| no_colours).chain(classes.into_iter().filter(no_class));
+    for i in doubtful.filter(|i| columns[*i].ty.is_none()).collect::<Vec<_>>() {
+        let column = &mut columns[i];
+        warnings.push(ScanWarning::ColumnUnusual { number: i + 1, name: column.name.clone() });
+        column.role = Role::Other(column.name.clone());
+    }
+}
+
+fn of_role(columns: &[Column], is_it: impl Fn(&Role) -> bool) -> Vec<usize> {
+    columns.iter().enumerate().filter(|(_, c)| is_it(&c.role)).map(|(i, _)| i).collect()
+}
+
+/// Colours of 0–1: none is above, and one is between, or `named` so.
+fn has_unit_colours(columns: &[Column], ranges: &[ColumnRange], named: bool) -> bool {
     let of_colours = || columns.iter().zip(ranges).filter(|(c, _)| matches!(c.role, Role::Colour(_))).map(|(_, r)| r);
-    of_colours().all(|r| r.is_in(0.0, 1.001)) && of_colours().any(|r| !r.integers)
+    of_colours().all(|r| r.is_in(0.0, 1.001)) && (named || of_colours().any(|r| !r.integers))
 }
 
 fn value_type(column: &Column, range: &ColumnRange, unit_colours: bool) -> AttributeType {
@@ -160,7 +132,7 @@ fn value_type(column: &Column, range: &ColumnRange, unit_colours: bool) -> Attri
         Role::Colour(_) | Role::Normal(_) => AttributeType::Float32,
         Role::Intensity if range.is_integer_in(0.0, 65535.0) => AttributeType::UInt16,
         Role::Intensity => AttributeType::Float32,
-        Role::Classification => AttributeType::UInt8,
+        Role::Classification => class_type(range),
         Role::Other(name) => {
             let fits = |ty: &AttributeType| match ty {
                 AttributeType::UInt8 => range.is_integer_in(0.0, 255.0),
@@ -170,6 +142,16 @@ fn value_type(column: &Column, range: &ColumnRange, unit_colours: bool) -> Attri
             las_type(name).filter(fits).unwrap_or(AttributeType::Float64)
         }
         Role::Axis(_) | Role::Harmonic(_) | Role::PackedColour | Role::Padding => AttributeType::Float64,
+    }
+}
+
+/// The least type of LAS or else of whole numbers that holds the sampled classes.
+fn class_type(range: &ColumnRange) -> AttributeType {
+    match range {
+        r if r.is_integer_in(0.0, 255.0) => AttributeType::UInt8,
+        r if r.is_integer_in(-32_768.0, 32_767.0) => AttributeType::Int16,
+        r if r.is_integer_in(-2_147_483_648.0, 2_147_483_647.0) => AttributeType::Int32,
+        _ => AttributeType::Float64,
     }
 }
 
@@ -198,25 +180,41 @@ fn sample(scan: &RowScan, numeric: &[bool]) -> Sample {
     Sample { ranges, unit_vectors }
 }
 
+impl Sample {
+    /// The columns without titles, by the number of those that hold numbers; the others are skipped.
+    fn by_number(&self, numeric: &[bool]) -> Vec<Column> {
+        let places: Vec<usize> = (0..numeric.len()).filter(|i| numeric[*i]).collect();
+        let ranges = places.iter().map(|i| self.ranges[*i]).collect();
+        let starts =
+            |i: &usize| places.get(*i..i + 3).is_some_and(|p| self.unit_vectors.contains(&p[0]) && p[2] == p[0] + 2);
+        let unit_vectors = (0..places.len()).filter(starts).collect();
+        let mut columns = vec![Column::padding(); numeric.len()];
+        for (place, column) in places.into_iter().zip(by_number(&Self { ranges, unit_vectors })) {
+            columns[place] = column;
+        }
+        columns
+    }
+}
+
 /// The usual orders, by the number of columns and, where that leaves two, by values.
 fn by_number(sample: &Sample) -> Vec<Column> {
     let byte = |i: usize| sample.ranges[i].is_integer_in(0.0, 255.0);
     let normal = |i: usize| sample.unit_vectors.contains(&i);
     let rgb_first = || byte(3) && byte(4) && byte(5) && !byte(6);
+    let colour = |i: usize| sample.ranges[i..i + 3].iter().all(|r| *r == ColumnRange::EMPTY || r.is_in(0.0, 65535.0));
     match sample.ranges.len() {
         2 => Column::all(&["x", "y"]),
         3 => Column::all(&["x", "y", "z"]),
         4 => Column::all(&["x", "y", "z", "i"]),
         6 if normal(3) => Column::all(&["x", "y", "z", "nx", "ny", "nz"]),
-        6 => Column::all(&["x", "y", "z", "r", "g", "b"]),
+        6 if colour(3) => Column::all(&["x", "y", "z", "r", "g", "b"]),
         7 if rgb_first() => Column::all(&["x", "y", "z", "r", "g", "b", "i"]),
-        7 => Column::all(&["x", "y", "z", "i", "r", "g", "b"]),
-        9 if normal(6) => Column::all(&["x", "y", "z", "r", "g", "b", "nx", "ny", "nz"]),
-        10 if normal(7) => Column::all(&["x", "y", "z", "i", "r", "g", "b", "nx", "ny", "nz"]),
+        7 if colour(4) => Column::all(&["x", "y", "z", "i", "r", "g", "b"]),
+        9 if normal(6) && colour(3) => Column::all(&["x", "y", "z", "r", "g", "b", "nx", "ny", "nz"]),
+        10 if normal(7) && colour(4) => Column::all(&["x", "y", "z", "i", "r", "g", "b", "nx", "ny", "nz"]),
         n => {
             let mut columns = Column::all(&["x", "y", "z"]);
-            let name = |i: usize| format!("column {i}");
-            columns.extend((4..=n).map(|i| Column { role: Role::Other(name(i)), name: name(i), ty: None }));
+            columns.extend((4..=n).map(|i| Column::other(&format!("column {i}"))));
             columns.truncate(n);
             columns
         }
@@ -245,24 +243,5 @@ mod tests {
         assert_eq!(with([byte, byte, byte, range(0.0, 4000.0, true)]), "x y z r g b i");
         assert_eq!(with([byte, byte, byte, byte]), "x y z i r g b");
         assert_eq!(with([byte, byte, byte, range(0.0, 1.0, false)]), "x y z r g b i");
-    }
-
-    #[test]
-    fn names_may_have_units_and_types() {
-        assert_eq!(text_role("X [m]"), Role::Axis(0));
-        assert_eq!(text_role("Easting"), Role::Axis(0));
-        let column = Column::named("quality:uint8").unwrap();
-        assert_eq!((column.name.as_str(), column.ty), ("quality", Some(AttributeType::UInt8)));
-        assert_eq!(Column::named("i:float").unwrap().role, Role::Intensity);
-        assert!(Column::named("q:byte").is_err());
-    }
-
-    #[test]
-    fn columns_that_cannot_be_are_told() {
-        let check = |list: &str| check(&list.split(',').map(str::to_owned).collect::<Vec<_>>());
-        assert_eq!(check("x,y,z,-,-,r,g,b,i"), Ok(()));
-        assert!(check("x,z").unwrap_err().contains("there is no y"));
-        assert!(check("x,y,z,i,intensity").unwrap_err().contains("intensity stands twice"));
-        assert!(check("x,y,q:byte").unwrap_err().contains("\"byte\" of column q"));
     }
 }
