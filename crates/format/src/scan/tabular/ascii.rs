@@ -204,7 +204,6 @@ fn store_checked<T: Number>(
         Rule::Unit => (0.0..=1.0).contains(&v),
         Rule::Harmonic => !v.is_nan(),
         Rule::Shift => stored.as_f64() - 2048.0 == v,
-        Rule::Harmonic => true,
         Rule::Keep | Rule::Convert => stored.as_f64() == v,
     };
     Ok((!is_kept).then_some(v))
