@@ -106,9 +106,7 @@ fn doubt(columns: &mut [Column], ranges: &[ColumnRange], warnings: &mut Vec<Scan
     let is_none = |i: usize| ranges[i] == ColumnRange::EMPTY;
     let colours = of_role(columns, |role| matches!(role, Role::Colour(_)));
     let no_colours = colours.iter().any(|i| !is_none(*i) && !ranges[*i].is_in(0.0, 65535.0));
-    let classes = of_role(columns, |role| *role == Role::Classification);
-    let no_class = |i: &usize| !is_none(*i) && !ranges[*i].is_integer_in(0.0, 255.0);
-    let doubtful = colours.into_iter().filter(|_| no_colours).chain(classes.into_iter().filter(no_class));
+    let doubtful = colours.into_iter().filter(|_| no_colours);
     for i in doubtful.filter(|i| columns[*i].ty.is_none()).collect::<Vec<_>>() {
         let column = &mut columns[i];
         warnings.push(ScanWarning::ColumnUnusual { number: i + 1, name: column.name.clone() });
