@@ -120,7 +120,7 @@ pub(crate) fn field_to_column(
             let place = Place { at: field.at, element, elements, first };
             let values = &mut batch.columns[column];
             with_type!(field.ty, T => place.fill::<T, N>(rows, rule, values))?;
-            if is_float(field.ty) && !is_float(values.ty()) {
+            if is_float(field.ty) && !is_float(values.ty()) && rule != Rule::Harmonic {
                 let mut changes = Changes::default();
                 with_type!(field.ty, T => {
                     let numbers = rows.numbers::<N>(field.at).map(|bytes| T::read(bytes, rows.endian).as_f64());
