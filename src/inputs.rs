@@ -99,7 +99,8 @@ impl Search {
 
     /// A file that was named must be a scan.
     fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
-        if kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? == Kind::NoScan {
+        let kind = kind(path).map_err(|e| Failure::io(path, "reading the input", &e))?;
+        if kind == Kind::NoScan || is_other(path).unwrap_or(false) {
             // the readers report why, unless the named columns make it a text scan
             pointmill_format::open_scan(path, &self.options)?;
         }

@@ -132,10 +132,10 @@ mod tests {
             ("--capacity", tree.capacity.to_string()),
             ("--split", tree.split.name().to_owned()),
             ("--layout", tree.layout.name().to_owned()),
-            ("--lod-cell", batches.lod_cell.unwrap().to_string()),
+            ("--lod-cell", "auto".to_owned()),
             ("--planes", "auto".to_owned()),
         ];
-        assert_eq!(batches.planes, None);
+        assert_eq!((batches.planes, batches.lod_cell), (None, None));
         for (option, default) in table {
             let text = help.split(&format!("      {option} <")).nth(1).unwrap().split("\n      -").next().unwrap();
             let words = text.split_whitespace().collect::<Vec<_>>().join(" ");

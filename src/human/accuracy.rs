@@ -54,10 +54,11 @@ fn integers(accuracy: &Accuracy) -> Option<String> {
     if accuracy.total.is_zero() && integers.same == integers.points {
         return None;
     }
-    Some(match integers.points - integers.same {
-        0 => "all integers come back".to_owned(),
-        lost => format!("integers of {} of {} do not come back", count(lost), plural(integers.points, "point")),
-    })
+    match integers.points - integers.same {
+        // integers of the lattice alone are no comfort where it moved the points
+        0 => accuracy.lattice.is_rounding().then(|| "all integers come back".to_owned()),
+        lost => Some(format!("integers of {} of {} do not come back", count(lost), plural(integers.points, "point"))),
+    }
 }
 
 fn merged(accuracy: &Accuracy) -> Option<String> {

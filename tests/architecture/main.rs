@@ -18,7 +18,17 @@ use layers::Layers;
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
 const LAYERS: [(&str, Layers<'static>); 5] = [
-    ("pointmill", &[&["flags"], &["exit", "datasets"], &["args", "interrupt"], &["human"], &["inputs"], &["commands"]]),
+    (
+        "pointmill",
+        &[
+            &["flags"],
+            &["exit", "datasets"],
+            &["args", "interrupt"],
+            &["human", "scan_choice"],
+            &["inputs"],
+            &["commands"],
+        ],
+    ),
     ("pointmill-crs", &[&["units", "system"], &["heights", "projection"], &["operation"], &["placing"]]),
     (
         "pointmill-format",

@@ -81,13 +81,15 @@ impl System {
     /// The system that a scan declares; `None` if it declares none.
     pub(crate) fn of_scan(crs: &Crs) -> Result<Option<Self>, CrsError> {
         let wkt = crs.wkt.as_deref().filter(|wkt| !wkt.trim().is_empty());
-        let by_keys = match (wkt, by_keys(crs)) {
-            (Some(wkt), Some(keys)) if !crs.keys_first => Self::parse(wkt).or_else(|error| keys.map_err(|_| error)),
+        let system = match (wkt, by_keys(crs)) {
+            // what cannot be used of one record may be usable of the other: both are of this file
+            (Some(wkt), Some(keys)) if crs.keys_first => keys.or_else(|error| Self::parse(wkt).map_err(|_| error)),
+            (Some(wkt), Some(keys)) => Self::parse(wkt).or_else(|error| keys.map_err(|_| error)),
             (Some(wkt), None) => Self::parse(wkt),
-            (_, Some(keys)) => keys,
+            (None, Some(keys)) => keys,
             (None, None) => return Ok(None),
         };
-        by_keys.map(Some)
+        system.map(Some)
     }
 
     /// With the units that a file declares beside its code.

@@ -96,6 +96,8 @@ pub enum ScanWarning {
     HeightsAboveNothing { target: String },
     /// Nothing says the unit of heights, and that of x and y has changed to `beside`.
     HeightsWithoutUnit { beside: String },
+    /// Points were turned or scaled, but not the shapes of Gaussian splats.
+    SplatsUnturned,
     /// A reprojection moved the points, but turned neither normals nor the poses of scans.
     DirectionsProjected,
     /// Text: a column without numbers.
@@ -220,6 +222,10 @@ impl ScanWarning {
             }
             Self::HeightsWithoutUnit { beside } => {
                 format!("nothing says the unit of its heights; they are left as they are, beside x and y in {beside}")
+            }
+            Self::SplatsUnturned => {
+                "the shapes of its splats (rot_*, scale_*, f_rest_*) are as in the file; only their places are moved"
+                    .to_owned()
             }
             Self::DirectionsProjected => {
                 "normals and poses are not turned by the reprojection; they keep the directions of the scan's own axes"

@@ -167,5 +167,5 @@ fn the_worked_example_of_the_format_page_is_the_golden_file() {
         assert_eq!(file[offset..offset + expected.len()], expected, "{line}");
         quoted += expected.len();
     }
-    assert_eq!(quoted, 405);
+    assert_eq!(quoted, 373);
 }

@@ -3,8 +3,8 @@
 use serde_json::json;
 
 use super::figures::{Accuracy, PositionErrors};
+use super::known::{Known, Side};
 use super::reported::{Figures, Reported};
-use super::{Known, Side};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::{Deviation, Known, Side};
+use super::deviation::Deviation;
+use super::known::{Known, Side};
 
 /// How far decoded positions are from those of the sources, world units. What could not be measured is absent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]

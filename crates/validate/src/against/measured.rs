@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use super::block::Block;
 use super::rules::Rules;
-use super::sides::Against;
 use crate::accuracy::{Ordered, Side};
 
 /// What was measured.
@@ -90,11 +89,4 @@ fn merged(mut rows: Vec<Row>) -> u64 {
     rows.sort_unstable();
     let places = rows.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
     places.filter(|p| p.first().map(|r| r.2) != p.last().map(|r| r.2)).map(|p| p.len() as u64).sum()
-}
-
-impl Against {
-    /// What was measured during [`Self::compare`].
-    pub(crate) fn measured(&self) -> Option<Measured> {
-        self.measured.lock().map_or(None, |measured| *measured)
-    }
 }

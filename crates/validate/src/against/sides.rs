@@ -128,6 +128,11 @@ pub(crate) struct Context<'a> {
 }
 
 impl Against {
+    /// What was measured during [`Self::compare`].
+    pub(crate) fn measured(&self) -> Option<Measured> {
+        self.measured.lock().map_or(None, |measured| *measured)
+    }
+
     /// Opens the sources.
     ///
     /// # Errors

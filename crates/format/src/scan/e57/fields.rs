@@ -1,6 +1,7 @@
 //! The fields of a prototype: what a record consists of and how its bits are stored.
 
-use super::xml::{Element, Numbers};
+use super::xml::element::Element;
+use super::xml::numbers::Numbers;
 
 /// How the values of a field are stored.
 #[derive(Debug, Clone, Copy, PartialEq)]

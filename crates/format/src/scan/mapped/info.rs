@@ -4,7 +4,7 @@ use super::directions::has_normals;
 use super::map::ScanMap;
 use super::positions::{PositionMap, move_all, project};
 use super::resolution::resolutions;
-use crate::{Aabb, Scan, ScanInfo, ScanPart, ScanWarning};
+use crate::{Aabb, Affine, Scan, ScanInfo, ScanPart, ScanWarning};
 
 /// Points per side of the grid whose images stand for those of a box: x, y, z.
 const GRID: [usize; 3] = [13, 13, 3];
@@ -23,6 +23,10 @@ pub(super) fn mapped(inner: &dyn Scan, map: &ScanMap, positions: &PositionMap) -
     info.warnings.extend(map.warnings.iter().cloned());
     if map.projection.is_some() && (!own.parts.is_empty() || has_normals(own)) {
         info.warnings.push(ScanWarning::DirectionsProjected);
+    }
+    let is_turned = map.projection.is_some() || map.affine.linear() != Affine::IDENTITY.linear();
+    if is_turned && own.attribute("rot_0").is_some() {
+        info.warnings.push(ScanWarning::SplatsUnturned);
     }
     info
 }

@@ -201,6 +201,14 @@ fn the_least_integer_cannot_be_negated_and_is_not_changed_in_silence() {
     assert!(matches!(kept.positions, Positions::Quantized(q) if q[2][1] == i32::MIN));
 }
 
+#[test]
+fn splats_that_are_turned_say_that_their_shapes_are_not() {
+    let splat = || Fake::new(integers(), &[("rot_0", Column::Float32(vec![1.0, 1.0]))]);
+    assert_eq!(moved(splat(), Affine::Y_UP).info().warnings, [ScanWarning::SplatsUnturned]);
+    let shift = matrix([[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+    assert_eq!(moved(splat(), shift).info().warnings, []);
+}
+
 /// Squares x, has no image for y < 0.
 #[derive(Debug)]
 struct Square;

@@ -257,21 +257,24 @@ impl<'a> Tokens<'a> {
 
     /// The bytes up to the next separator, which is skipped; without quotes.
     pub(crate) fn token(&mut self) -> &'a [u8] {
+        self.ended_token().0
+    }
+
+    /// The same, and false if a strict line goes on without a separator.
+    fn ended_token(&mut self) -> (&'a [u8], bool) {
         let start = self.start();
         let rest = &self.line[start..];
         if rest.first() == Some(&b'"') {
             let len = quoted_len(&rest[1..]);
             self.at = (start + len + 2).min(self.line.len());
-            self.pass_separator();
-            return &rest[1..=len];
+            return (&rest[1..=len], self.pass_separator());
         }
         let len = match self.separator.filter(|_| self.strict) {
             Some(separator) => memchr::memchr(separator, rest).unwrap_or(rest.len()),
             None => rest.iter().position(|b| self.ends_token(*b)).unwrap_or(rest.len()),
         };
         self.at = start + len;
-        self.pass_separator();
-        rest[..len].trim_ascii_end()
+        (rest[..len].trim_ascii_end(), self.pass_separator())
     }
 
     /// False if a strict line goes on without a separator.
@@ -320,7 +323,10 @@ impl<'a> Tokens<'a> {
                 self.at = start;
             }
         }
-        parse(self.token())
+        match self.ended_token() {
+            (token, true) => parse(token),
+            (token, false) => Err(format!("\"{}\" is not followed by a separator", String::from_utf8_lossy(token))),
+        }
     }
 
     /// The next number as an integer of up to 64 bits; "255.0" is one. `None`: not a number, or an empty field.

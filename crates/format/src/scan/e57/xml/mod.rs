@@ -5,21 +5,20 @@
 //! there and are not, namespaces that are declared twice or not at all, numbers in unusual spellings.
 
 mod cloud;
-mod element;
+pub(super) mod element;
 mod image;
 mod markup;
-mod numbers;
+pub(super) mod numbers;
 
 use std::borrow::Cow;
 
 pub(super) use cloud::{Cloud, Limit, Placement};
-pub(super) use element::Element;
 pub(super) use image::{Image, View};
-pub(super) use numbers::Numbers;
 
 use crate::ScanWarning;
-use element::split;
+use element::{Element, split};
 use markup::{Event, Markup, Tag};
+use numbers::Numbers;
 
 /// What the XML section says.
 #[derive(Debug, Default)]
