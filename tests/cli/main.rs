@@ -6,7 +6,6 @@ mod attributes;
 mod bad_input;
 mod bad_output;
 mod batches;
-mod crs_units;
 mod cut_short;
 mod extract;
 mod formats;
