@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use pointmill_converter::ConvertError;
-use pointmill_format::{ErrorKind, ReadError};
+use pointmill_format::{Advice, ErrorKind, ReadError};
 
 use crate::flags;
 
@@ -93,6 +93,7 @@ impl From<ReadError> for Failure {
         let line = flags::read_error_line(&error);
         match error.kind() {
             ErrorKind::Broken => Self::Input(line),
+            ErrorKind::Unsupported if error.advice() == Some(&Advice::MoreMemory) => Self::Memory(line),
             ErrorKind::Unsupported => Self::Unsupported(line),
             ErrorKind::Io(_) => Self::Io(line),
         }

@@ -1,7 +1,7 @@
 //! Where settings and advice of the libraries get the names of options: nothing below `src/` knows any.
 
 use pointmill_converter::{Advice, ConvertError, DropReason, PlanError, PlanFault, Setting, Warning};
-use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError};
+use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError, ScanWarning};
 
 /// The option that a setting comes from.
 fn option(setting: Setting) -> &'static str {
@@ -37,12 +37,15 @@ fn advice(advice: &Advice) -> String {
             bounds_value(bounds)
         ),
         Advice::SkipInvalid => "pass --invalid skip to leave such points out".to_owned(),
+        Advice::SkipOriginPoints => "--origin-points skip leaves them out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
         Advice::CommasSeparate => "pass --decimal point if they separate columns".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
         Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),
-        Advice::Reproject => "reproject the inputs, or name the system with --crs".to_owned(),
+        Advice::Reproject => {
+            "bring the inputs to one system with --reproject, or name the system of all with --crs".to_owned()
+        }
         Advice::NameAttributes => "name the attributes to keep with --attributes".to_owned(),
         Advice::PackLeaves => "--layout packed puts them into one".to_owned(),
         other => other.to_string(),
@@ -77,6 +80,12 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
         Some(ReadAdvice::SkipUnreadable) => {
             "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
         }
+        Some(ReadAdvice::MoreMemory) => "convert it with a larger --memory".to_owned(),
+        Some(ReadAdvice::NameCrs) => "name its coordinate reference system with --crs".to_owned(),
+        Some(ReadAdvice::OtherCrs) => {
+            "choose a system for --reproject on the same datum and with the same heights, or reproject the scan elsewhere"
+                .to_owned()
+        }
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
         }
@@ -100,6 +109,9 @@ fn plan_line(error: &PlanError) -> String {
 
 /// A warning of a conversion, one line.
 pub(crate) fn warning_line(warning: &Warning) -> String {
+    if let Warning::Scan { warning: ScanWarning::Images { .. }, .. } = warning {
+        return format!("{}; pointmill extract writes images", warning.what());
+    }
     with_advice(warning.what(), warning.advice().as_ref())
 }
 

@@ -19,6 +19,7 @@ use crate::exit::Failure;
 use crate::human::quantities::plural;
 use kind::{is_other, kind_by_ending, kind_in_folder};
 
+use crate::scan_choice;
 pub(crate) use kind::{Kind, kind};
 
 /// The scans to read, and notes about the search for them.
@@ -58,7 +59,9 @@ impl InputArgs {
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        expand(&typed, &options)
+        let found = expand(&typed, &options)?;
+        scan_choice::check(&found.files, &options)?;
+        Ok(found)
     }
 }
 
@@ -96,7 +99,8 @@ impl Search {
 
     /// A file that was named must be a scan.
     fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
-        if kind(path).map_err(|e| Failure::io(path, "reading the input", &e))? == Kind::NoScan {
+        let kind = kind(path).map_err(|e| Failure::io(path, "reading the input", &e))?;
+        if kind == Kind::NoScan || is_other(path).unwrap_or(false) {
             // the readers report why, unless the named columns make it a text scan
             pointmill_format::open_scan(path, &self.options)?;
         }

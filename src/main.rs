@@ -11,12 +11,13 @@ mod flags;
 mod human;
 mod inputs;
 mod interrupt;
+mod scan_choice;
 
 use std::process::ExitCode;
 
 use args::{Args, Command};
 use clap::Parser as _;
-use commands::{convert, info, validate};
+use commands::{convert, extract, info, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {
@@ -37,6 +38,7 @@ fn run(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Convert(convert) => convert::run(convert),
         Command::Validate(validate) => validate::run(validate),
+        Command::Extract(extract) => extract::run(extract),
         Command::Info(info) => info::run(info),
     }
 }

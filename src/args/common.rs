@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 use pointmill_format::{Decimal, OpenOptions};
 
+use super::placing::PlacingArgs;
 use super::values::parse_separator;
 use crate::exit::Failure;
 
@@ -22,7 +23,7 @@ pub(crate) struct InputArgs {
     pub(crate) reading: ReadingArgs,
 }
 
-/// Facts about scans that their files do not state.
+/// Facts about scans that their files do not state, and where their points belong.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct ReadingArgs {
     /// Columns of text scans in file order, for example x,y,z,r,g,b,i. Names: x y z, r g b, i (intensity),
@@ -42,9 +43,20 @@ pub(crate) struct ReadingArgs {
     /// Decimal mark of text scans; auto looks at a sample of the rows, and fails where it cannot tell
     #[arg(long, value_enum, default_value = "auto", value_name = "MARK", help_heading = "Reading scans")]
     pub(crate) decimal: DecimalArg,
+    /// Reads only this scan within the files (E57, PTX): its exact name, or its number in the file, from 1; repeat it for
+    /// more scans. Other kinds of files are read whole [default: all scans]
+    #[arg(
+        long = "scan",
+        value_name = "NAME|N",
+        value_parser = clap::builder::NonEmptyStringValueParser::new(),
+        help_heading = "Reading scans"
+    )]
+    pub(crate) scans: Vec<String>,
     /// Keeps rowIndex and columnIndex of E57 scans as attributes
     #[arg(long, help_heading = "Reading scans")]
     pub(crate) row_column: bool,
+    #[command(flatten)]
+    pub(crate) placing: PlacingArgs,
 }
 
 impl ReadingArgs {
@@ -57,6 +69,10 @@ impl ReadingArgs {
         let mut options = OpenOptions::default().keep_row_column(self.row_column);
         (options.columns, options.separator) = (self.columns.clone(), self.separator);
         options.decimal = self.decimal.into();
+        options.scans = (!self.scans.is_empty()).then(|| self.scans.clone());
+        if let Some(placing) = self.placing.placing()? {
+            options = options.maps(placing);
+        }
         Ok(options)
     }
 }

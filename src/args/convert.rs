@@ -61,9 +61,6 @@ pub(crate) struct ConvertArgs {
     /// scans without a step, one chosen from their extent and precision
     #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale, help_heading = "Output")]
     pub(crate) scale: Scale,
-    /// Coordinate reference system: a proj4 string, EPSG:n or WKT [default: from the inputs]
-    #[arg(long, value_name = "TEXT", help_heading = "Output")]
-    pub(crate) crs: Option<String>,
 
     /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
     /// [default: all for potree2, classification for bintree, colour for batches]
@@ -74,8 +71,14 @@ pub(crate) struct ConvertArgs {
           help_heading = "Selecting data")]
     pub(crate) bounds: Option<Aabb>,
     /// Keeps only points of these classes, for example 2,6 [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Selecting data")]
-    pub(crate) class: Option<Vec<u8>>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        allow_negative_numbers = true,
+        help_heading = "Selecting data"
+    )]
+    pub(crate) class: Option<Vec<i64>>,
     /// Keeps every Nth point, by index in the file
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..),
           help_heading = "Selecting data")]
@@ -89,6 +92,10 @@ pub(crate) struct ConvertArgs {
     /// What to do with points without a valid position
     #[arg(long, value_enum, default_value = "skip", help_heading = "Selecting data")]
     pub(crate) invalid: FaultArg,
+    /// What to do with points exactly at the origin of their scan (where the scanner stood, by the pose of the scan; 0,0,0
+    /// in files without poses): some scanners write them where they measured nothing
+    #[arg(long, value_enum, default_value = "keep", help_heading = "Selecting data")]
+    pub(crate) origin_points: OriginPointsArg,
     /// What to do with inputs, or parts of inputs, that cannot be decoded
     #[arg(long, value_enum, default_value = "fail", help_heading = "Selecting data")]
     pub(crate) unreadable: FaultArg,
@@ -201,6 +208,12 @@ pub(crate) enum SamplingArg {
 pub(crate) enum DuplicatesArg {
     Keep,
     Drop,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OriginPointsArg {
+    Keep,
+    Skip,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

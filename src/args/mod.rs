@@ -2,6 +2,7 @@
 
 mod common;
 mod convert;
+mod placing;
 mod values;
 
 use std::num::NonZero;
@@ -12,7 +13,7 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 pub(crate) use common::{InputArgs, ProgressArg, ReadingArgs, TalkArgs};
 pub(crate) use convert::{
     BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
-    OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use values::Attributes;
 
@@ -34,6 +35,8 @@ pub(crate) enum Command {
     Convert(Box<ConvertArgs>),
     /// Checks whether a dataset conforms to its format and matches its scans
     Validate(ValidateArgs),
+    /// Writes the images within an E57 file, and the places of its scans and images as a table
+    Extract(ExtractArgs),
     /// Describes scans and datasets, from their headers unless --deep is given
     Info(InfoArgs),
 }
@@ -58,6 +61,28 @@ pub(crate) struct ValidateArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) talk: TalkArgs,
+}
+
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ExtractArgs {
+    /// The file: E57, or PTX, which has places of scans but no images
+    #[arg(value_name = "SCAN")]
+    pub(crate) file: PathBuf,
+    /// Folder for the images and poses.csv; it is made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Replaces files of the same names in DIR; others are left alone
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    /// Takes only this scan and its images: its exact name, or its number, from 1; repeat it for more scans
+    #[arg(long = "scan", value_name = "NAME|N", value_parser = clap::builder::NonEmptyStringValueParser::new())]
+    pub(crate) scans: Vec<String>,
+    /// What becomes of an image whose bytes cannot be read
+    #[arg(long, value_enum, value_name = "POLICY", default_value = "fail")]
+    pub(crate) unreadable: FaultArg,
+    /// Reports errors only
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -107,10 +132,10 @@ mod tests {
             ("--capacity", tree.capacity.to_string()),
             ("--split", tree.split.name().to_owned()),
             ("--layout", tree.layout.name().to_owned()),
-            ("--lod-cell", batches.lod_cell.unwrap().to_string()),
+            ("--lod-cell", "auto".to_owned()),
             ("--planes", "auto".to_owned()),
         ];
-        assert_eq!(batches.planes, None);
+        assert_eq!((batches.planes, batches.lod_cell), (None, None));
         for (option, default) in table {
             let text = help.split(&format!("      {option} <")).nth(1).unwrap().split("\n      -").next().unwrap();
             let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -123,6 +148,8 @@ mod tests {
         let args =
             convert(&["--class", "2,6", "--bounds", "-1,-2,-3..1,2,3", "--attributes", "rgb, intensity"]).unwrap();
         assert_eq!(args.class, Some(vec![2, 6]));
+        assert_eq!(convert(&["--class", "-1"]).unwrap().class, Some(vec![-1]));
+        assert_eq!(convert(&["--class=-1,300"]).unwrap().class, Some(vec![-1, 300]));
         assert_eq!(args.bounds.unwrap().min, [-1.0, -2.0, -3.0]);
         assert_eq!(args.attributes, Some(Attributes::List(vec!["rgb".into(), "intensity".into()])));
         assert_eq!(args.scale, Scale(None));
@@ -131,7 +158,7 @@ mod tests {
     #[test]
     fn nonsense_is_refused() {
         let table: [&[&str]; 10] = [
-            &["--class", "256"],
+            &["--class", "2.5"],
             &["--every", "0"],
             &["--threads", "0"],
             &["--memory", "lots"],

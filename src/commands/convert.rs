@@ -4,14 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, Outliers, Plan,
-    Potree2Settings, RgbDepth, Sampling, ScaleChoice, Target,
+    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, OriginPoints, Outliers,
+    Plan, Potree2Settings, RgbDepth, Sampling, ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
 use crate::args::{
     Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
-    OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
@@ -141,7 +141,11 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         Some(Attributes::List(names)) => AttributeChoice::List(names.clone()),
     };
     plan.scale = args.scale.0.map_or(ScaleChoice::Auto, ScaleChoice::Fixed);
-    plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every };
+    let origin_points = match args.origin_points {
+        OriginPointsArg::Keep => OriginPoints::Keep,
+        OriginPointsArg::Skip => OriginPoints::Skip,
+    };
+    plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every, origin_points };
     plan.duplicates = match args.duplicates {
         DuplicatesArg::Keep => Duplicates::Keep,
         DuplicatesArg::Drop => Duplicates::Drop,
@@ -154,7 +158,9 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         RgbDepthArg::Eight => RgbDepth::Eight,
         RgbDepthArg::Sixteen => RgbDepth::Sixteen,
     };
-    plan.crs.clone_from(&args.crs);
+    let placing = &args.inputs.reading.placing;
+    // the datasets are in the system that the points end in
+    plan.crs.clone_from(if placing.reproject.is_some() { &placing.reproject } else { &placing.crs });
     plan.overwrite = args.overwrite;
     if let Some(bytes) = args.memory {
         plan.memory_bytes = bytes;

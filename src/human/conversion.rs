@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use crate::flags;
 
+use super::accuracy;
 use super::quantities::{bytes, count, number, numbers, plural, rate, seconds};
 use super::text::{Table, batches, corners, or_none};
 
@@ -19,7 +20,7 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
     };
     lines.push(format!("{}, {}{memory}{temporary}", seconds(report.seconds), rate(per_second)));
     lines.extend(points_lines(report));
-    lines.push(coordinates_line(report));
+    lines.extend(report.outputs.iter().map(|output| accuracy::line(output, report)));
     for output in &report.outputs {
         lines.extend(dropped_line(output, report.outputs.len() > 1));
     }
@@ -72,6 +73,7 @@ fn points_lines(report: &Report) -> Vec<String> {
         (p.thinned, "by thinning"),
         (duplicates, "as duplicates"),
         (p.invalid, "without a valid position"),
+        (p.at_origin, "at the scanner's origin"),
         (p.unreadable, "unreadable"),
     ];
     let causes = causes.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n)));
@@ -80,25 +82,6 @@ fn points_lines(report: &Report) -> Vec<String> {
         plural(p.read, "point"),
         causes.collect::<Vec<_>>().join(", ")
     )]
-}
-
-fn coordinates_line(report: &Report) -> String {
-    let change = &report.coordinate_change;
-    let step = numbers(&report.grid.scale);
-    if change.max.iter().all(|v| *v == 0.0) {
-        return format!("coordinates unchanged, step {step}");
-    }
-    // 0.07 read as a double and 7 steps of 0.01 differ in the last bits
-    let farthest =
-        report.inputs.iter().filter_map(|i| i.bounds_measured).flatten().fold(0.0f64, |far, v| far.max(v.abs()));
-    if change.max.iter().zip(&report.grid.scale).all(|(max, step)| *max <= (step * 1e-6).min(farthest * 1e-15)) {
-        return format!("coordinates unchanged except for the rounding of doubles, step {step}");
-    }
-    format!(
-        "coordinates moved by at most {} (root mean square {}), step {step}",
-        numbers(&change.max),
-        numbers(&change.rms)
-    )
 }
 
 fn details(report: &Report) -> Vec<String> {
@@ -147,7 +130,14 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
 /// Points read that are not in the dataset.
 fn points_not_written(report: &Report) -> u64 {
     let p = &report.points;
-    p.outside_bounds + p.outliers + p.other_class + p.thinned + duplicates_dropped(report) + p.invalid + p.unreadable
+    p.outside_bounds
+        + p.outliers
+        + p.other_class
+        + p.thinned
+        + duplicates_dropped(report)
+        + p.invalid
+        + p.at_origin
+        + p.unreadable
 }
 
 /// Only octrees drop duplicates, and there is one octree at most.

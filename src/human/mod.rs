@@ -1,5 +1,6 @@
 //! Text for people; JSON is made in the commands.
 
+mod accuracy;
 pub(crate) mod conversion;
 pub(crate) mod progress;
 pub(crate) mod quantities;

@@ -64,6 +64,21 @@ pub(crate) fn number(v: f64) -> String {
     if short == "-0" { "0".to_owned() } else { short.to_owned() }
 }
 
+/// A number that is not below `v`, with three digits.
+pub(crate) fn at_most(v: f64) -> String {
+    let text = format!("{v:.2e}");
+    let near: f64 = text.parse().unwrap_or(v);
+    // a step of the third digit
+    let step = text.split_once('e').map_or(0.0, |(_, exponent)| format!("1e{exponent}").parse().unwrap_or(0.0) / 100.0);
+    let up = if near < v { near + step } else { near };
+    number(format!("{up:.2e}").parse().unwrap_or(up))
+}
+
+/// A number to the nearest, with three digits.
+pub(crate) fn three_digits(v: f64) -> String {
+    format!("{v:.2e}").parse().map_or_else(|_| v.to_string(), number)
+}
+
 /// Numbers side by side.
 pub(crate) fn numbers(values: &[f64]) -> String {
     values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(" ")
@@ -84,6 +99,10 @@ mod tests {
         );
         assert_eq!(bytes((1 << 30) - 1), "1.00 GiB");
         assert_eq!((seconds(0.416), seconds(185.0)), ("0.42 s".into(), "3 min 05 s".into()));
+        assert_eq!(
+            [0.0, 0.001, 0.000_001_907_348_6, 0.051_512_3, 0.999_1, 1234.5, 9.999e-9].map(at_most).join(" "),
+            "0 0.001 0.00000191 0.0516 1 1240 1e-8"
+        );
         assert_eq!(rate(12_345_678.0), "12.3 M points/s");
         assert_eq!(numbers(&[848_935.200_000_000_1, -0.0, 1e-7, 0.001]), "848935.2 0 1e-7 0.001");
         assert_eq!(numbers(&[f64::MAX, f64::NAN, 100.0]), "1.7976931348623157e308 NaN 100");

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pointmill_validate::{DatasetKind, LeafQuality, LevelQuality, Outcome};
+use pointmill_validate::{Accuracy, DatasetKind, LeafQuality, LevelQuality, Outcome};
 
-use super::quantities::{count, plural};
+use super::quantities::{at_most, count, plural, three_digits};
 use super::text::printable;
 
 /// What a validation found: checks, quality by level, problems.
@@ -41,9 +41,27 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
             let _ = writeln!(out, "  not compared, because the dataset does not have them: {}", printable(&names));
         }
     }
+    out.push_str(&accuracy(&outcome.accuracy));
     out.push_str(&quality(&outcome.quality, verbose));
     out.push_str(&outcome.leaves.as_ref().map(leaves).unwrap_or_default());
     out + &problems(outcome)
+}
+
+/// Errors of decoded positions, as far as they were measured.
+fn accuracy(accuracy: &Accuracy) -> String {
+    let mut out = String::new();
+    let parts = [("lattice against the scans", &accuracy.lattice), ("decoded against the lattice", &accuracy.format)];
+    for (what, errors) in parts.into_iter().filter_map(|(what, errors)| Some((what, errors.as_ref()?))) {
+        let by_axis = errors.max.map(at_most).join(" ");
+        let (max, rms) = (at_most(errors.max_3d), at_most(errors.rms_3d));
+        let mean = errors.mean.map(three_digits).join(" ");
+        let _ = writeln!(out, "  {what}: at most {max} (by axis {by_axis}), root mean square {rms}, mean {mean}");
+    }
+    if let Some(integers) = accuracy.integers {
+        let lost = integers.points - integers.same;
+        let _ = writeln!(out, "  integers of {} of {} do not come back", count(lost), plural(integers.points, "point"));
+    }
+    out
 }
 
 /// Distances relative to the spacing of the level; `–` where there is nothing to measure.

@@ -6,8 +6,12 @@ use std::process::Command;
 use serde_json::Value;
 
 /// What each crate of the workspace may depend on, for whatever purpose, among the crates of the workspace.
-const ALLOWED: [(&str, &[&str]); 5] = [
-    ("pointmill", &["pointmill-converter", "pointmill-format", "pointmill-validate", "pointmill-testkit"]),
+const ALLOWED: [(&str, &[&str]); 6] = [
+    (
+        "pointmill",
+        &["pointmill-converter", "pointmill-crs", "pointmill-format", "pointmill-validate", "pointmill-testkit"],
+    ),
+    ("pointmill-crs", &["pointmill-format"]),
     ("pointmill-converter", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-validate", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-format", &["pointmill-testkit"]),

@@ -17,8 +17,19 @@ use layers::Layers;
 
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
-const LAYERS: [(&str, Layers<'static>); 4] = [
-    ("pointmill", &[&["flags"], &["exit", "datasets"], &["args", "interrupt"], &["human"], &["inputs"], &["commands"]]),
+const LAYERS: [(&str, Layers<'static>); 5] = [
+    (
+        "pointmill",
+        &[
+            &["flags"],
+            &["exit", "datasets"],
+            &["args", "interrupt"],
+            &["human", "scan_choice"],
+            &["inputs"],
+            &["commands"],
+        ],
+    ),
+    ("pointmill-crs", &[&["units", "system"], &["heights", "projection"], &["operation"], &["placing"]]),
     (
         "pointmill-format",
         &[
@@ -31,7 +42,13 @@ const LAYERS: [(&str, Layers<'static>); 4] = [
     ),
     (
         "pointmill-validate",
-        &[&["check", "place"], &["finding"], &["options", "outcome"], &["against"], &["potree2", "bintree", "batches"]],
+        &[
+            &["check", "place"],
+            &["finding"],
+            &["options", "accuracy", "outcome"],
+            &["against"],
+            &["potree2", "bintree", "batches"],
+        ],
     ),
     (
         "pointmill-converter",

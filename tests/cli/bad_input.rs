@@ -42,6 +42,17 @@ fn a_folder_without_scans_says_what_is_there_instead() {
 }
 
 #[test]
+fn an_archive_that_was_named_says_what_it_is_and_one_in_a_folder_is_skipped() {
+    let dir = Dir::new();
+    fs::create_dir(dir.path("scans")).unwrap();
+    dir.write("scans/a.ply.gz", b"\x1f\x8b\x08\x08\0\0\0\0\0\x03a.ply\0");
+    dir.write("scans/b.xyz", b"1 2 3\n4 5 6\n");
+    dir.run(["convert", "scans/a.ply.gz", "-o", "out"]).failed_with(4, &["a.ply.gz", "a gzip file", "unpack it"]);
+    dir.succeed(["convert", "scans", "-o", "out"]);
+    assert_eq!(dir.report("out")["outputs"][0]["points"], 2);
+}
+
+#[test]
 fn a_file_that_was_named_and_is_no_scan_is_not_supported() {
     let dir = Dir::new();
     dir.write("notes.txt", b"hello");

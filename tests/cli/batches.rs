@@ -69,7 +69,8 @@ fn the_report_has_levels_planes_errors_and_what_would_be_drawn() {
     assert_eq!((details["batches"].as_u64(), details["planes"].as_u64()), (Some(5), Some(20)));
     assert!(details["planes_dropped"].as_str().unwrap().contains("lo10"));
     let error = |bits: &str| details["errors"][bits]["max"][0].as_f64().unwrap();
-    assert!(error("10") < 0.1 && error("20") < error("10") / 900.0 && error("30") < error("20") / 900.0);
+    assert!(error("10") < 0.1 && error("20") < error("10") / 900.0);
+    assert!(details["errors"]["30"].is_null(), "bits that are not in the file");
     let drawn = details["drawn"].as_array().unwrap();
     assert!(drawn.iter().all(|at| ["10", "20", "30"].iter().map(|b| at[*b].as_u64().unwrap()).sum::<u64>() == 5));
     assert_eq!(report["output_bytes"].as_u64(), Some(file.len() as u64));

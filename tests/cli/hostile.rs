@@ -16,7 +16,7 @@ fn a_header_that_declares_a_thousand_light_seconds_costs_no_precision() {
     dir.write("scans/millimetres.las", &fine.bytes());
     dir.succeed(["convert", "scans", "-o", "out", "-q"]);
     assert_eq!(dir.report("out")["grid"]["scale"][0], 0.001);
-    assert_eq!(dir.report("out")["coordinate_change"]["max"][0], 0.0);
+    assert_eq!(dir.report("out")["outputs"][0]["accuracy"]["lattice"]["max"][0], 0.0);
     dir.validate("out", &["scans"]);
 }
 

@@ -1,18 +1,26 @@
 //! The program as a user meets it: commands, exit codes, what is written and, above all, what is left alone.
 
+mod accuracy;
 mod arguments;
+mod attributes;
 mod bad_input;
 mod bad_output;
 mod batches;
 mod cut_short;
+mod extract;
 mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod odd_places;
+mod placing;
 mod precision;
 mod reporting;
+
 mod same_points;
 mod sameness;
+mod scans_within;
 mod several;
 mod support;
 mod text_inputs;
+mod units;

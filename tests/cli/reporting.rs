@@ -51,7 +51,7 @@ fn the_report_is_in_the_dataset_and_where_it_was_asked_for() {
         assert!(report[key] == copy[key] && report[key] == printed[key], "{key}");
     }
     assert_eq!(report["checksum_in"], report["outputs"][0]["checksum"]);
-    assert_eq!(report["coordinate_change"]["max"], serde_json::json!([0.0, 0.0, 0.0]));
+    assert_eq!(report["outputs"][0]["accuracy"]["lattice"]["max"], serde_json::json!([0.0, 0.0, 0.0]));
 }
 
 #[test]

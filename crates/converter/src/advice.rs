@@ -33,6 +33,8 @@ pub enum Advice {
     },
     /// Skip points without a valid position.
     SkipInvalid,
+    /// Skip points exactly at the origin of their scan.
+    SkipOriginPoints,
     /// Use the colour depth that was detected.
     DetectRgbDepth,
     /// State the colour depth.
@@ -76,6 +78,7 @@ impl fmt::Display for Advice {
             Self::KeepDuplicates => "keep duplicates, or convert to potree2",
             Self::CutBounds { bounds: None } => "limit the bounds to leave them out, or correct the input",
             Self::SkipInvalid => "skip invalid points to leave such points out",
+            Self::SkipOriginPoints => "skip points at the origin of their scan to leave them out",
             Self::DetectRgbDepth => "let the colour depth be detected",
             Self::SetRgbDepth => "state the colour depth to override this",
             Self::CommasSeparate => "say so if they separate columns",

@@ -104,6 +104,8 @@ pub enum InputFault {
         thinned: u64,
         /// Points without a valid position.
         invalid: u64,
+        /// Points exactly at the origin of their scan that were skipped for it.
+        at_origin: u64,
     },
     /// Points farther away than coordinates can be.
     FarPoints {
@@ -314,10 +316,10 @@ impl fmt::Display for InputFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoneReadable => f.write_str("none of the inputs could be read"),
-            Self::NothingLeft { read, outside_bounds, other_class, thinned, invalid } => write!(
+            Self::NothingLeft { read, outside_bounds, other_class, thinned, invalid, at_origin } => write!(
                 f,
                 "no points left after filtering {read}: {outside_bounds} outside the bounds, {other_class} of other \
-                 classes, {thinned} thinned out, {invalid} without a valid position"
+                 classes, {thinned} thinned out, {invalid} without a valid position, {at_origin} at the scanner's origin"
             ),
             Self::FarPoints { min, max } => {
                 let corner = |c: &[f64; 3]| format!("{:e}, {:e}, {:e}", c[0], c[1], c[2]);

@@ -53,13 +53,14 @@ pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
 pub use outputs::potree2::{Encoding, Potree2Settings};
 pub use plan::{
-    AttributeChoice, Duplicates, Filter, OnFault, Outliers, Plan, PlanError, PlanFault, RgbDepth, ScaleChoice, Setting,
+    AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault, RgbDepth,
+    ScaleChoice, Setting,
 };
 pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
-    AttributeReport, ChangedAttribute, ChangedValues, CoordinateChange, DropReason, DroppedAttribute, Estimate,
-    GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report,
-    TreeReport,
+    Accuracy, AttributeReport, ChangedAttribute, ChangedValues, DropReason, DroppedAttribute, Estimate, GridReport,
+    How, InputReport, Integers, Merged, Metres, MissingValues, OtherFilesReport, OutputReport, PhaseReport,
+    PointsReport, PositionErrors, Report, SharedPlaceReport, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
 pub use sources::{ResolvedCrs, resolve_crs};

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use pointmill_format::{Aabb, Changes, DatasetKind, ReadError, ScanWarning, Unit};
+use pointmill_format::{Aabb, AttributeType, Changes, DatasetKind, ReadError, ScanWarning, Unit};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::advice::Advice;
@@ -85,14 +85,43 @@ pub enum Warning {
         /// The coordinate step would be finer without them.
         holds_back_step: bool,
     },
+    /// Points exactly at the origin of their scan, where the scanner stood.
+    OriginPoints {
+        /// How many.
+        points: u64,
+        /// Of how many points of scans whose origin is known.
+        of: u64,
+    },
+    /// Very many points share one place.
+    SharedPlace {
+        /// World coordinates of the place that most share.
+        position: [f64; 3],
+        /// Points there.
+        points: u64,
+        /// Points of the cloud.
+        of: u64,
+        /// Other places that very many points share.
+        more: usize,
+        /// The place is (0, 0, 0) in a file that does not say where the scanner stood.
+        at_origin: bool,
+    },
     /// Values of an attribute could not stay as they were.
     ValuesChanged {
         /// Its name.
         attribute: String,
-        /// The format that cannot hold them; `None`: they changed while they were read.
-        output: Option<DatasetKind>,
+        /// The format that cannot hold them, and the type that it has; `None`: they changed while they were read.
+        output: Option<(DatasetKind, AttributeType)>,
         /// How many, by what became of them.
         changes: Changes,
+    },
+    /// Two attributes of one name cannot be one.
+    AttributesApart {
+        /// The name.
+        name: String,
+        /// Elements of the first and of the second.
+        elements: [usize; 2],
+        /// The name that the second gets.
+        other: String,
     },
     /// Some files, or some scans of a file, have no values of attributes that others have.
     ValuesMissing {
@@ -238,7 +267,10 @@ impl Warning {
             Self::OutliersDropped { .. } => "outliers_dropped",
             Self::CoarseSingle { .. } => "coarse_single",
             Self::Outliers { .. } => "outliers",
+            Self::OriginPoints { .. } => "origin_points",
+            Self::SharedPlace { .. } => "shared_place",
             Self::ValuesChanged { .. } => "values_changed",
+            Self::AttributesApart { .. } => "attributes_apart",
             Self::ValuesMissing { .. } => "values_missing",
             Self::MixedRgbDepth { .. } => "mixed_rgb_depth",
             Self::Crs(_) => "crs",
@@ -255,6 +287,7 @@ impl Warning {
     pub fn advice(&self) -> Option<Advice> {
         match self {
             Self::Outliers { others, .. } => Some(Advice::CutBounds { bounds: Some(*others) }),
+            Self::OriginPoints { .. } | Self::SharedPlace { at_origin: true, .. } => Some(Advice::SkipOriginPoints),
             Self::MixedRgbDepth { .. } => Some(Advice::SetRgbDepth),
             Self::Scan { warning: ScanWarning::DecimalComma { .. }, .. } => Some(Advice::CommasSeparate),
             Self::Crs(CrsNote::NoCode { .. } | CrsNote::UserDefined { .. }) => Some(Advice::NameEpsg),
@@ -290,10 +323,19 @@ impl Warning {
                 steps(*resolution)
             ),
             Self::Outliers { points, factor, holds_back_step, .. } => outliers(*points, *factor, *holds_back_step),
+            Self::OriginPoints { points, of } => format!(
+                "{} of {} points lie exactly at the origin of their scan, where the scanner stood",
+                grouped(*points),
+                grouped(*of)
+            ),
+            Self::SharedPlace { position, points, of, more, .. } => shared_place(*position, *points, *of, *more),
             Self::ValuesChanged { attribute, output: None, changes } => format!("{attribute}: {changes}"),
-            Self::ValuesChanged { attribute, output: Some(kind), changes } => {
-                format!("{}: {attribute}: {changes}", kind.name())
+            Self::ValuesChanged { attribute, output: Some((kind, ty)), changes } => {
+                format!("{}: {attribute}, stored as {ty}: {changes}", kind.name())
             }
+            Self::AttributesApart { name, elements: [one, two], other } => format!(
+                "the inputs have two attributes {name:?}, of {one} and of {two} elements a point; the second is {other:?}"
+            ),
             Self::ValuesMissing { attributes, points, files } => missing(attributes, *points, *files),
             Self::MixedRgbDepth { eight_bit, coloured, first } => format!(
                 "{eight_bit} of {coloured} inputs with colour have no value above 255 and are taken as 8 bits deep, \
@@ -353,6 +395,28 @@ fn outliers(points: u64, factor: f64, holds_back_step: bool) -> String {
          tree would have fewer levels",
         factor.floor()
     )
+}
+
+fn shared_place([x, y, z]: [f64; 3], points: u64, of: u64, more: usize) -> String {
+    let more = match more {
+        0 => String::new(),
+        1 => ", and one more place is shared by at least one in a hundred".to_owned(),
+        n => format!(", and {n} more places are each shared by at least one in a hundred"),
+    };
+    format!("{} of {} points share the position ({x}, {y}, {z}){more}", grouped(points), grouped(of))
+}
+
+/// A count with commas between thousands.
+fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
 }
 
 impl fmt::Display for Warning {

@@ -12,7 +12,7 @@ pub enum WriteError {
     #[error("the cell of level 0 is {0}; it has to be a finite number greater than 0")]
     Cell(f64),
     #[error(
-        "a cell of {cell} is too small for an extent of {extent}: the order reaches 2^30 cells; take one of {least} or more"
+        "a cell of {cell} is too small: the points reach {extent} beyond the whole unit below them, and the order 2^30 cells; take one of {least} or more"
     )]
     CellTooSmall { cell: f64, extent: f64, least: f64 },
     #[error("the points span {0:?} to {1:?}, which float32 boxes cannot hold; leave out the points that are far away")]

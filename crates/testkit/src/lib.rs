@@ -6,6 +6,7 @@
 //! * [`golden`]: the tables of what other programs read from the fixtures (`fixtures/*/expected.tsv`).
 //! * [`damage`]: cut files, flipped bits, wrong fields.
 //! * [`las`]: LAS files of any points, any field of which may be wrong.
+//! * [`las_records`]: variable length records and extra bytes for these.
 //! * [`reader`]: what every reader of scans promises, checked on any [`pointmill_format::Scan`].
 //!
 //! Everything here panics where a test must fail, and says what was found.
@@ -18,6 +19,7 @@ pub mod damage;
 pub mod files;
 pub mod golden;
 pub mod las;
+pub mod las_records;
 pub mod random;
 pub mod reader;
 pub mod scans;

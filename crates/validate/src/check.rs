@@ -37,6 +37,7 @@ pub enum Check {
     Sides,
     Degenerate,
     Against,
+    Accuracy,
     Header,
     Sections,
     Description,
@@ -85,6 +86,7 @@ impl Check {
         Self::Spacing,
         Self::Coverage,
         Self::Against,
+        Self::Accuracy,
     ];
 
     /// The checks of mean-split binary trees.
@@ -103,6 +105,7 @@ impl Check {
         Self::Sides,
         Self::Degenerate,
         Self::Against,
+        Self::Accuracy,
     ];
 
     /// The checks of quantised batches.
@@ -123,6 +126,7 @@ impl Check {
         Self::Errors,
         Self::AttributeRanges,
         Self::Against,
+        Self::Accuracy,
     ];
 
     /// Its place among all checks.
@@ -163,6 +167,7 @@ impl Check {
             Self::Sides => "sides",
             Self::Degenerate => "degenerate",
             Self::Against => "against",
+            Self::Accuracy => "accuracy",
             Self::Header => "header",
             Self::Sections => "sections",
             Self::Description => "description",
@@ -214,6 +219,7 @@ impl Check {
             Self::Sides => "the low side is at the plane or below, the high side above",
             Self::Degenerate => "points of one place, and no others, are cut by number",
             Self::Against => "every point and attribute of the sources is in the dataset exactly once",
+            Self::Accuracy => "the report of the conversion states the errors of decoded positions as they are",
             Self::Header => "the header is in range and agrees with itself",
             Self::Sections => {
                 "sections are in order on multiples of 256 bytes, zeros between them, nothing behind them"
@@ -227,7 +233,7 @@ impl Check {
             Self::StorageOrder => "points ascend by Morton code, X, Y, Z, colour, attributes once the swap is undone",
             Self::Levels => "exactly the points nearest to the centres of cells of level 0, 1, 2 have that level",
             Self::Colours => "points below level 3 show the mean of their cell, greys follow from intensities",
-            Self::Originals => "originals ascend and are those of exactly the points below level 3",
+            Self::Originals => "originals ascend and are those of points below level 3 that show another colour",
             Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }
     }

@@ -19,6 +19,7 @@
 //! sees the converter.
 #![forbid(unsafe_code)]
 
+mod accuracy;
 mod against;
 mod batches;
 mod bintree;
@@ -33,6 +34,7 @@ use std::path::Path;
 
 use pointmill_format::ReadError;
 
+pub use accuracy::{Accuracy, Integers, Merged, PositionErrors};
 pub use check::Check;
 pub use finding::{CheckResult, Finding, Severity};
 pub use options::{Options, Progress, ProgressFn};

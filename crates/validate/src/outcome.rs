@@ -3,6 +3,7 @@
 use pointmill_format::DatasetKind;
 use serde::Serialize;
 
+use crate::accuracy::Accuracy;
 use crate::check::Check;
 use crate::finding::{CheckResult, Finding, Findings};
 
@@ -30,6 +31,8 @@ pub struct Outcome {
     pub leaves: Option<LeafQuality>,
     /// The comparison with the sources, if there was one.
     pub against: Option<AgainstSummary>,
+    /// How far decoded positions are from those of the sources, as far as it could be measured.
+    pub accuracy: Accuracy,
 }
 
 impl Outcome {
@@ -48,6 +51,7 @@ impl Outcome {
             quality: Vec::new(),
             leaves: None,
             against: None,
+            accuracy: Accuracy::default(),
         }
     }
 

@@ -4,19 +4,21 @@ mod batches;
 mod bintree;
 mod description;
 mod measure;
+mod parts;
 mod potree2;
 mod scan;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use description::Description;
-use pointmill_format::{DatasetKind, Located, locate};
+use pointmill_format::{DatasetKind, Located, OpenOptions, locate};
 use serde_json::Value;
 
 use crate::args::InfoArgs;
 use crate::datasets;
 use crate::exit::{Failure, emit, print_line};
 use crate::inputs;
+use crate::scan_choice;
 
 /// Describes a dataset; each kind has a file here.
 fn describe_dataset(dataset: &Located) -> Result<Description, Failure> {
@@ -36,7 +38,9 @@ fn datasets(path: &Path) -> Vec<Located> {
 
 /// Describes every path; the exit code is that of the first failure.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    args.reading.placing.refuse_idle_crs()?;
     let options = args.reading.options()?;
+    check_choice(&args.paths, &options)?;
     let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };
     for path in &args.paths {
         let datasets = datasets(path);
@@ -60,6 +64,17 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         emit(&format!("{:#}\n", Value::Array(out.objects)))?;
     }
     out.first_failure.map_or(Ok(()), Err)
+}
+
+/// Checks that the scans that were chosen are in one of all inputs.
+fn check_choice(paths: &[PathBuf], options: &OpenOptions) -> Result<(), Failure> {
+    if options.scans.is_none() {
+        return Ok(());
+    }
+    // what cannot be found is reported in its turn
+    let expanded = paths.iter().filter_map(|path| inputs::expand(std::slice::from_ref(path), options).ok());
+    let files: Vec<PathBuf> = expanded.flat_map(|found| found.files).collect();
+    scan_choice::check(&files, options)
 }
 
 /// The output so far.

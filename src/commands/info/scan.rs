@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
-use pointmill_format::{AxisGrid, OpenOptions, Resolution, Scan, ScanInfo, ScanPart, Unit};
+use pointmill_format::{AxisGrid, OpenOptions, Resolution, Scan, ScanInfo, Unit};
 use serde_json::{Map, Value, json};
 
 use super::description::{Description, attribute_json, corners};
 use super::measure::{Measured, measure};
+use super::parts;
 use crate::exit::Failure;
 use crate::human::quantities::{bytes, count, number, numbers, plural};
 use crate::human::text::{self, Table, attribute_line};
 
-/// Maximum scans of a file that are listed as text; JSON lists all.
+/// Maximum scans, and images, of a file that are listed as text; JSON lists all.
 const MAX_PARTS: usize = 30;
 
 /// Describes a scan, with `deep` also its points.
@@ -52,12 +53,8 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
     }
     let pieces = plural(scan.pieces().len() as u64, "piece");
     t.row("size", format!("{}, {pieces} to decode in parallel", bytes(info.file_bytes)));
-    for (i, part) in info.parts.iter().take(MAX_PARTS).enumerate() {
-        t.row(if i == 0 { "scans" } else { "" }, part_line(i, part));
-    }
-    if let Some(more @ 1..) = info.parts.len().checked_sub(MAX_PARTS) {
-        t.row("", format!("and {}; --json lists all", plural(more as u64, "more scan")));
-    }
+    list(&mut t, "scan", info.parts.iter().map(parts::part_line), info.parts.len());
+    list(&mut t, "image", info.images.iter().map(parts::image_line), info.images.len());
     for (i, attribute) in info.attributes.iter().enumerate() {
         let ranges = measured.map(|m| m.ranges[i].as_slice());
         t.row(if i == 0 { "attributes" } else { "" }, attribute_line(attribute, ranges));
@@ -65,6 +62,16 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
     info.warnings.iter().for_each(|w| t.row("warning", w.to_string()));
     crs.notes.iter().for_each(|note| t.row("warning", note.to_string()));
     t.0
+}
+
+/// Lines of a list of scans or images.
+fn list(t: &mut Table, noun: &str, lines: impl Iterator<Item = String>, count: usize) {
+    for (i, line) in lines.take(MAX_PARTS).enumerate() {
+        t.row(&if i == 0 { format!("{noun}s") } else { String::new() }, line);
+    }
+    if let Some(more @ 1..) = count.checked_sub(MAX_PARTS) {
+        t.row("", format!("and {}; --json lists all", plural(more as u64, &format!("more {noun}"))));
+    }
 }
 
 /// The precision of stored coordinates: one text where all axes agree, else one per axis.
@@ -101,46 +108,8 @@ fn single_step(v: f64) -> f64 {
     f64::from(v.next_up()) - f64::from(v)
 }
 
-/// "2: Hall, 1,200 points, at 3 4 5, turned by 30° about 0 0 1".
-fn part_line(index: usize, part: &ScanPart) -> String {
-    let name = if part.name.is_empty() { String::new() } else { format!("{}, ", part.name) };
-    let at = numbers(&part.translation);
-    format!("{index}: {name}{}, at {at}{}", plural(part.points, "point"), turn(&part.rotation))
-}
-
-/// A rotation as its angle and axis; another matrix as its rows.
-fn turn(m: &[[f64; 3]; 3]) -> String {
-    let dot = |a: usize, b: usize| (0..3).map(|i| m[a][i] * m[b][i]).sum::<f64>();
-    let is_rotation = (0..3).all(|a| (0..=a).all(|b| (dot(a, b) - f64::from(u8::from(a == b))).abs() < 1e-4));
-    let minors = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| m[1][i] * m[2][j] - m[1][j] * m[2][i]);
-    let determinant: f64 = (0..3).map(|i| m[0][i] * minors[i]).sum();
-    if !is_rotation || determinant < 0.0 {
-        return format!(", times the matrix {}", m.each_ref().map(|row| numbers(row)).join("; "));
-    }
-    // twice the sine times the axis, and one more than twice the cosine
-    let axis = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]];
-    let length = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let degrees = length.atan2(m[0][0] + m[1][1] + m[2][2] - 1.0).to_degrees();
-    if degrees < 1e-4 {
-        return String::new();
-    }
-    // at 180° the axis is that of the symmetric part instead
-    let axis = if length > 1e-4 { axis.map(|v| v / length) } else { half_turn_axis(m) };
-    let short = |v: f64| number((v * 1e4).round() / 1e4);
-    format!(", turned by {}° about {}", short(degrees), axis.map(short).join(" "))
-}
-
-/// The axis of a rotation by 180°: `m + 1` is twice its outer product.
-fn half_turn_axis(m: &[[f64; 3]; 3]) -> [f64; 3] {
-    let largest = (1..3).fold(0, |best, a| if m[a][a] > m[best][best] { a } else { best });
-    let column: [f64; 3] = std::array::from_fn(|i| m[i][largest] + f64::from(u8::from(i == largest)));
-    let length = column.iter().map(|v| v * v).sum::<f64>().sqrt();
-    column.map(|v| v / length)
-}
-
 fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
     let info = scan.info();
-    let part = |p: &ScanPart| json!({ "name": p.name, "points": p.points, "rotation": p.rotation, "translation": p.translation });
     let of_axis = |resolution: Resolution| match resolution {
         Resolution::Grid(grid) => json!({ "stored": "steps", "step": grid.step, "offset": grid.offset }),
         Resolution::Step(step) => json!({ "stored": "steps", "step": step }),
@@ -157,7 +126,8 @@ fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
         "lattice": info.lattice.map(|l| json!({ "scale": l.scale, "offset": l.offset })),
         "resolution": resolution,
         "crs": crs_json(info),
-        "scans": info.parts.iter().map(part).collect::<Vec<_>>(),
+        "scans": info.parts.iter().map(parts::part_json).collect::<Vec<_>>(),
+        "images": info.images.iter().map(parts::image_json).collect::<Vec<_>>(),
         "attributes": info.attributes.iter().map(attribute_json).collect::<Vec<_>>(),
         "pieces": scan.pieces().len(),
         "file_bytes": info.file_bytes,
@@ -199,20 +169,6 @@ fn crs_json(info: &ScanInfo) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn rotations_are_described_by_angle_and_axis() {
-        assert_eq!(turn(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), "");
-        assert_eq!(turn(&[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), ", turned by 90° about 0 0 1");
-        assert_eq!(turn(&[[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]), ", turned by 180° about 0 0 1");
-        let (c, s) = (30f64.to_radians().cos(), 30f64.to_radians().sin());
-        assert_eq!(turn(&[[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]), ", turned by 30° about 1 0 0");
-        assert_eq!(
-            turn(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0]]),
-            ", times the matrix 1 0 0; 0 1 0; 0 0 2"
-        );
-        assert!(turn(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]).contains("matrix"), "a mirror");
-    }
 
     #[test]
     fn single_precision_is_described_as_steps() {

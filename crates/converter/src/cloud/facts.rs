@@ -36,7 +36,9 @@ impl Facts {
         let mut ranges = stats.ranges.clone();
         let mut widen_rgb = vec![None; sources.all.len()];
         if let Some(rgb) = schema.rgb() {
-            let depths: Vec<bool> = stats.sources.iter().map(|s| is_eight_bit(plan.rgb_depth, s)).collect();
+            let all = sources.all.iter().zip(&stats.sources);
+            let depths: Vec<bool> =
+                all.map(|(s, stats)| is_eight_bit(plan.rgb_depth, s.scan.info().rgb_is_16_bit, stats)).collect();
             for (i, source) in stats.sources.iter().enumerate().filter(|(_, s)| s.kept > 0) {
                 let mut range = source.rgb.clone();
                 if intake.sources[i].has(Some(rgb)) && depths[i] {
@@ -57,12 +59,13 @@ impl Facts {
     }
 }
 
-/// True if the colour values of a source have 8 bits.
-fn is_eight_bit(policy: RgbDepth, source: &SourceStats) -> bool {
+/// True if the colour values of a source have 8 bits; what the file declares comes before what its values look like.
+fn is_eight_bit(policy: RgbDepth, is_declared_16_bit: bool, source: &SourceStats) -> bool {
     let deepest = source.rgb.max.iter().chain(&source.rgb_unfiltered.max);
     match policy {
         RgbDepth::Eight => true,
         RgbDepth::Sixteen => false,
+        RgbDepth::Auto if is_declared_16_bit => false,
         RgbDepth::Auto => !source.rgb.is_empty() && deepest.into_iter().all(|v| *v <= 255.0),
     }
 }

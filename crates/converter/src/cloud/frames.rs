@@ -19,7 +19,7 @@ use std::ops::{Index, IndexMut};
 pub(crate) struct JobPoint(pub(crate) [i64; 3]);
 
 /// Integers as records store them: those of the job lattice, counted from [`StoredOrigin`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[repr(transparent)]
 pub(crate) struct StoredPoint(pub(crate) [i32; 3]);
 

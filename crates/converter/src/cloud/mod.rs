@@ -20,7 +20,7 @@ mod shortfall;
 mod stats;
 mod store;
 
-pub(crate) use cell::Cell;
+pub(crate) use cell::{Cell, SharedPlace};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
@@ -35,7 +35,7 @@ pub(crate) use record::{RecordFrame, copy_record, position};
 pub(crate) use regroup::Regrouper;
 pub(crate) use segments::{Segment, Segments};
 pub(crate) use shortfall::Shortfall;
-pub(crate) use stats::{Range, Stats};
+pub(crate) use stats::{Change, Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 
 use pointmill_format::Aabb;
@@ -62,6 +62,8 @@ pub(crate) struct Cloud<'a> {
     pub(crate) facts: Facts,
     /// Points outside were dropped as outliers.
     pub(crate) far_cut: Option<Aabb>,
+    /// Places that very many points share, the fullest first.
+    pub(crate) shared_places: Vec<SharedPlace>,
     /// Of headers and points, in order of discovery.
     pub(crate) warnings: Vec<Warning>,
 }
@@ -74,6 +76,7 @@ pub(crate) struct Gathered {
     pub(crate) store: Store,
     pub(crate) cells: Vec<Cell>,
     pub(crate) stats: Stats,
+    pub(crate) shared_places: Vec<SharedPlace>,
 }
 
 impl<'a> Cloud<'a> {
@@ -89,10 +92,24 @@ impl<'a> Cloud<'a> {
         far_cut: Option<Aabb>,
         mut warnings: Vec<Warning>,
     ) -> Result<Self, ConvertError> {
-        let Gathered { lattice, is_lossless, frame, store, cells, stats } = gathered;
+        let Gathered { lattice, is_lossless, frame, store, cells, stats, shared_places } = gathered;
         warnings.extend_from_slice(&stats.warnings);
         let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
-        Ok(Self { plan, sources, intake, lattice, is_lossless, frame, store, cells, stats, facts, far_cut, warnings })
+        Ok(Self {
+            plan,
+            sources,
+            intake,
+            lattice,
+            is_lossless,
+            frame,
+            store,
+            cells,
+            stats,
+            facts,
+            far_cut,
+            shared_places,
+            warnings,
+        })
     }
 
     /// The filter with its box as it was applied: without outliers, if they were dropped.

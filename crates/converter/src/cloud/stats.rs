@@ -14,8 +14,12 @@ pub(crate) struct Stats {
     pub(crate) bounds: JobBounds,
     /// Range of each attribute of the schema.
     pub(crate) ranges: Vec<Range>,
-    /// Points by class.
+    /// Points by class, if classes have 8 bits.
     pub(crate) classes: Vec<u64>,
+    /// Classes that single precision does not hold as whole numbers.
+    pub(crate) odd_classes: Changes,
+    /// 64-bit integers that doubles do not hold: by attribute of the schema, empty where there are none.
+    pub(crate) doubled: Vec<Changes>,
     pub(crate) sources: Vec<SourceStats>,
     /// Of the records as they are stored.
     pub(crate) checksum: Checksum,
@@ -27,7 +31,13 @@ pub(crate) struct Stats {
     pub(crate) other_class: u64,
     pub(crate) thinned: u64,
     pub(crate) invalid: u64,
+    /// Skipped because they lie exactly at the origin of their scan.
+    pub(crate) origin_skipped: u64,
     pub(crate) unreadable: u64,
+    /// Points whose integers in their scan do not come back from the job lattice.
+    pub(crate) integers_lost: u64,
+    /// Some point moved to the job lattice by more than doubles of its coordinates are rounded.
+    pub(crate) moves: bool,
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -98,6 +108,8 @@ pub(crate) struct SourceStats {
     pub(crate) read: u64,
     /// That go in.
     pub(crate) kept: u64,
+    /// Exactly at the origin of their scan, before any filter.
+    pub(crate) at_origin: u64,
     /// World coordinates, before any filter.
     pub(crate) bounds: Aabb,
     /// Axes on which a point contradicts the grid that the file, or a sample, claims.
@@ -114,11 +126,18 @@ pub(crate) struct SourceStats {
 impl SourceStats {
     /// Adds to what changed of an attribute of the schema.
     pub(crate) fn count_changes(&mut self, attribute: usize, changes: &Changes) {
-        if self.changes.len() <= attribute {
-            self.changes.resize(attribute + 1, Changes::default());
-        }
-        self.changes[attribute].merge(changes);
+        count(&mut self.changes, attribute, changes);
     }
+}
+
+fn count(all: &mut Vec<Changes>, attribute: usize, changes: &Changes) {
+    if changes.is_empty() {
+        return;
+    }
+    if all.len() <= attribute {
+        all.resize(attribute + 1, Changes::default());
+    }
+    all[attribute].merge(changes);
 }
 
 /// Smallest and largest value of each element; NaN and infinities are not values.
@@ -236,6 +255,7 @@ impl Stats {
         let source = SourceStats {
             read: 0,
             kept: 0,
+            at_origin: 0,
             bounds: Aabb::EMPTY,
             off_grid: [false; 3],
             rgb: Range::new(3),
@@ -246,6 +266,8 @@ impl Stats {
             bounds: JobBounds::EMPTY,
             ranges: schema.attributes.iter().map(|a| Range::new(a.elements)).collect(),
             classes: vec![0; 256],
+            odd_classes: Changes::default(),
+            doubled: Vec::new(),
             sources: vec![source; sources],
             checksum: Checksum::default(),
             change: Change::default(),
@@ -255,18 +277,29 @@ impl Stats {
             other_class: 0,
             thinned: 0,
             invalid: 0,
+            origin_skipped: 0,
             unreadable: 0,
+            integers_lost: 0,
+            moves: false,
             warnings: Vec::new(),
         }
+    }
+
+    /// Adds to the values of an attribute of the schema that doubles do not hold.
+    pub(crate) fn count_doubled(&mut self, attribute: usize, changes: &Changes) {
+        count(&mut self.doubled, attribute, changes);
     }
 
     pub(crate) fn merge(&mut self, other: &Self) {
         self.bounds.union(&other.bounds);
         self.ranges.iter_mut().zip(&other.ranges).for_each(|(a, b)| a.merge(b));
         self.classes.iter_mut().zip(&other.classes).for_each(|(a, b)| *a += b);
+        self.odd_classes.merge(&other.odd_classes);
+        other.doubled.iter().enumerate().for_each(|(attribute, changes)| self.count_doubled(attribute, changes));
         for (a, b) in self.sources.iter_mut().zip(&other.sources) {
             a.read += b.read;
             a.kept += b.kept;
+            a.at_origin += b.at_origin;
             a.bounds = a.bounds.union(&b.bounds);
             a.off_grid = std::array::from_fn(|axis| a.off_grid[axis] || b.off_grid[axis]);
             a.rgb.merge(&b.rgb);
@@ -281,7 +314,10 @@ impl Stats {
         self.other_class += other.other_class;
         self.thinned += other.thinned;
         self.invalid += other.invalid;
+        self.origin_skipped += other.origin_skipped;
         self.unreadable += other.unreadable;
+        self.integers_lost += other.integers_lost;
+        self.moves |= other.moves;
         self.warnings.extend_from_slice(&other.warnings);
         self.warnings.sort_by_cached_key(Warning::to_string);
     }

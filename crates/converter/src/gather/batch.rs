@@ -3,16 +3,16 @@
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-use pointmill_format::{Changes, PointBatch, Positions};
+use pointmill_format::{Column, PointBatch, Positions};
 
 use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{CellParts, Context};
-use super::{partition, ranges, select};
+use super::{exact, moved, partition, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
 use crate::runtime::os_hints;
-use crate::sources::{POSITION_BYTES, as_doubles};
+use crate::sources::{MARK_BYTES, POSITION_BYTES, Recast};
 
 /// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
 const TILE_POINTS: usize = 512;
@@ -31,6 +31,8 @@ pub(super) struct Worker<'a> {
     pub(super) stats: Stats,
     parts: CellParts,
     q: JobColumns,
+    /// See [`exact::marks`]; empty if they are not needed.
+    marks: Vec<u64>,
     change: [Vec<f64>; 3],
     selection: Vec<u32>,
     cells: Vec<u64>,
@@ -52,6 +54,7 @@ impl<'a> Worker<'a> {
             stats: Stats::new(&pass.intake.schema, pass.sources.all.len()),
             parts: CellParts::default(),
             q: JobColumns::default(),
+            marks: Vec::new(),
             change: Default::default(),
             selection: Vec::new(),
             cells: Vec::new(),
@@ -72,16 +75,10 @@ impl<'a> Worker<'a> {
         let filtered = select::select(self.pass, source, batch, &mut self.stats, &mut self.selection)?;
         self.stats.sources[source].read += batch.len() as u64;
         self.note_changes(source, batch);
-        let stored;
-        let batch = match self.as_stored(source, batch) {
-            Some(other) => {
-                stored = other;
-                &stored
-            }
-            None => batch,
-        };
+        let recast = self.recast(source, batch);
+        let columns = stored_columns(batch, &recast);
         if filtered {
-            ranges::unfiltered_colour(self.pass, source, batch, &mut self.stats);
+            ranges::unfiltered_colour(self.pass, source, &columns, &mut self.stats);
         }
         let kept = if filtered { self.selection.len() } else { batch.len() };
         if kept == 0 {
@@ -96,7 +93,7 @@ impl<'a> Worker<'a> {
             let range = start..if is_scattered { kept } else { (start + SLICE_POINTS).min(kept) };
             start = range.end;
             let rows = if filtered { Rows::Selected(&selection[range]) } else { Rows::Consecutive(range) };
-            outcome = self.take_slice(source, batch, &rows);
+            outcome = self.take_slice(source, batch, &columns, &rows);
             if outcome.is_err() {
                 break;
             }
@@ -104,7 +101,7 @@ impl<'a> Worker<'a> {
         self.selection = selection;
         if !self.pass.misled.load(Ordering::Relaxed) {
             let selection = filtered.then_some(&self.selection[..]);
-            ranges::add(self.pass, source, batch, selection, &mut self.stats);
+            ranges::add(self.pass, source, &columns, batch.len(), selection, &mut self.stats);
         }
         outcome
     }
@@ -118,22 +115,26 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// The batch with columns of the types that are stored, if these differ from what was read.
-    fn as_stored(&mut self, source: usize, batch: &PointBatch) -> Option<PointBatch> {
-        let mut stored: Option<PointBatch> = None;
-        for (i, column) in batch.columns.iter().enumerate() {
-            if let Some((doubles, rounded)) = as_doubles(column) {
-                stored.get_or_insert_with(|| batch.clone()).columns[i] = doubles;
-                if let Some(place) = self.pass.intake.sources[source].columns[i] {
-                    let changes = Changes { rounded, ..Changes::default() };
-                    self.stats.sources[source].count_changes(place, &changes);
-                }
+    /// The columns that are not stored as they were read, by index.
+    fn recast(&mut self, source: usize, batch: &PointBatch) -> Vec<(usize, Column)> {
+        let intake = &self.pass.intake.sources[source];
+        let recast = |(i, recast): &(usize, Recast)| {
+            let (column, changes) = recast.apply(&batch.columns[*i]);
+            if let Some(place) = intake.columns[*i] {
+                self.stats.sources[source].count_changes(place, &changes);
             }
-        }
-        stored
+            (*i, column)
+        };
+        intake.recasts.iter().map(recast).collect()
     }
 
-    fn take_slice(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> Result<(), ConvertError> {
+    fn take_slice(
+        &mut self,
+        source: usize,
+        batch: &PointBatch,
+        columns: &[&Column],
+        rows: &Rows<'_>,
+    ) -> Result<(), ConvertError> {
         let bounds = self.quantize(source, batch, rows);
         self.stats.bounds.union(&bounds);
         if !self.pass.partition.holds(&bounds) {
@@ -142,13 +143,25 @@ impl<'a> Worker<'a> {
         if self.pass.misled.load(Ordering::Relaxed) {
             return Ok(()); // the pass will be repeated with the bounds that this one finds
         }
+        if self.pass.intake.mark.is_some() {
+            let own = self.pass.sources.all[source].scan.info().lattice.as_ref();
+            exact::marks(
+                &self.pass.maps[source],
+                own,
+                &self.pass.lattice,
+                batch,
+                &self.q,
+                |i| rows.row(i),
+                &mut self.marks,
+            );
+        }
         let points = self.q.len();
         self.stats.points += points as u64;
         self.stats.sources[source].kept += points as u64;
         self.pass.partition.cells(&self.q, &mut self.cells);
         self.grouping.group(&self.cells, partition::morton_of);
         let (block, start) = self.room_for(source, points)?;
-        self.assemble(source, batch, rows);
+        self.assemble(source, columns, rows);
         self.note_segments(block, start);
         Ok(())
     }
@@ -182,14 +195,14 @@ impl<'a> Worker<'a> {
     }
 
     /// Builds the records in the order of their cells.
-    fn assemble(&mut self, source: usize, batch: &PointBatch, slice: &Rows<'_>) {
+    fn assemble(&mut self, source: usize, columns: &[&Column], slice: &Rows<'_>) {
         let schema = &self.pass.intake.schema;
         let stride = schema.stride;
         let order = &self.grouping.order;
         let origin = self.pass.partition.origin();
         let start = self.records.len();
         self.records.resize(start + order.len() * stride, 0);
-        let parts = Part::of(&batch.columns, &self.pass.intake.sources[source].columns, schema);
+        let parts = Part::of(columns, &self.pass.intake.sources[source].columns, schema);
         let mut rows = [0u32; TILE_POINTS];
         for (tile, order) in self.records[start..].chunks_mut(TILE_POINTS * stride).zip(order.chunks(TILE_POINTS)) {
             for (record, &i) in tile.chunks_exact_mut(stride).zip(order) {
@@ -211,6 +224,11 @@ impl<'a> Worker<'a> {
             }
             for part in &parts {
                 part.put(tile, stride, rows);
+            }
+            if let Some(at) = self.pass.intake.mark {
+                for (record, i) in tile.chunks_exact_mut(stride).zip(order) {
+                    record[at..at + MARK_BYTES].copy_from_slice(&self.marks[*i as usize].to_le_bytes());
+                }
             }
             self.stats.checksum.add_all(tile, stride);
         }
@@ -235,6 +253,12 @@ impl<'a> Worker<'a> {
             Moved::Each => Err(&self.change[a][..]),
         });
         self.stats.change.add(points, axes);
+        if let Some(own) = &self.pass.sources.all[source].scan.info().lattice {
+            self.stats.integers_lost += moved::integers_lost(&axes, own, points);
+        }
+        if !self.stats.moves {
+            self.stats.moves = moved::is_more_than_rounding(&axes, &self.q, &bounds, &self.pass.lattice);
+        }
         for (a, by) in axes.iter().enumerate().filter(|(a, _)| self.pass.claims[source][*a]) {
             let rounding = self.pass.rounding(source, a, &bounds);
             if by.is_err_and(|column| column.iter().any(|v| v.abs() > rounding)) {
@@ -258,10 +282,27 @@ impl<'a> Worker<'a> {
     }
 }
 
+/// The columns of a batch as they are stored; `recast`: those that are not as they were read.
+fn stored_columns<'b>(batch: &'b PointBatch, recast: &'b [(usize, Column)]) -> Vec<&'b Column> {
+    let mut columns: Vec<&Column> = batch.columns.iter().collect();
+    recast.iter().for_each(|(i, column)| columns[*i] = column);
+    columns
+}
+
 /// Rows of a batch that are taken together.
 enum Rows<'a> {
     Consecutive(Range<usize>),
     Selected(&'a [u32]),
+}
+
+impl Rows<'_> {
+    /// The row of the batch that is the `i`th of these.
+    fn row(&self, i: usize) -> usize {
+        match self {
+            Self::Consecutive(range) => range.start + i,
+            Self::Selected(rows) => rows[i] as usize,
+        }
+    }
 }
 
 fn quantize_axis(

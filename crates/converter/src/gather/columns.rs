@@ -17,9 +17,9 @@ const MAX_BYTES: usize = 8;
 
 impl<'a> Part<'a> {
     /// The parts of a batch; `places` are the columns' indices in the schema, `None` for columns that are not kept.
-    pub(crate) fn of(columns: &'a [Column], places: &[Option<usize>], schema: &Schema) -> Vec<Self> {
-        let mut placed: Vec<(usize, &Column)> =
-            columns.iter().zip(places).filter_map(|(column, place)| Some(((*place)?, column))).collect();
+    pub(crate) fn of(columns: &[&'a Column], places: &[Option<usize>], schema: &Schema) -> Vec<Self> {
+        let mut placed: Vec<(usize, &'a Column)> =
+            columns.iter().copied().zip(places).filter_map(|(column, place)| Some(((*place)?, column))).collect();
         placed.sort_unstable_by_key(|(place, _)| schema.offsets[*place]);
         let mut parts: Vec<Self> = Vec::new();
         for (place, column) in placed {
@@ -125,6 +125,7 @@ mod tests {
         assert_eq!(attributes[4].ty, AttributeType::Float64);
         let schema = Schema::new(attributes);
         let mut tile = vec![0; 2 * schema.stride];
+        let columns: Vec<&Column> = columns.iter().collect();
         for part in Part::of(&columns, &[0, 1, 2, 3, 4, 5].map(Some), &schema) {
             part.put(&mut tile, schema.stride, &[1, 0]);
         }

@@ -3,10 +3,12 @@
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
-use pointmill_format::{Aabb, Lattice};
+use pointmill_format::Lattice;
 
 use super::axis::SourceMap;
+use super::cut::Cut;
 use super::lattice::ulp;
+use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segments, Store};
 use crate::plan::Plan;
@@ -28,10 +30,14 @@ pub(super) struct Context<'a> {
     pub(super) intake: &'a Intake,
     /// From the coordinates of each source to the lattice of the pass.
     pub(super) maps: Vec<SourceMap>,
+    /// The filter's box, for each source.
+    pub(super) cuts: Vec<Option<Cut>>,
+    /// Where the scanners of each source stood.
+    pub(super) origins: Vec<Origins>,
     /// Axes of each source on which every point has to prove the claim that a grid holds it.
     pub(super) claims: Vec<[bool; 3]>,
-    /// Points outside are outliers, which are dropped.
-    pub(super) far_cut: Option<Aabb>,
+    /// Points outside, in the terms of each source, are outliers, which are dropped.
+    pub(super) far_cuts: Vec<Option<Cut>>,
     /// The lattice of the pass.
     pub(super) lattice: Lattice,
     pub(super) partition: Partition,

@@ -9,11 +9,16 @@ mod axis;
 mod batch;
 mod columns;
 mod context;
+mod cut;
+mod exact;
 mod far;
 mod lattice;
+mod moved;
+mod origins;
 mod outliers;
 mod partition;
 mod pass;
+mod places;
 mod ranges;
 mod select;
 
@@ -22,14 +27,15 @@ use pointmill_format::{Aabb, AxisGrid, Lattice, ReadError};
 pub(crate) use context::Demand;
 pub(crate) use lattice::from_headers;
 
-use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, Stats};
+use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
-use crate::plan::{Outliers, Plan};
+use crate::plan::{OriginPoints, Outliers, Plan};
 use crate::runtime::{Clock, Phase, Runtime};
 use crate::sources::{Fineness, Sources, far_out, intersection};
 use crate::warning::Warning;
 use far::FarPoints;
 use lattice::Loss;
+use origins::Origins;
 use pass::{Pass, PassEnd};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
@@ -64,7 +70,10 @@ pub(crate) fn gather<'a>(
         let (stats, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, rt).run()? {
             PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
             PassEnd::Misled(stats) => (stats, None),
-            PassEnd::Complete(gathered) => (Box::new(gathered.stats.clone()), Some(gathered)),
+            PassEnd::Complete(mut gathered) => {
+                gathered.shared_places = places::find(&mut gathered)?;
+                (Box::new(gathered.stats.clone()), Some(gathered))
+            }
         };
         let settled = lattice::settled(plan, sources, &lattice, &stats);
         let read = Read { lattice: &lattice, stats: &stats, complete: complete.as_deref(), settled: settled.as_ref() };
@@ -93,7 +102,7 @@ pub(crate) fn gather<'a>(
                 hint = Some(stats.bounds);
             }
             (_, Some(gathered)) => {
-                finishing_warnings(sources, &gathered).into_iter().for_each(&mut warn);
+                finishing_warnings(plan, sources, &gathered).into_iter().for_each(&mut warn);
                 let known = warnings.len() + gathered.stats.warnings.len();
                 let cloud = Cloud::new(plan, sources, intake, *gathered, far_cut, warnings)?;
                 cloud.warnings[known..].iter().for_each(|w| rt.warn(w));
@@ -105,8 +114,8 @@ pub(crate) fn gather<'a>(
 }
 
 /// What there is to say of the points once all are in.
-fn finishing_warnings(sources: &Sources, gathered: &Gathered) -> Vec<Warning> {
-    let mut warnings = Vec::new();
+fn finishing_warnings(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Vec<Warning> {
+    let mut warnings = odd_places(plan, sources, gathered);
     if let Some(outliers) = outliers::find(gathered) {
         warnings.push(outliers.warning(gathered.lattice.is_held_back()));
     }
@@ -114,6 +123,28 @@ fn finishing_warnings(sources: &Sources, gathered: &Gathered) -> Vec<Warning> {
         if let Some(resolution) = source.survey.coarse_single(&stats.bounds) {
             warnings.push(Warning::CoarseSingle { path: source.scan.info().path.clone(), resolution });
         }
+    }
+    warnings
+}
+
+/// What there is to say of points at the origins of scans, and of places that very many points share.
+fn odd_places(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Vec<Warning> {
+    let origins: Vec<Origins> = sources.all.iter().map(|s| Origins::of(s.scan.info())).collect();
+    let (known, unknown): (Vec<_>, Vec<_>) =
+        origins.iter().zip(&gathered.stats.sources).partition(|(origins, _)| origins.are_known);
+    let mut warnings = Vec::new();
+    let (points, of) = known.iter().fold((0, 0), |(points, of), (_, s)| (points + s.at_origin, of + s.read));
+    if plan.filter.origin_points == OriginPoints::Keep && places::are_many_at_origin(points, of) {
+        warnings.push(Warning::OriginPoints { points, of });
+    }
+    // What was just said is not said again.
+    let step = gathered.lattice.lattice.scale;
+    let is_new = |place: &&SharedPlace| known.iter().all(|(origins, _)| !origins.are_near(place.position, step));
+    let new: Vec<&SharedPlace> = gathered.shared_places.iter().filter(is_new).collect();
+    if let Some((SharedPlace { position, points }, more)) = new.split_first() {
+        let (position, points, of, more) = (*position, *points, gathered.stats.points, more.len());
+        let at_origin = position == [0.0; 3] && unknown.iter().any(|(_, s)| s.at_origin > 0);
+        warnings.push(Warning::SharedPlace { position, points, of, more, at_origin });
     }
     warnings
 }
@@ -256,8 +287,8 @@ fn nothing_to_convert(sources: &Sources, stats: &Stats) -> ConvertError {
             ReadError::broken(&info.path, info.file_bytes, what).advise("there is nothing to convert").into()
         }
         _ => {
-            let Stats { outside_bounds, other_class, thinned, invalid, .. } = *stats;
-            InputFault::NothingLeft { read, outside_bounds, other_class, thinned, invalid }.into()
+            let Stats { outside_bounds, other_class, thinned, invalid, origin_skipped: at_origin, .. } = *stats;
+            InputFault::NothingLeft { read, outside_bounds, other_class, thinned, invalid, at_origin }.into()
         }
     }
 }

@@ -37,9 +37,10 @@ impl Outliers {
     }
 }
 
-/// Looks at the cells of the partition, not at the points.
+/// Looks at the cells of the partition, not at the points. What counts is how many places there are on either side: a
+/// hundred thousand points in one place are one, or the advice would leave out all that was measured.
 pub(super) fn find(gathered: &Gathered) -> Option<Outliers> {
-    let handful = handful(gathered.stats.points);
+    let handful = handful(gathered.cells.iter().map(Cell::distinct).sum());
     let cells: Vec<&Cell> = gathered.cells.iter().collect();
     let (kept, left_out) = trim(cells, handful)?;
     let (cube, lattice) = (&gathered.frame.cube, &gathered.lattice.lattice);
@@ -58,14 +59,15 @@ pub(super) fn find(gathered: &Gathered) -> Option<Outliers> {
     (left_out > 0 && factor >= WORTH).then_some(Outliers { points: left_out, others, factor })
 }
 
-/// How many of `points` points are too few to matter.
-fn handful(points: u64) -> u64 {
-    HANDFUL.max(points / 1_000_000).min(points / RARE)
+/// How many of `places` distinct points are too few to matter.
+fn handful(places: u64) -> u64 {
+    HANDFUL.max(places / 1_000_000).min(places / RARE)
 }
 
-/// Leaves out cells from both ends of every axis as long as the points in them are a handful.
+/// Leaves out cells from both ends of every axis as long as the distinct points in them are a handful; also returns the
+/// number of points left out, distinct or not.
 fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
-    let mut left_out = 0;
+    let (mut left_out, mut points_left_out) = (0, 0);
     let along = |axis: usize, c: &Cell| [c.key.x, c.key.y, c.key.z][axis];
     if cells.windows(2).any(|w| w[0].key.level != w[1].key.level) {
         return None; // divided already
@@ -77,7 +79,7 @@ fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
             let mut points = 0;
             let mut cut = (0, 0, 0);
             for (i, pair) in cells.windows(2).enumerate() {
-                points += pair[0].points;
+                points += pair[0].distinct();
                 if left_out + points > handful {
                     break;
                 }
@@ -86,11 +88,11 @@ fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
                     cut = (gap, i + 1, points);
                 }
             }
-            cells.drain(..cut.1);
+            points_left_out += cells.drain(..cut.1).map(|cell| cell.points).sum::<u64>();
             left_out += cut.2;
         }
     }
-    Some((cells, left_out))
+    Some((cells, points_left_out))
 }
 
 #[cfg(test)]
@@ -101,7 +103,19 @@ mod tests {
 
     fn cell(x: u32, points: u64) -> Cell {
         let key = NodeKey { level: 8, x, y: 3, z: 0 };
-        Cell { key, points, segments: Segments::default(), is_one_place: false, moments: Moments::default() }
+        Cell {
+            key,
+            points,
+            segments: Segments::default(),
+            is_one_place: false,
+            repeats: 0,
+            bounds: None,
+            moments: Moments::default(),
+        }
+    }
+
+    fn shared(x: u32, points: u64) -> Cell {
+        Cell { repeats: points - 1, is_one_place: true, ..cell(x, points) }
     }
 
     #[test]
@@ -111,6 +125,18 @@ mod tests {
         assert_eq!((kept.len(), left_out), (2, 5));
         let many = [cell(0, 30), cell(100, 50_000)];
         assert_eq!(trim(many.iter().collect(), 16).unwrap().1, 0);
+    }
+
+    #[test]
+    fn a_mass_of_points_in_one_place_counts_as_one() {
+        let find = |cells: &[Cell]| {
+            let (kept, left_out) =
+                trim(cells.iter().collect(), handful(cells.iter().map(Cell::distinct).sum())).unwrap();
+            (kept.len(), left_out)
+        };
+        assert_eq!(find(&[shared(0, 99_999), cell(255, 1)]), (2, 0), "the only other point stays");
+        assert_eq!(find(&[shared(0, 99_999), cell(255, 90)]), (2, 0));
+        assert_eq!(find(&[shared(0, 99_999), cell(255, 5_000)]), (1, 99_999));
     }
 
     #[test]

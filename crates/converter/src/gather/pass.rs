@@ -7,7 +7,9 @@ use pointmill_format::{Aabb, Advice, Lattice, Scratch};
 use super::axis::SourceMap;
 use super::batch::Worker;
 use super::context::{CellPart, CellParts, Context, Demand};
+use super::cut::Cut;
 use super::lattice::ulp;
+use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton};
 use crate::error::ConvertError;
@@ -47,6 +49,9 @@ impl<'a> Pass<'a> {
         rt: &'a Runtime<'a>,
     ) -> Self {
         let map = |s: &Source| SourceMap::new(s.scan.info().lattice.as_ref(), &lattice.lattice);
+        let cuts = |bounds: Option<Aabb>| -> Vec<Option<Cut>> {
+            sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect()
+        };
         let context = Context {
             plan,
             sources,
@@ -54,7 +59,9 @@ impl<'a> Pass<'a> {
             maps: sources.all.iter().map(map).collect(),
             claims: sources.all.iter().map(|s| s.survey.fineness.map(|f| f.is_claim())).collect(),
             lattice: lattice.lattice,
-            far_cut,
+            far_cuts: cuts(far_cut),
+            cuts: cuts(plan.filter.bounds),
+            origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
             store: Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, rt.budget.store_bytes),
             wants_moments: demand.moments,
@@ -80,7 +87,15 @@ impl<'a> Pass<'a> {
             .map(|(packed, CellPart { mut segments, moments })| {
                 segments.sort();
                 let points = segments.points();
-                Cell { key: partition.node(packed, &cube), points, segments, is_one_place: false, moments }
+                Cell {
+                    key: partition.node(packed, &cube),
+                    points,
+                    segments,
+                    is_one_place: false,
+                    repeats: 0,
+                    bounds: None,
+                    moments,
+                }
             })
             .collect();
         cells.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));
@@ -91,6 +106,7 @@ impl<'a> Pass<'a> {
             store,
             cells,
             stats,
+            shared_places: Vec::new(),
         })))
     }
 

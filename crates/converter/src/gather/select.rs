@@ -5,7 +5,7 @@ use pointmill_format::{Aabb, Column, Lattice, PointBatch, Positions, with_column
 use super::context::Context;
 use crate::cloud::Stats;
 use crate::error::{ConvertError, InputFault};
-use crate::plan::OnFault;
+use crate::plan::{OnFault, OriginPoints};
 
 /// Fills `selection` with the points that pass the filter; false if all do.
 pub(super) fn select(
@@ -19,25 +19,25 @@ pub(super) fn select(
     let filter = &pass.plan.filter;
     let bounds = world_bounds(scan.info().lattice.as_ref(), &batch.positions);
     stats.sources[source].bounds = stats.sources[source].bounds.union(&bounds);
-    let is_inside = |b: Aabb| b.contains(bounds.min) && b.contains(bounds.max);
-    let all_inside = filter.bounds.is_none_or(is_inside) && pass.far_cut.is_none_or(is_inside);
+    let cut = pass.cuts[source].as_ref();
+    let origins = &pass.origins[source];
+    let at_origin = origins.count(batch);
+    stats.sources[source].at_origin += at_origin;
+    let skips_origin = filter.origin_points == OriginPoints::Skip && at_origin > 0;
+    let far_cut = pass.far_cuts[source].as_ref();
+    let all_inside = [cut, far_cut].into_iter().flatten().all(|cut| cut.holds_all(&batch.positions));
     let all_finite = match &batch.positions {
         Positions::Quantized(_) => true,
         Positions::World(p) => p.iter().all(|axis| axis.iter().all(|v| v.is_finite())),
     };
-    if filter.every < 2 && all_inside && filter.classes.is_none() && all_finite {
+    if filter.every < 2 && all_inside && filter.classes.is_none() && all_finite && !skips_origin {
         return Ok(false);
     }
     let class_column = scan.info().attributes.iter().position(|a| a.name == "classification");
     let classes = class_column.map(|c| &batch.columns[c]).filter(|_| filter.classes.is_some()).map(whole_numbers);
-    let world = |i: usize| -> [f64; 3] {
-        match (&batch.positions, scan.info().lattice.as_ref()) {
-            (Positions::Quantized(p), Some(l)) => {
-                std::array::from_fn(|a| f64::from(p[a][i]) * l.scale[a] + l.offset[a])
-            }
-            (Positions::Quantized(p), None) => std::array::from_fn(|a| f64::from(p[a][i])),
-            (Positions::World(p), _) => std::array::from_fn(|a| p[a][i]),
-        }
+    let is_finite = |i: usize| match &batch.positions {
+        Positions::Quantized(_) => true,
+        Positions::World(p) => p.iter().all(|axis| axis[i].is_finite()),
     };
     selection.clear();
     for i in 0..batch.len() {
@@ -45,21 +45,22 @@ pub(super) fn select(
             stats.thinned += 1;
             continue;
         }
-        let p = world(i);
-        if !p.iter().all(|v| v.is_finite()) {
+        if !is_finite(i) {
             if pass.plan.invalid == OnFault::Fail {
                 let path = scan.info().path.clone();
                 return Err(InputFault::InvalidPosition { path, point: batch.first_point + i as u64 }.into());
             }
             stats.invalid += 1;
-        } else if filter.bounds.is_some_and(|b| !b.contains(p)) {
+        } else if skips_origin && origins.hold(batch, i) {
+            stats.origin_skipped += 1;
+        } else if cut.is_some_and(|cut| !cut.holds(&batch.positions, i)) {
             stats.outside_bounds += 1;
-        } else if pass.far_cut.is_some_and(|b| !b.contains(p)) {
+        } else if far_cut.is_some_and(|cut| !cut.holds(&batch.positions, i)) {
             stats.outliers += 1;
         } else if filter
             .classes
             .as_ref()
-            .is_some_and(|c| !c.iter().any(|c| i64::from(*c) == classes.as_ref().map_or(0, |v| v[i])))
+            .is_some_and(|c| !classes.as_ref().map_or(Some(0), |v| v[i]).is_some_and(|class| c.contains(&class)))
         {
             stats.other_class += 1;
         } else {
@@ -69,10 +70,10 @@ pub(super) fn select(
     Ok(selection.len() < batch.len())
 }
 
-/// Classes of any type as whole numbers; what is none is no class, −1.
+/// Classes of any type as whole numbers; `None`: no whole number, and so no class.
 #[allow(clippy::unnecessary_cast)] // one body for every type of column
-fn whole_numbers(column: &Column) -> Vec<i64> {
-    with_column!(column, v => v.iter().map(|v| if (*v as i64) as f64 == *v as f64 { *v as i64 } else { -1 }).collect())
+fn whole_numbers(column: &Column) -> Vec<Option<i64>> {
+    with_column!(column, v => v.iter().map(|v| Some(*v as i64).filter(|class| *class as f64 == *v as f64)).collect())
 }
 
 fn world_bounds(lattice: Option<&Lattice>, positions: &Positions) -> Aabb {

@@ -96,7 +96,8 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
         Ok(())
     }
 
-    /// Of records that are equal in every byte one stays.
+    /// Of records that are equal in every byte one stays. Their mark ([`crate::cloud::Intake::mark`]) differs where the
+    /// sources have different positions.
     fn drop_duplicates(&mut self, ledger: &mut Ledger) {
         let (records, stride) = (&self.records, self.plan.cloud.frame.stride);
         let class = self.plan.cloud.facts.class;

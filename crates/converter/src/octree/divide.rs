@@ -60,6 +60,8 @@ fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) 
         points: segments.iter().map(|s| u64::from(s.count)).sum(),
         segments,
         is_one_place,
+        repeats: 0,
+        bounds: None,
         moments: Moments::default(),
     };
     Ok(parts.into_iter().map(part).collect())

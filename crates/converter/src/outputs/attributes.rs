@@ -1,9 +1,12 @@
 //! Which attributes a dataset keeps, and why others are omitted.
 
+use pointmill_format::{Attribute, AttributeType, Changes, DatasetKind};
+
 use crate::cloud::Range;
 use crate::plan::AttributeChoice;
-use crate::report::{DropReason, DroppedAttribute};
+use crate::report::{ChangedAttribute, DropReason, DroppedAttribute};
 use crate::sources::Schema;
+use crate::warning::Warning;
 
 /// Attributes that go into a dataset, and those that do not.
 pub(crate) struct Choice {
@@ -37,6 +40,19 @@ pub(crate) fn choose(choice: &AttributeChoice, schema: &Schema, unread: &[String
             Choice { kept, dropped }
         }
     }
+}
+
+/// What the values of an attribute become in a format, if not all of them can be held: for the report, and in words.
+pub(super) fn changed(
+    kind: DatasetKind,
+    attribute: &Attribute,
+    stored_as: AttributeType,
+    changes: &Changes,
+) -> Option<(ChangedAttribute, Warning)> {
+    let name = attribute.name.clone();
+    let output = Some((kind, stored_as));
+    let warning = Warning::ValuesChanged { attribute: name.clone(), output, changes: *changes };
+    (!changes.is_empty()).then(|| (ChangedAttribute { name, changed: (*changes).into() }, warning))
 }
 
 /// Attributes of the schema that are not kept, and those that were not read at all.

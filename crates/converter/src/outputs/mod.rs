@@ -3,9 +3,11 @@
 mod attributes;
 pub(crate) mod batches;
 pub(crate) mod bintree;
+mod number;
 mod origin;
 mod output;
 pub(crate) mod potree2;
+mod recovery;
 mod staging;
 
 pub(crate) use attributes::choose as choose_attributes;

@@ -80,12 +80,26 @@ pub struct Filter {
     /// Keep what lies inside or on the border, world coordinates.
     pub bounds: Option<Aabb>,
     /// Keep these classes; `None`: all.
-    pub classes: Option<Vec<u8>>,
+    pub classes: Option<Vec<i64>>,
     /// Keep points whose index in their file is a multiple of this; 0 and 1: all.
     pub every: u64,
+    /// Points exactly at the origin of their scan.
+    pub origin_points: OriginPoints,
 }
 
-/// What to do with points whose position and attributes all repeat.
+/// What to do with points exactly at the origin of their scan: where the scanner stood, by the pose of the scan; (0, 0, 0)
+/// in files without poses. Some scanners write them where they measured nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OriginPoints {
+    /// Keep them; the report has their number.
+    #[default]
+    Keep,
+    /// Skip them and count them in the report.
+    Skip,
+}
+
+/// What to do with points whose position and attributes all repeat, as the sources have them: points that only the
+/// lattice of the run makes equal are different ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Duplicates {
     /// Keep all.

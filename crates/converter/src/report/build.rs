@@ -4,13 +4,13 @@ use pointmill_format::{Aabb, DatasetKind};
 use serde_json::{Map, Value, json};
 
 use super::types::{
-    AttributeReport, CoordinateChange, GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport,
-    PhaseReport, PointsReport, Report,
+    AttributeReport, GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport,
+    Report, SharedPlaceReport,
 };
-use crate::cloud::{Cloud, Cube, JobLattice};
+use crate::cloud::{Cloud, Cube, JobLattice, SharedPlace};
 use crate::error::ConvertError;
 use crate::memory;
-use crate::plan::{AttributeChoice, Filter, Plan};
+use crate::plan::{AttributeChoice, Filter, OriginPoints, Plan};
 use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
 use crate::sources::{Sources, resolve_crs};
@@ -31,7 +31,6 @@ pub(crate) struct Account {
 /// Points that do not add up.
 pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
     let stats = &cloud.stats;
-    let count = stats.points.max(1) as f64;
     let Account { settings, other_files, outputs, phases, seconds } = account;
     let of_outputs = outputs.iter().flat_map(|o| &o.warnings);
     Ok(Report {
@@ -42,10 +41,7 @@ pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, Conv
         attributes: attribute_reports(cloud),
         grid: grid_report(&cloud.lattice, cloud.is_lossless, &cloud.frame.cube),
         points: points_report(cloud, &outputs)?,
-        coordinate_change: CoordinateChange {
-            max: stats.change.max,
-            rms: stats.change.sum_of_squares.map(|s| (s / count).sqrt()),
-        },
+        shared_places: cloud.shared_places.iter().map(shared_place).collect(),
         checksum_in: stats.checksum.to_string(),
         temp_bytes: cloud.store.spilled_bytes(),
         output_bytes: outputs.iter().map(|o| o.bytes).sum(),
@@ -68,14 +64,24 @@ fn points_report(cloud: &Cloud<'_>, outputs: &[OutputReport]) -> Result<PointsRe
         other_class: stats.other_class,
         thinned: stats.thinned,
         invalid: stats.invalid,
+        at_origin: stats.origin_skipped,
         unreadable: stats.unreadable.saturating_add(cloud.sources.points_missing),
     };
-    let filtered = points.outside_bounds + points.outliers + points.other_class + points.thinned + points.invalid;
+    let filtered = points.outside_bounds
+        + points.outliers
+        + points.other_class
+        + points.thinned
+        + points.invalid
+        + points.at_origin;
     let is_whole = |o: &OutputReport| o.points + o.duplicates_dropped == points.kept;
     if points.read == points.kept + filtered && outputs.iter().all(is_whole) {
         return Ok(points);
     }
     Err(ConvertError::Internal(format!("the points do not add up: {points:?}")))
+}
+
+fn shared_place(place: &SharedPlace) -> SharedPlaceReport {
+    SharedPlaceReport { position: place.position, points: place.points }
 }
 
 fn phase_report(time: &PhaseTime, points: u64) -> PhaseReport {
@@ -96,6 +102,7 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
             format: info.format.clone(),
             points_declared: info.points_declared,
             points_read: seen.map_or(0, |s| s.read),
+            points_at_origin: seen.map_or(0, |s| s.at_origin),
             bounds_declared: info.bounds_declared.map(flat),
             bounds_measured: seen.map(|s| s.bounds).filter(|b| !b.is_empty()).map(flat),
             resolution: source
@@ -146,6 +153,9 @@ pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value>
     settings.insert("duplicates".into(), plan.duplicates.name().into());
     settings.insert("outliers".into(), plan.outliers.name().into());
     settings.insert("rgb-depth".into(), plan.rgb_depth.name().into());
+    for (name, value) in plan.open.maps.iter().flat_map(|maps| maps.settings()) {
+        settings.insert(name.into(), value.into());
+    }
     settings
 }
 
@@ -160,6 +170,9 @@ pub(crate) fn filter_settings(filter: &Filter) -> Map<String, Value> {
     }
     if filter.every > 1 {
         settings.insert("every".into(), filter.every.into());
+    }
+    if filter.origin_points == OriginPoints::Skip {
+        settings.insert("originPoints".into(), "skip".into());
     }
     settings
 }

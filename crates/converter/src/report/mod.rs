@@ -1,11 +1,14 @@
 //! The account of a run: what went in, what came out, what it cost.
 
+mod accuracy;
+mod assess;
 mod build;
 mod types;
 
+pub use accuracy::{Accuracy, How, Integers, Merged, Metres, PositionErrors};
+pub(crate) use assess::{FormatErrors, accuracy};
 pub(crate) use build::{Account, filter_settings, grid_report, input_reports, report, settings};
 pub use types::{
-    AttributeReport, ChangedAttribute, ChangedValues, CoordinateChange, DropReason, DroppedAttribute, Estimate,
-    GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report,
-    TreeReport,
+    AttributeReport, ChangedAttribute, ChangedValues, DropReason, DroppedAttribute, Estimate, GridReport, InputReport,
+    MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport, TreeReport,
 };

@@ -7,6 +7,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::accuracy::Accuracy;
 use crate::reason::GridReason;
 use crate::warning::Warning;
 
@@ -26,8 +27,8 @@ pub struct Report {
     pub grid: GridReport,
     /// Every point accounted for.
     pub points: PointsReport,
-    /// Largest and RMS change of a coordinate, per axis, world units.
-    pub coordinate_change: CoordinateChange,
+    /// Places that very many points share (16 or more, and at least one in a hundred), the fullest first.
+    pub shared_places: Vec<SharedPlaceReport>,
     /// One entry per attribute that was read, in the order of the stored records.
     pub attributes: Vec<AttributeReport>,
     /// One entry per dataset written, in the order requested.
@@ -60,6 +61,8 @@ pub struct OutputReport {
     pub points: u64,
     /// Points that were dropped because all of their values repeat.
     pub duplicates_dropped: u64,
+    /// How far the positions that a reader decodes are from those of the sources.
+    pub accuracy: Accuracy,
     /// Attributes that were kept.
     pub attributes: Vec<String>,
     /// Attributes that were omitted, and why.
@@ -96,6 +99,9 @@ pub struct InputReport {
     pub points_declared: u64,
     /// Decoded.
     pub points_read: u64,
+    /// Decoded, and exactly at the origin of their scan: where the scanner stood, by the pose of the scan; (0, 0, 0) in
+    /// files without poses.
+    pub points_at_origin: u64,
     /// Claimed by the header: min x y z, max x y z.
     pub bounds_declared: Option<[f64; 6]>,
     /// Of the points decoded, before any filter.
@@ -211,7 +217,8 @@ pub struct GridReport {
     pub why: GridReason,
 }
 
-/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid`, and for every output
+/// Every point accounted for: `read = kept + outside_bounds + outliers + other_class + thinned + invalid + at_origin`, and
+/// for every output
 /// `kept = points + duplicates_dropped`. All are counted, none is a difference; the run fails where a sum is wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]
@@ -230,18 +237,20 @@ pub struct PointsReport {
     pub thinned: u64,
     /// Without a valid position.
     pub invalid: u64,
+    /// Exactly at the origin of their scan, and skipped for it.
+    pub at_origin: u64,
     /// Declared, but in parts of inputs that could not be decoded.
     pub unreadable: u64,
 }
 
-/// Coordinate change by moving to the output lattice.
+/// A place that very many points share.
 #[derive(Debug, Clone, Default, Serialize)]
 #[non_exhaustive]
-pub struct CoordinateChange {
-    /// Largest, world units.
-    pub max: [f64; 3],
-    /// Root of the mean square, world units.
-    pub rms: [f64; 3],
+pub struct SharedPlaceReport {
+    /// World coordinates.
+    pub position: [f64; 3],
+    /// Points of the cloud that lie there.
+    pub points: u64,
 }
 
 /// An attribute that is not in the dataset. Serialises to its name, why as text, and the constant if there is one.

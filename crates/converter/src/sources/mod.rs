@@ -3,17 +3,21 @@
 mod crs;
 mod decimals;
 mod divisor;
+mod recast;
 mod schema;
 mod survey;
+mod union;
 
 use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
 pub(crate) use crs::resolve_all as resolve_crs_of_all;
 pub use crs::{ResolvedCrs, resolve_crs};
-pub(crate) use schema::{POSITION_BYTES, Schema, as_doubles};
+pub(crate) use recast::{Recast, doubled};
+pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema};
 #[cfg(test)]
 pub(crate) use survey::Extent;
 pub(crate) use survey::{Fineness, Survey, far_out, intersection, single_step};
+pub(crate) use union::{Placed, Union};
 
 use self::divisor::Divisors;
 use crate::error::{ConvertError, InputFault};
@@ -21,11 +25,14 @@ use crate::plan::{OnFault, Plan};
 use crate::runtime::Events;
 use crate::warning::{Warning, reason_of};
 
+/// The description of one file may take this part of the memory while it is opened.
+const DESCRIPTION_SHARE: u64 = 4;
+
 /// A scan, and where its columns are among all attributes.
 pub(crate) struct Source {
     pub(crate) scan: Box<dyn Scan>,
-    /// Where each of its columns is in [`Sources::attributes`].
-    pub(crate) columns: Vec<usize>,
+    /// Where each of its columns is in [`Sources::attributes`], and how it gets there.
+    pub(crate) columns: Vec<Placed>,
     /// Where its points are, and how finely they are stored, as far as is known before they are read.
     pub(crate) survey: Survey,
 }
@@ -55,8 +62,10 @@ impl Sources {
         }
         let mut scans: Vec<Box<dyn Scan>> = Vec::new();
         let mut points_missing = 0u64;
+        let mut options = plan.open.clone();
+        options.description_bytes.get_or_insert(plan.memory_bytes / DESCRIPTION_SHARE);
         for path in &paths {
-            let opened = pointmill_format::open_scan(path, &plan.open);
+            let opened = pointmill_format::open_scan(path, &options);
             match opened.and_then(|scan| Ok((missing_points(&*scan, plan.unreadable)?, scan))) {
                 Ok((missing, scan)) => {
                     let noticed = scan.info().warnings.iter();
@@ -73,20 +82,22 @@ impl Sources {
         if scans.is_empty() {
             return Err(InputFault::NoneReadable.into());
         }
-        warnings.iter().for_each(|w| events.warning(w));
-        Ok(Self::combine(scans, points_missing, warnings))
+        let sources = Self::combine(scans, points_missing, warnings);
+        sources.warnings.iter().for_each(|w| events.warning(w));
+        Ok(sources)
     }
 
-    fn combine(scans: Vec<Box<dyn Scan>>, points_missing: u64, warnings: Vec<Warning>) -> Self {
+    fn combine(scans: Vec<Box<dyn Scan>>, points_missing: u64, mut warnings: Vec<Warning>) -> Self {
         let infos: Vec<_> = scans.iter().map(|s| s.info()).collect();
-        let (attributes, columns) = Schema::union(&infos);
+        let union = Union::of(&infos);
+        warnings.extend(union.warnings);
         let points_declared = scans.iter().flat_map(|s| s.pieces()).map(|p| p.points).sum();
         let divisors = Divisors::of(&scans);
-        let sources = scans.into_iter().zip(columns).map(|(scan, columns)| {
+        let sources = scans.into_iter().zip(union.columns).map(|(scan, columns)| {
             let survey = Survey::of(&*scan, Some(&divisors));
             Source { scan, columns, survey }
         });
-        Self { all: sources.collect(), attributes, points_declared, points_missing, warnings }
+        Self { all: sources.collect(), attributes: union.schema, points_declared, points_missing, warnings }
     }
 
     /// What the headers claim (or a sample shows) of where the points are, cut by the filter; a hint.

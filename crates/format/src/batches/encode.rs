@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use super::describe::{ErrorFigures, PlaneErrors};
 use super::record::quantize;
-use super::{BATCH_POINTS, BatchRecord, f32_above, f32_below};
-use crate::WriteError;
+use super::{BATCH_POINTS, BatchRecord, Precision, f32_above, f32_below};
+use crate::{Deviations, WriteError};
 
 /// A batch as it goes to the file. Reuse one: its vectors keep their memory.
 #[derive(Debug, Clone)]
@@ -38,8 +38,13 @@ pub struct ErrorSums {
     pub points: u64,
     /// Largest error.
     pub max: [[f64; 3]; 3],
+    /// Sum of errors, decoded less meant.
+    pub sum: [[f64; 3]; 3],
     /// Sum of squared errors.
     pub squares: [[f64; 3]; 3],
+    /// Square of a distance in space that no error of that plane count exceeds: the sum of the squares of the largest
+    /// errors on the axes, greatest of the batches.
+    pub max_squared_3d: [f64; 3],
 }
 
 impl ErrorSums {
@@ -49,8 +54,10 @@ impl ErrorSums {
         for plane in 0..3 {
             for axis in 0..3 {
                 self.max[plane][axis] = self.max[plane][axis].max(other.max[plane][axis]);
+                self.sum[plane][axis] += other.sum[plane][axis];
                 self.squares[plane][axis] += other.squares[plane][axis];
             }
+            self.max_squared_3d[plane] = self.max_squared_3d[plane].max(other.max_squared_3d[plane]);
         }
     }
 
@@ -63,6 +70,19 @@ impl ErrorSums {
             Some(ErrorFigures { max: self.max[plane], rms })
         };
         PlaneErrors { ten: of(0), twenty: of(1), thirty: of(2) }
+    }
+
+    /// The errors of one plane count.
+    #[must_use]
+    pub fn deviations(&self, precision: Precision) -> Deviations {
+        let plane = precision as usize;
+        Deviations {
+            points: self.points,
+            max: self.max[plane],
+            sum: self.sum[plane],
+            squares: self.squares[plane],
+            max_squared_3d: self.max_squared_3d[plane],
+        }
     }
 }
 
@@ -89,6 +109,8 @@ pub fn encode_batch(first_point: u32, positions: [&[f64]; 3], out: &mut EncodedB
     for (axis, coordinates) in positions.into_iter().enumerate() {
         encode_axis(axis, coordinates, out);
     }
+    let errors = &mut out.errors;
+    errors.max_squared_3d = errors.max.map(|max| max.iter().map(|v| v * v).sum());
     Ok(())
 }
 
@@ -105,7 +127,7 @@ fn range(coordinates: &[f64]) -> (f32, f32) {
 fn encode_axis(axis: usize, coordinates: &[f64], out: &mut EncodedBatch) {
     let (corner, side) = (out.record.corner()[axis], out.record.sides()[axis]);
     let steps = [10, 20, 30].map(|bits| side / f64::from(1u32 << bits));
-    let (mut max, mut squares) = ([0f64; 3], [0f64; 3]);
+    let (mut max, mut sum, mut squares) = ([0f64; 3], [0f64; 3], [0f64; 3]);
     let shift = 10 * axis;
     let words = out.hi10.iter_mut().zip(&mut out.mid10).zip(&mut out.lo10);
     for (r, ((hi, mid), lo)) in coordinates.iter().zip(words) {
@@ -114,13 +136,15 @@ fn encode_axis(axis: usize, coordinates: &[f64], out: &mut EncodedBatch) {
         *mid |= (q >> 10 & 1023) << shift;
         *lo |= (q & 1023) << shift;
         for (plane, top_bits) in [q >> 20, q >> 10, q].into_iter().enumerate() {
-            let error = (corner + (f64::from(top_bits) + 0.5) * steps[plane] - r).abs();
-            max[plane] = max[plane].max(error);
+            let error = corner + (f64::from(top_bits) + 0.5) * steps[plane] - r;
+            max[plane] = max[plane].max(error.abs());
+            sum[plane] += error;
             squares[plane] += error * error;
         }
     }
     for plane in 0..3 {
         out.errors.max[plane][axis] = max[plane];
+        out.errors.sum[plane][axis] = sum[plane];
         out.errors.squares[plane][axis] = squares[plane];
     }
 }
@@ -155,14 +179,18 @@ mod tests {
             assert_eq!(figures.max[0], 4.0 / f64::from(2u32 << precision.bits()), "attained");
             assert_eq!(figures.max[2], 0.0, "no extent, no error");
             let decoder = batch.record.decoder(precision);
-            let mut largest = [0f64; 3];
+            let deviations = batch.errors.deviations(precision);
+            let (mut largest, mut sum) = ([0f64; 3], 0.0);
             for (i, r) in line.iter().enumerate() {
                 let q = quantized([batch.hi10[i], batch.mid10[i], batch.lo10[i]]);
                 let p = decoder.position(q);
                 let error = [(p[0] - r).abs(), (p[1] - third[i]).abs(), p[2].abs()];
                 largest = std::array::from_fn(|a| largest[a].max(error[a]));
+                sum += p[1] - third[i];
+                assert!(error.iter().map(|e| e * e).sum::<f64>() <= deviations.max_squared_3d);
             }
-            assert_eq!(largest, figures.max);
+            assert_eq!((largest, sum), (figures.max, deviations.sum[1]));
+            assert_eq!((deviations.max, deviations.points), (figures.max, 1025));
         }
     }
 

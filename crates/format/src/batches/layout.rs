@@ -80,6 +80,46 @@ pub struct Finish {
     pub description_offset: u64,
 }
 
+/// What averaging did to the colours (§4.3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Averaging {
+    /// Every point shows its own colour.
+    ChangedNothing,
+    /// Some points show another than their own.
+    Changed {
+        /// How many, one entry each in the originals section; `None`: their colours are not kept.
+        originals: Option<u64>,
+    },
+}
+
+impl Averaging {
+    /// What averaging that replaced the colours of `changed` points did, all of them kept or none.
+    #[must_use]
+    pub fn of(changed: u64, keeps_originals: bool) -> Self {
+        match changed {
+            0 => Self::ChangedNothing,
+            n => Self::Changed { originals: keeps_originals.then_some(n) },
+        }
+    }
+
+    /// Bytes of the originals section, if there is one.
+    #[must_use]
+    pub fn originals_bytes(self) -> Option<u64> {
+        match self {
+            Self::Changed { originals: Some(count) } => Some(8 + 8 * count),
+            _ => None,
+        }
+    }
+
+    fn flags(self) -> u32 {
+        match self {
+            Self::ChangedNothing => 0,
+            Self::Changed { originals: None } => Flags::AVERAGED,
+            Self::Changed { originals: Some(_) } => Flags::AVERAGED | Flags::ORIGINALS,
+        }
+    }
+}
+
 impl Layout {
     /// The layout of `points` points with these extra attributes and planes.
     ///
@@ -212,15 +252,9 @@ impl Layout {
         section.offset + size * u64::from(first_point)
     }
 
-    /// Bytes of an originals section with `count` entries.
-    pub const fn originals_bytes(count: u64) -> u64 {
-        8 + 8 * count
-    }
-
-    /// Header and description of the finished file, with batches swapped, levels, averaged colours and originals.
+    /// Header and description of the finished file, with batches swapped, levels and averaged colours.
     ///
-    /// `tight`: the box of all points, world (empty for none). `originals`: entries of the originals section. Of
-    /// `description` this sets `attributes` (type, place; `min` and `max` of entries with the same name are kept) and
+    /// `tight`: the box of all points, world (empty for none). Of `description` this sets `attributes` (type, place; `min` and `max` of entries with the same name are kept) and
     /// leaves out `errors` of planes that are not there.
     ///
     /// # Errors
@@ -229,7 +263,7 @@ impl Layout {
         &self,
         grid: &Grid,
         tight: &Aabb,
-        originals: u64,
+        averaging: Averaging,
         mut description: Description,
     ) -> Result<Finish, WriteError> {
         let given = std::mem::take(&mut description.attributes);
@@ -239,20 +273,21 @@ impl Layout {
         if let Err(e) = Description::from_json(text.as_bytes(), "description".as_ref(), 0) {
             return Err(WriteError::input(format!("{}: not a number, infinite, or a scale that is not > 0", e.what())));
         }
-        let description_offset = align(self.originals + Self::originals_bytes(originals));
+        let originals = averaging.originals_bytes();
+        let description_offset = align(originals.map_or(self.end_of_points(), |bytes| self.originals + bytes));
         let header = Header {
             points: self.points,
             batches: self.batches,
             grid: *grid,
             tight: if tight.is_empty() { Aabb { min: [0.0; 3], max: [0.0; 3] } } else { *tight },
-            flags: Flags(Flags::SWAPPED | Flags::LOD | Flags::AVERAGED | Flags::ORIGINALS),
+            flags: Flags(Flags::SWAPPED | Flags::LOD | averaging.flags()),
             sections: Sections {
                 batches: self.records.offset,
                 hi10: self.hi10.offset,
                 mid10: self.mid10.map(|s| s.offset),
                 lo10: self.lo10.map(|s| s.offset),
                 colour: self.colour.offset,
-                originals: Some(self.originals),
+                originals: originals.map(|_| self.originals),
                 description: description_offset,
             },
             description_bytes: text.len() as u64,
@@ -310,6 +345,21 @@ mod tests {
     }
 
     #[test]
+    fn the_description_takes_the_place_of_originals_that_are_not_there() {
+        let layout = Layout::new(99, &[], Precision::Ten).unwrap();
+        let grid = Grid::new(&Aabb::EMPTY, 1.0).unwrap();
+        let description = Description::new(Lattice { scale: [1.0; 3], offset: [0.0; 3] });
+        let end = |averaging| layout.finish(&grid, &Aabb::EMPTY, averaging, description.clone()).unwrap().header;
+        for (changed, keeps, flags, bytes) in
+            [(0, true, 3, None), (0, false, 3, None), (5, false, 7, None), (5, true, 15, Some(48))]
+        {
+            let header = end(Averaging::of(changed, keeps));
+            assert_eq!((header.flags.0, header.sections.originals), (flags, bytes.map(|_| layout.originals)));
+            assert_eq!(header.sections.description, align(layout.originals + bytes.unwrap_or(0)));
+        }
+    }
+
+    #[test]
     fn requests_that_do_not_fit_are_refused() {
         assert!(matches!(Layout::new(1 << 32, &[], Precision::Ten), Err(WriteError::TooManyPoints(_))));
         assert!(Layout::new((1 << 32) - 1, &attributes(), Precision::Thirty).is_ok());
@@ -325,8 +375,9 @@ mod tests {
         let layout = Layout::new(0, &[], Precision::Ten).unwrap();
         let grid = Grid::new(&Aabb::EMPTY, 1.0).unwrap();
         let mut description = Description::new(Lattice { scale: [1.0; 3], offset: [0.0; 3] });
-        assert!(layout.finish(&grid, &Aabb::EMPTY, 0, description.clone()).is_ok());
+        let unchanged = Averaging::ChangedNothing;
+        assert!(layout.finish(&grid, &Aabb::EMPTY, unchanged, description.clone()).is_ok());
         description.source_step[1] = f64::NAN;
-        assert!(matches!(layout.finish(&grid, &Aabb::EMPTY, 0, description), Err(WriteError::Input(_))));
+        assert!(matches!(layout.finish(&grid, &Aabb::EMPTY, unchanged, description), Err(WriteError::Input(_))));
     }
 }

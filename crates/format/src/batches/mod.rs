@@ -66,7 +66,7 @@ pub use describe::{AttributeEntry, ColourSource, Description, ErrorFigures, Latt
 pub use encode::{EncodedBatch, ErrorSums, encode_batch, le_bytes};
 pub use grid::{Grid, LOD_LEVELS, f32_above, f32_below};
 pub use header::{Flags, Header, Sections};
-pub use layout::{Finish, Layout, PointSection, Section};
+pub use layout::{Averaging, Finish, Layout, PointSection, Section};
 #[cfg(feature = "mmap")]
 pub use map::MappedFile;
 pub use order::{batch_count, batch_points, swap_slot};

@@ -7,7 +7,7 @@ use crate::{Aabb, Attribute, Lattice, WriteError};
 
 use super::describe::{ColourSource, Description};
 use super::{
-    BATCH_POINTS, ColourSum, EncodedBatch, ErrorSums, Grid, HEADER_BYTES, Header, LOD_LEVELS, Layout, Part,
+    Averaging, BATCH_POINTS, ColourSum, EncodedBatch, ErrorSums, Grid, HEADER_BYTES, Header, LOD_LEVELS, Layout, Part,
     PointSection, Precision, Section, align, colour_word, encode_batch, le_bytes, lod_of, rgb_of,
 };
 
@@ -135,7 +135,7 @@ pub fn write(out: &mut (impl Write + Seek), cloud: &Cloud, options: &WriteOption
     let originals: Vec<u32> = stored
         .iter()
         .enumerate()
-        .filter(|(_, i)| u32::from(lod_of(colours[**i])) < LOD_LEVELS)
+        .filter(|(_, i)| rgb_of(colours[**i]) != rgb_of(cloud.colours[**i]))
         .flat_map(|(index, i)| [index as u32, cloud.word(*i)])
         .collect();
     let count = originals.len() as u64 / 2;
@@ -144,7 +144,8 @@ pub fn write(out: &mut (impl Write + Seek), cloud: &Cloud, options: &WriteOption
     let mut description = options.description.clone();
     description.lattice = cloud.lattice.into();
     description.errors = errors.figures();
-    let finish = layout.finish(&grid, &tight, count, description)?;
+    let averaging = Averaging::of(count, true);
+    let finish = layout.finish(&grid, &tight, averaging, description)?;
 
     let mut file = InOrder { out, at: 0 };
     file.out.seek(SeekFrom::Start(0))?;
@@ -173,9 +174,11 @@ pub fn write(out: &mut (impl Write + Seek), cloud: &Cloud, options: &WriteOption
             }
         }
     }
-    file.begin(Section { offset: layout.originals, bytes: Layout::originals_bytes(count) })?;
-    file.put(&count.to_le_bytes())?;
-    file.put(&le_bytes(&originals))?;
+    if let Some(bytes) = averaging.originals_bytes() {
+        file.begin(Section { offset: layout.originals, bytes })?;
+        file.put(&count.to_le_bytes())?;
+        file.put(&le_bytes(&originals))?;
+    }
     file.begin(Section { offset: finish.description_offset, bytes: finish.header.description_bytes })?;
     file.put(&finish.description_bytes)?;
     file.out.flush()?;

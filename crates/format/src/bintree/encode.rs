@@ -1,6 +1,6 @@
 //! Points to the bytes of a leaf.
 
-use crate::Aabb;
+use crate::{Aabb, Deviations};
 
 use super::{CORE_BYTES, RecordLayout};
 
@@ -42,13 +42,15 @@ pub struct LeafEncoder<'a> {
     stride: usize,
     center: [f64; 3],
     bounds: Aabb,
+    deviations: Deviations,
     out: &'a mut Vec<u8>,
 }
 
 impl<'a> LeafEncoder<'a> {
     /// Starts a leaf at the end of `out`. `center`: world coordinates, finite.
     pub fn new(layout: &RecordLayout, center: [f64; 3], out: &'a mut Vec<u8>) -> Self {
-        Self { stride: layout.stride(), center, bounds: Aabb::EMPTY, out }
+        let (bounds, deviations) = (Aabb::EMPTY, Deviations::default());
+        Self { stride: layout.stride(), center, bounds, deviations, out }
     }
 
     /// Appends a point: `world` in world coordinates, `class` raw ([`class_value`] is applied).
@@ -64,8 +66,16 @@ impl<'a> LeafEncoder<'a> {
         for (bytes, value) in core.as_chunks_mut::<4>().0.iter_mut().zip(values) {
             *bytes = value.to_le_bytes();
         }
-        self.bounds.grow(decode(self.center, offset));
+        let decoded = decode(self.center, offset);
+        self.bounds.grow(decoded);
+        self.deviations.add(std::array::from_fn(|a| decoded[a] - world[a]));
         rest
+    }
+
+    /// How far the decoded points are from those that were pushed, so far.
+    #[must_use]
+    pub fn deviations(&self) -> &Deviations {
+        &self.deviations
     }
 
     /// The tight box of the decoded points, as the index wants it.
@@ -108,6 +118,7 @@ mod tests {
         for &x in &xs {
             leaf.push(lattice.world([x; 3]), 0.0);
         }
+        let deviations = *leaf.deviations();
         let bounds = leaf.finish();
         for (record, &x) in bytes.as_chunks::<16>().0.iter().zip(&xs) {
             let dx = f32::from_le_bytes([record[0], record[1], record[2], record[3]]);
@@ -118,6 +129,7 @@ mod tests {
                 assert_eq!(lattice.quantize(0, decoded[0]), x, "{step} {half}");
             }
         }
+        assert_eq!((deviations.points, deviations.max), (xs.len() as u64, [worst; 3]));
         worst
     }
 

@@ -20,14 +20,21 @@ pub enum Advice {
     CheckColumns,
     /// Rows of two numbers: cut short, or x and y alone, which [`crate::OpenOptions::columns`] can say.
     NameColumns,
-    /// A comma that may be a decimal mark or a separator, which [`crate::OpenOptions::decimal`] can say.
-    DecimalMark,
     /// An archive: the scans are in it.
     Unpack,
+    /// A comma that may be a decimal mark or a separator, which [`crate::OpenOptions::decimal`] can say.
+    DecimalMark,
     /// The kinds of scans that this build reads ([`crate::supported_scans`]).
     Supported(String),
     /// Cut short or damaged, or of another kind than those that this build reads.
     CopyOrSupported(String),
+    /// The description of the file is larger than the memory that it may take
+    /// ([`crate::OpenOptions::description_bytes`]).
+    MoreMemory,
+    /// The coordinate reference system of the scan can be named, in place of what the file declares.
+    NameCrs,
+    /// Choose another coordinate reference system to reproject to, on the same datum, or reproject with other means.
+    OtherCrs,
     /// A conversion can skip what cannot be read and go on with the rest.
     SkipUnreadable,
     /// Anything else, as text.
@@ -48,13 +55,18 @@ impl fmt::Display for Advice {
             Self::NameColumns => {
                 f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")
             }
-            Self::DecimalMark => f.write_str("say whether commas are decimal marks"),
             Self::Unpack => f.write_str("unpack it and name the scans in it"),
+            Self::DecimalMark => f.write_str("say whether commas are decimal marks"),
             Self::Supported(kinds) if kinds.is_empty() => f.write_str("this build reads no scans; enable a feature"),
             Self::Supported(kinds) => write!(f, "supported are {kinds}"),
             Self::CopyOrSupported(kinds) => {
                 write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")
             }
+            Self::MoreMemory => f.write_str("let it take more memory"),
+            Self::NameCrs => f.write_str("name its coordinate reference system"),
+            Self::OtherCrs => f.write_str(
+                "reproject to a system on the same datum and with the same heights, or reproject it elsewhere",
+            ),
             Self::SkipUnreadable => f.write_str("copy the file again, or skip what cannot be read"),
             Self::Other(text) => f.write_str(text),
         }

@@ -14,13 +14,13 @@ pub enum Fault {
         /// The extension of the file, if it is one that scans have: the file is damaged, or misnamed.
         extension: Option<String>,
     },
-    /// The file is something else, not a scan: "an Arc/Info ASCII grid, a raster".
-    OtherKind(String),
     /// An archive or a compressed file: a scan may be in it.
     Archive {
         /// "a gzip file", "a ZIP archive", ….
         what: &'static str,
     },
+    /// The file is something else, not a scan: "an Arc/Info ASCII grid, a raster".
+    OtherKind(String),
     /// The format is known, this version of it is not.
     UnknownVersion {
         /// "LAS", "E57", ….
@@ -105,8 +105,8 @@ impl fmt::Display for Fault {
             Self::UnknownFormat { extension: Some(extension) } => {
                 write!(f, "called .{extension}, but it is no scan that is known here")
             }
-            Self::OtherKind(what) => write!(f, "this is {what}, not a scan"),
             Self::Archive { what } => write!(f, "this is {what}, not a scan"),
+            Self::OtherKind(what) => write!(f, "this is {what}, not a scan"),
             Self::UnknownVersion { format, found: (major, minor), known } => {
                 write!(f, "{format} version {major}.{minor} is not known ({known})")
             }

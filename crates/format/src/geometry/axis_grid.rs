@@ -40,13 +40,12 @@ impl AxisGrid {
         let unit = decimal(1, decimals)?;
         let mut divisor = 0;
         for grid in grids {
-            for length in [grid.step, (grid.offset - first.offset).abs()] {
-                let units = (length / unit).round();
-                let is_lost = length == grid.step && units == 0.0;
-                if is_lost
-                    || !is_whole(length, unit, grid.offset.abs().max(first.offset.abs()))
-                    || units >= 2f64.powi(53)
-                {
+            let (between, far) = ((grid.offset - first.offset).abs(), grid.offset.abs().max(first.offset.abs()));
+            if !is_multiple(grid.step, unit) || !is_whole(between, unit, far) {
+                return None;
+            }
+            for units in [grid.step, between].map(|length| (length / unit).round()) {
+                if units >= 2f64.powi(53) {
                     return None;
                 }
                 divisor = greatest_common_divisor(divisor, units as u64);
@@ -59,8 +58,15 @@ impl AxisGrid {
     #[must_use]
     pub fn holds(&self, other: &Self) -> bool {
         let far = self.offset.abs().max(other.offset.abs());
-        is_whole(other.step, self.step, 0.0) && is_whole(other.offset - self.offset, self.step, far)
+        is_multiple(other.step, self.step) && is_whole(other.offset - self.offset, self.step, far)
     }
+}
+
+/// True if `step` is a multiple of `unit`, but for its own last bits: it is multiplied by integers of 31 bits.
+fn is_multiple(step: f64, unit: f64) -> bool {
+    let units = step / unit;
+    let rounding = units * 4.0 * f64::EPSILON;
+    units.round() > 0.0 && rounding < 0.1 && (units - units.round()).abs() <= rounding
 }
 
 /// True if `length` is a whole number of `unit`s, but for the rounding of numbers as large as `far`.
@@ -111,6 +117,13 @@ mod tests {
     fn offsets_beyond_the_precision_of_doubles_make_no_finer_grid() {
         assert_eq!(common(&[(1e-9, 0.0), (1e-9, 123_456_789.123_456_789)]), None);
         assert_eq!(common(&[(0.5, 1e17), (0.25, 1e17 + 64.0)]), None);
+    }
+
+    #[test]
+    fn a_step_that_was_a_single_is_not_the_decimal_next_to_it() {
+        let single = f64::from(0.001f32);
+        assert_ne!(common(&[(single, 0.0), (0.001, 0.0)]).map(|g| g.0), Some(0.001), "0.1 m off after 2^31 steps");
+        assert!(!AxisGrid { step: 0.001, offset: 0.0 }.holds(&AxisGrid { step: single, offset: 0.0 }));
     }
 
     #[test]

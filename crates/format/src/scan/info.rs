@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::image::ScanImage;
 use crate::{Aabb, Attribute, AxisGrid, Lattice, ScanWarning, Unit};
 
 /// The coordinate reference system as the file declares it; nothing is derived.
@@ -58,10 +59,14 @@ pub struct ScanInfo {
     pub lattice: Option<Lattice>,
     /// How finely the file stores world coordinates, per axis; meaningless for scans that have a lattice.
     pub resolution: [Resolution; 3],
-    /// The scans within the file, where its format knows such (E57, PTX); else empty.
+    /// The scans within the file that are read, where its format knows such (E57, PTX); else empty.
     pub parts: Vec<ScanPart>,
+    /// The images within the file (E57).
+    pub images: Vec<ScanImage>,
     /// The columns beside the position, in order.
     pub attributes: Arc<[Attribute]>,
+    /// True if `rgb` has 16 bits because the file says so (E57), however small its values are.
+    pub rgb_is_16_bit: bool,
     /// The coordinate reference system.
     pub crs: Crs,
     /// Bytes of the file.
@@ -82,7 +87,9 @@ impl ScanInfo {
             lattice: None,
             resolution: [Resolution::default(); 3],
             parts: Vec::new(),
+            images: Vec::new(),
             attributes: [].into(),
+            rgb_is_16_bit: false,
             crs: Crs::default(),
             file_bytes: 0,
             warnings: Vec::new(),

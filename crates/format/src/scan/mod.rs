@@ -2,13 +2,21 @@
 
 mod archive;
 mod batches;
-#[cfg(any(feature = "e57", feature = "las"))]
+#[cfg(feature = "las")]
 mod catch_panic;
+mod chosen;
 mod decimal;
 mod decode;
+mod image;
 mod info;
+mod mapped;
 mod open;
 mod other_kind;
+#[cfg(feature = "text")]
+mod partial;
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg_attr(not(all(feature = "e57", feature = "las", feature = "text")), allow(dead_code))]
+mod quantities;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 mod source;
 mod unit;
@@ -31,9 +39,12 @@ pub mod ply;
 pub mod text;
 
 pub use batches::Batches;
+pub use chosen::scans_named;
 pub use decimal::Decimal;
 pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
+pub use image::{Blob, ImageEncoding, ImageGeometry, ImageKind, ImagePose, ScanImage};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
+pub use mapped::{PointMap, ScanMap, ScanMaps};
 pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
 pub use other_kind::OtherKind;
 pub use unit::Unit;

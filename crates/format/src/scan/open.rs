@@ -5,8 +5,10 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use super::archive::archive;
+use super::mapped::{ScanMaps, mapped};
 use super::other_kind::OtherKind;
 use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
 
@@ -34,7 +36,7 @@ pub enum ScanKind {
     Text(crate::scan::text::TextKind),
 }
 
-/// What a file does not say of itself, for the kinds that need it.
+/// What a file does not say of itself, for the kinds that need it, and what becomes of its points.
 ///
 /// ```
 /// use pointmill_format::OpenOptions;
@@ -42,7 +44,7 @@ pub enum ScanKind {
 /// let options = OpenOptions::default().columns(["x", "y", "z", "-", "i"]).separator(';');
 /// assert_eq!(options.separator, Some(';'));
 /// ```
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct OpenOptions {
     /// Text: the names of all columns in file order (`text::TextOptions::columns`); `None`: found.
@@ -53,6 +55,14 @@ pub struct OpenOptions {
     pub decimal: Decimal,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
+    /// E57, PTX: the scans within a file that are read, each by name or number ([`crate::scans_named`]); `None`: all.
+    /// Files of other kinds have no scans within them and are read whole.
+    pub scans: Option<Vec<String>>,
+    /// Bytes of memory that the description of a file's scans may take while it is opened (the XML section of E57);
+    /// `None`: 1 GiB.
+    pub description_bytes: Option<u64>,
+    /// What becomes of the points; `None`: they stay where they are.
+    pub maps: Option<Arc<dyn ScanMaps>>,
 }
 
 impl OpenOptions {
@@ -81,6 +91,27 @@ impl OpenOptions {
     #[must_use]
     pub fn keep_row_column(mut self, keep: bool) -> Self {
         self.keep_row_column = keep;
+        self
+    }
+
+    /// Sets [`Self::scans`].
+    #[must_use]
+    pub fn scans<N: Into<String>>(mut self, choices: impl IntoIterator<Item = N>) -> Self {
+        self.scans = Some(choices.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Sets [`Self::description_bytes`].
+    #[must_use]
+    pub fn description_bytes(mut self, bytes: u64) -> Self {
+        self.description_bytes = Some(bytes);
+        self
+    }
+
+    /// Sets [`Self::maps`].
+    #[must_use]
+    pub fn maps(mut self, maps: impl ScanMaps + 'static) -> Self {
+        self.maps = Some(Arc::new(maps));
         self
     }
 }
@@ -200,10 +231,18 @@ pub fn supported_scans() -> String {
 /// Opens a scan of any kind that this build reads; the kind is detected from the content, the extension is ignored.
 ///
 /// # Errors
-/// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
-#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+/// A file that is empty, or of no kind that is read here, those of the reader of its kind, and of
+/// [`OpenOptions::maps`].
 pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
-    let path = path.as_ref();
+    let scan = open_as_it_is(path.as_ref(), options)?;
+    match &options.maps {
+        Some(maps) => mapped(scan, &**maps),
+        None => Ok(scan),
+    }
+}
+
+#[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
+fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
@@ -223,18 +262,23 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
         #[cfg(feature = "las")]
         ScanKind::Las => crate::scan::las::open(path),
         #[cfg(feature = "e57")]
-        ScanKind::E57 => crate::scan::e57::open_with(
-            path,
-            crate::scan::e57::E57Options::default().keep_row_column(options.keep_row_column),
-        ),
+        ScanKind::E57 => {
+            let e57 = crate::scan::e57::E57Options::default()
+                .keep_row_column(options.keep_row_column)
+                .scans(options.scans.clone());
+            let max_xml = options.description_bytes.unwrap_or(e57.max_xml);
+            crate::scan::e57::open_with(path, e57.max_xml(max_xml))
+        }
         #[cfg(feature = "ply")]
         ScanKind::Ply => crate::scan::ply::open(path),
         #[cfg(feature = "pcd")]
         ScanKind::Pcd => crate::scan::pcd::open(path),
         #[cfg(feature = "text")]
         ScanKind::Text(_) => {
+            let choices = options.scans.as_deref();
             let OpenOptions { columns, separator, decimal, .. } = options.clone();
-            crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })
+            let scan = crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })?;
+            Ok(super::partial::choose(scan, choices))
         }
     }
 }
@@ -255,14 +299,14 @@ fn is_ending_of_scans(extension: &str) -> bool {
 fn unknown(path: &Path, first: &[u8]) -> ReadError {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     let supported = Advice::Supported(supported_scans());
+    if let Some(what) = archive(first) {
+        return ReadError::unsupported(path, Fault::Archive { what }).advise(Advice::Unpack);
+    }
     if let Some(other) = OtherKind::of(first) {
         return ReadError::unsupported(path, Fault::OtherKind(other.to_string())).advise(supported);
     }
     if cfg!(feature = "text") && (first.starts_with(&[0xff, 0xfe]) || first.starts_with(&[0xfe, 0xff])) {
         return ReadError::unsupported(path, "the text is UTF-16").advise("save it as UTF-8");
-    }
-    if let Some(what) = archive(first) {
-        return ReadError::unsupported(path, Fault::Archive { what }).advise(Advice::Unpack);
     }
     match ending.filter(|e| is_ending_of_scans(e)) {
         _ if first.is_empty() => ReadError::unsupported(path, "not a file that can be read").advise(supported),

@@ -33,6 +33,8 @@ pub enum ScanWarning {
     /// LAZ: the chunk table cannot be used. `chunks`: as many were found without it; `None`: points are decoded in
     /// sequence.
     ChunkTable { why: String, chunks: Option<usize> },
+    /// LAZ: the chunk table was wrong (`why`) and is mended (`how`); the mended one was proven.
+    ChunkTableMended { why: String, how: String },
     /// LAZ: a LASzip record, but points that are not compressed.
     LaszipIgnored,
     /// LAS: a record (`kind`: VLR or EVLR) starts outside its place.
@@ -51,8 +53,13 @@ pub enum ScanWarning {
     WktEmpty,
     /// LAS: waveform packets are not read.
     Waveforms { point_format: u8 },
-    /// LAS: more than one Extra Bytes record; the first is taken.
-    ExtraBytesRecords,
+    /// LAS: more than one Extra Bytes record, which describe `widths` bytes of a point, of its `extra` ones. Those with
+    /// the numbers `taken`, from 1, are joined.
+    ExtraBytesRecords { widths: Vec<usize>, taken: Vec<usize>, extra: usize },
+    /// LAS: a record of LASzip's compatibility mode that does not fit the points; they are read as they are.
+    CompatibilityIgnored { version: u16, point_format: u8 },
+    /// LAS: the header declares no points, the record of LASzip's compatibility mode that many.
+    CompatibilityCount { count: u64 },
     /// LAS: the Extra Bytes record is not a multiple of its descriptors.
     ExtraBytesLength { bytes: usize, descriptor: usize },
     /// LAS: extra bytes reach beyond the record.
@@ -81,6 +88,18 @@ pub enum ScanWarning {
     PlyVersion { version: String },
     /// No z: it is 0 for every point.
     NoZ,
+    /// The unit of its coordinate reference system is `declared`; its coordinates are taken to be in `given`.
+    UnitsClash { declared: String, given: String },
+    /// A reprojection changes the datum, in this way.
+    DatumChange { by: String },
+    /// Nothing says what heights are above; `target`, to which they are reprojected, has them above the ellipsoid.
+    HeightsAboveNothing { target: String },
+    /// Nothing says the unit of heights, and that of x and y has changed to `beside`.
+    HeightsWithoutUnit { beside: String },
+    /// Points were turned or scaled, but not the shapes of Gaussian splats.
+    SplatsUnturned,
+    /// A reprojection moved the points, but turned neither normals nor the poses of scans.
+    DirectionsProjected,
     /// Text: a column without numbers.
     ColumnIgnored { number: usize, name: String },
     /// Text: the first column numbers or names the rows.
@@ -95,7 +114,7 @@ pub enum ScanWarning {
     DecimalComma { example: String },
     /// Text: blanks and commas both separate columns.
     SeparatorsMixed,
-    /// E57: what one or more scans of the file share; numbers of the scans, from 0.
+    /// E57: what one or more scans of the file share; indices of the scans, from 0. The line has numbers, from 1.
     InScans { scans: Vec<usize>, warning: Box<ScanWarning> },
     /// E57: more warnings of scans than are kept.
     More,
@@ -115,8 +134,24 @@ pub enum ScanWarning {
     SourceIdsShared { scans: usize },
     /// E57: the coordinate metadata is no WKT; its start.
     CrsUnknown { start: String },
-    /// E57: images are not read; `None`: nor can their description be.
-    Images { count: Option<usize> },
+    /// E57: images are not points; they are not read.
+    Images { count: usize },
+    /// E57: the description of an image cannot be understood; numbers from 1.
+    ImageUnknown { number: usize, why: String },
+    /// E57: the last page of the file is not whole; its checksum is missing, or some of it.
+    LastPage { missing: u64 },
+    /// E57: the XML section has another length, or starts elsewhere, than the header declares.
+    XmlLength { declared: u64, found: u64 },
+    /// E57: the XML section is not UTF-8 from that byte of it on.
+    XmlEncoding { at: u64 },
+    /// E57: the root of the XML has an attribute (a namespace, as a rule) twice.
+    XmlRepeated { name: String },
+    /// E57: numbers of the XML have decimal commas.
+    XmlCommas,
+    /// E57: a scan has no element that describes points.
+    PointsUndescribed,
+    /// E57, PTX: not one of the file's scans was chosen.
+    NoneChosen { scans: usize },
     /// E57: the file has no scans.
     NoScans,
     /// Anything else, as text.
@@ -174,6 +209,28 @@ impl ScanWarning {
             }
             Self::Bounds => "the header's bounds are inverted or not finite; they are not used".to_owned(),
             Self::NoZ => "there is no z; it is 0 for every point".to_owned(),
+            Self::UnitsClash { declared, given } => {
+                format!(
+                    "its coordinate reference system is in {declared}; the coordinates are taken as {given} and scaled"
+                )
+            }
+            Self::DatumChange { by } => format!("the datum is changed by {by}"),
+            Self::HeightsAboveNothing { target } => {
+                format!(
+                    "nothing says what its heights are above; {target} has them above the ellipsoid, and so they are taken"
+                )
+            }
+            Self::HeightsWithoutUnit { beside } => {
+                format!("nothing says the unit of its heights; they are left as they are, beside x and y in {beside}")
+            }
+            Self::SplatsUnturned => {
+                "the shapes of its splats (rot_*, scale_*, f_rest_*) are as in the file; only their places are moved"
+                    .to_owned()
+            }
+            Self::DirectionsProjected => {
+                "normals and poses are not turned by the reprojection; they keep the directions of the scan's own axes"
+                    .to_owned()
+            }
             Self::ColumnIgnored { number, name } => {
                 format!("column {number} ({name}) holds no numbers; it is omitted")
             }
@@ -215,6 +272,11 @@ impl ScanWarning {
             Self::ChunkTable { why, chunks: None } => {
                 format!("the chunk table is unusable ({why}); the points are decoded one after the other")
             }
+            Self::ChunkTableMended { why, how } => {
+                format!(
+                    "the chunk table is wrong ({why}): {how}; mended, and proven by decoding a sample of the chunks"
+                )
+            }
             Self::LaszipIgnored => {
                 "there is a LASzip record, but the points are not marked as compressed; it is ignored".to_owned()
             }
@@ -240,7 +302,14 @@ impl ScanWarning {
             Self::Waveforms { point_format } => {
                 format!("point format {point_format} carries waveform packets; they are not read, all other values are")
             }
-            Self::ExtraBytesRecords => "there is more than one Extra Bytes record; the first is taken".to_owned(),
+            Self::ExtraBytesRecords { widths, taken, extra } => extra_bytes_records(widths, taken, *extra),
+            Self::CompatibilityIgnored { version, point_format } => format!(
+                "a record of LASzip's compatibility mode (version {version}) does not fit the points (format \
+                 {point_format} and its extra bytes); they are read as they are stored"
+            ),
+            Self::CompatibilityCount { count } => format!(
+                "the header declares no points, the record of LASzip's compatibility mode {count}; these are read"
+            ),
             Self::ExtraBytesLength { bytes, descriptor } => {
                 format!("the Extra Bytes record has {bytes} bytes, not a multiple of {descriptor}")
             }
@@ -278,9 +347,32 @@ impl ScanWarning {
             Self::CrsUnknown { start } => {
                 return format!("the coordinate metadata is no WKT and is not read: {start:?}");
             }
-            Self::Images { count: Some(1) } => "1 image is in the file; it is not read",
-            Self::Images { count: Some(n) } => return format!("{n} images are in the file; they are not read"),
-            Self::Images { count: None } => "images are in the file; they are not read, nor can their description be",
+            Self::Images { count: 1 } => "1 image is in the file; it is not part of its points and not read",
+            Self::Images { count } => {
+                return format!("{count} images are in the file; they are not part of its points and not read");
+            }
+            Self::ImageUnknown { number, why } => {
+                return format!("the description of image {number} is not understood ({why}); it is ignored");
+            }
+            Self::LastPage { missing } => {
+                return format!(
+                    "the last page of the file lacks {missing} of its 1024 bytes, of its checksum or before it; what is \
+                     there is read"
+                );
+            }
+            Self::XmlLength { declared, found } => {
+                return format!("the header declares {declared} bytes of XML; {found} are found there and read");
+            }
+            Self::XmlEncoding { at } => {
+                return format!("the XML is not UTF-8 from its byte {at} on; it is read as Latin-1");
+            }
+            Self::XmlRepeated { name } => return format!("the XML declares {name} twice; the first is taken"),
+            Self::XmlCommas => "numbers of the XML have decimal commas; they are read as decimal points",
+            Self::PointsUndescribed => "no points are described for it",
+            Self::NoneChosen { scans: 1 } => "its scan was not chosen; nothing of it is read",
+            Self::NoneChosen { scans } => {
+                return format!("none of its {scans} scans was chosen; nothing of it is read");
+            }
             Self::NoScans => "the file has no scans",
             Self::More => "there is more of this kind",
             Self::PointsShared => "its points are those of an earlier scan; they are read once",
@@ -294,8 +386,28 @@ impl ScanWarning {
     }
 }
 
+fn extra_bytes_records(widths: &[usize], taken: &[usize], extra: usize) -> String {
+    let join = |numbers: &[usize]| numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    let (there, numbers) = (widths.len(), join(taken));
+    let width: usize = taken.iter().map(|i| widths[i - 1]).sum();
+    match taken.len() {
+        _ if width != extra => format!(
+            "there are {there} Extra Bytes records, of {} bytes per point, which do not add up to its {extra} extra \
+             bytes; number {numbers} is taken",
+            join(widths)
+        ),
+        1 => format!(
+            "there are {there} Extra Bytes records; number {numbers} describes all {extra} extra bytes of a point"
+        ),
+        _ => format!(
+            "there are {there} Extra Bytes records; joined in order, numbers {numbers} describe all {extra} extra \
+             bytes of a point"
+        ),
+    }
+}
+
 fn in_scans(scans: &[usize], warning: &ScanWarning) -> String {
-    let named: Vec<_> = scans.iter().take(MAX_NAMED).map(usize::to_string).collect();
+    let named: Vec<_> = scans.iter().take(MAX_NAMED).map(|i| (i + 1).to_string()).collect();
     let more = match scans.len() - named.len() {
         0 => String::new(),
         n => format!(" and {n} more"),

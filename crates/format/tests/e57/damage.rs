@@ -46,7 +46,7 @@ fn points_without_a_bit_are_limited() {
     };
     assert_eq!(count(65_536).unwrap().len(), 65_536);
     let error = count(1 << 60).unwrap_err().to_string();
-    assert!(error.contains("scan 0: 1152921504606846976 points without a bit of data"), "{error}");
+    assert!(error.contains("scan 1: 1152921504606846976 points without a bit of data"), "{error}");
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn two_scans_in_one_place_are_read_once() {
     let (second, third) = (section(&bytes, 1), section(&bytes, 2));
     replace(&mut bytes, &third, &second);
     let cloud = read_bytes(&bytes).unwrap();
-    assert!(cloud.warned("scan 2: its points are those of an earlier scan"), "{:?}", cloud.info.warnings);
+    assert!(cloud.warned("scan 3: its points are those of an earlier scan"), "{:?}", cloud.info.warnings);
     assert_eq!(cloud.len(), 400);
 }
 
@@ -93,16 +93,17 @@ fn a_scan_without_a_section_loses_its_points_alone() {
     replace(&mut bytes, &second, "fileOffset=\"999999999\"");
     let cloud = read_bytes(&bytes).unwrap();
     assert_eq!((cloud.len(), cloud.errors.len()), (400, 0));
-    assert!(cloud.warned("scan 1: 200 points are declared, 0 are there (page"), "{:?}", cloud.info.warnings);
+    assert!(cloud.warned("scan 2: 200 points are declared, 0 are there (page"), "{:?}", cloud.info.warnings);
 }
 
 #[test]
 fn an_image_that_cannot_be_described_does_not_stop_the_points() {
     let mut bytes = fixture("empty_scans.e57");
-    replace(&mut bytes, "<imageWidth type=\"Integer\"", "<imageWidth type=\"Nonsense\"");
+    replace(&mut bytes, "<imageWidth type=\"Integer\">2", "<imageWidth type=\"Integer\">two");
     let cloud = read_bytes(&bytes).unwrap();
-    assert_eq!(cloud.len(), 10);
-    assert!(cloud.warned("nor can their description be"), "{:?}", cloud.info.warnings);
+    assert_eq!((cloud.len(), cloud.info.images.len()), (10, 1));
+    let why = "the description of image 1 is not understood (imageWidth is \"two\", not a number); it is ignored";
+    assert!(cloud.warned(why) && cloud.warned("1 image is in the file"), "{:?}", cloud.info.warnings);
 }
 
 #[test]
@@ -110,5 +111,5 @@ fn scans_without_positions_are_refused() {
     let mut bytes = fixture("no_z.e57");
     replace(&mut bytes, "<cartesianY ", "<cartesianQ ");
     let error = read_bytes(&bytes).unwrap_err();
-    assert!(error.to_string().contains("scan 0: its points have neither x and y nor range"), "{error}");
+    assert!(error.to_string().contains("scan 1: its points have neither x and y nor range"), "{error}");
 }

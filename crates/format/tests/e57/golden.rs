@@ -58,7 +58,10 @@ fn extra_fields_come_as_they_are_stored() {
         for (column, expected) in columns.iter().filter(|(c, _)| c.contains('/')) {
             let (scan, field) = column.split_once('/').unwrap();
             let name = match field {
-                "nor:class" => "class 2",
+                "returnIndex" => "return number",
+                "returnCount" => "number of returns",
+                "nor:class" => "class",
+                "demo:class" => "classification",
                 field => field.rsplit(':').next().unwrap(),
             };
             let is_own = |prefix: &str| name.starts_with(prefix);
@@ -67,7 +70,10 @@ fn extra_fields_come_as_they_are_stored() {
                 continue;
             }
             checked += 1;
-            let seen = row(&of_scan(&cloud, name, scan.parse().unwrap()));
+            // returns are counted from 1, their indices from 0
+            let first = f64::from(u8::from(field == "returnIndex"));
+            let values: Vec<_> = of_scan(&cloud, name, scan.parse().unwrap()).iter().map(|v| v - first).collect();
+            let seen = row(&values);
             assert!(same(&seen, expected), "{file} {column}: {seen:?}, expected {expected:?}");
         }
     }
@@ -80,15 +86,15 @@ fn columns_have_their_names_types_and_meaning() {
     let names = |file: &str| attributes(file).iter().map(|a| a.name.clone()).collect::<Vec<_>>().join(", ");
     assert_eq!(
         names("scans.e57"),
-        "rgb, intensity, point source id, rowIndex, columnIndex, returnIndex, returnCount, timeStamp"
+        "rgb, intensity, point source id, rowIndex, columnIndex, return number, number of returns, timestamp"
     );
-    assert_eq!(names("normals.e57"), "point source id, NormalX, NormalY, NormalZ, class, class 2, reflectance");
+    assert_eq!(names("normals.e57"), "point source id, NormalX, NormalY, NormalZ, classification, class, reflectance");
     let of = |file: &str, name: &str| attributes(file).iter().find(|a| a.name == name).cloned().unwrap();
-    let scaled = of("normals.e57", "class 2");
+    let scaled = of("normals.e57", "class");
     assert_eq!((scaled.ty, scaled.scale[0], scaled.offset[0]), (AttributeType::Int16, 0.25, 10.0));
-    assert_eq!(of("normals.e57", "class").ty, AttributeType::UInt8);
+    assert_eq!(of("normals.e57", "classification").ty, AttributeType::UInt8);
     assert_eq!(of("normals.e57", "reflectance").ty, AttributeType::Float32);
-    assert_eq!(of("scans.e57", "timeStamp").ty, AttributeType::Float64, "single in one scan, double in another");
+    assert_eq!(of("scans.e57", "timestamp").ty, AttributeType::Float64, "single in one scan, double in another");
     assert_eq!(of("widths.e57", "w64").ty, AttributeType::Int64);
     assert_eq!(of("widths.e57", "w0").ty, AttributeType::UInt8);
     assert_eq!((of("scans.e57", "rgb").ty, of("scans.e57", "rgb").elements), (AttributeType::UInt16, 3));
@@ -97,7 +103,7 @@ fn columns_have_their_names_types_and_meaning() {
 #[test]
 fn rows_and_columns_come_only_if_asked_for() {
     let scan = e57::open(files::fixture("e57").join("scans.e57")).unwrap();
-    assert!(!scan.info().attributes.iter().any(|a| a.name.ends_with("Index") && a.name != "returnIndex"));
+    assert!(!scan.info().attributes.iter().any(|a| a.name.ends_with("Index")));
 }
 
 #[test]
@@ -137,13 +143,13 @@ fn what_stands_around_the_points_is_told() {
     assert_eq!(scans.bounds_declared, None, "two scans declare none");
     assert_eq!(
         scans.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["scan 2: the rotation is no unit quaternion; it is normalised"]
+        ["scan 3: the rotation is no unit quaternion; it is normalised"]
     );
     let empty = info("empty_scans.e57");
     assert_eq!(empty.crs.wkt.as_deref(), Some("PROJCS[\"Höhe & <Breite>\",GEOGCS[\"WGS 84\"],UNIT[\"metre\",1]]"));
     assert_eq!(
         empty.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["2 images are in the file; they are not read"]
+        ["2 images are in the file; they are not part of its points and not read"]
     );
     assert_eq!(
         info("no_scans.e57").warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
@@ -151,11 +157,11 @@ fn what_stands_around_the_points_is_told() {
     );
     assert_eq!(
         info("no_z.e57").warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["scan 0: its points have no z; it is taken as 0"]
+        ["scan 1: its points have no z; it is taken as 0"]
     );
     assert_eq!(
         info("packets.e57").warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ["scan 0: the field note holds text; it is not read"]
+        ["scan 1: the field note holds text; it is not read"]
     );
     for quiet in ["spherical.e57", "both_systems.e57", "normals.e57", "widths.e57", "constant.e57"] {
         assert!(info(quiet).warnings.is_empty(), "{quiet}: {:?}", info(quiet).warnings);

@@ -4,7 +4,9 @@
 mod common;
 mod corpus;
 mod damage;
+mod deviations;
 mod golden;
+mod images;
 mod mutation;
 mod oracle;
 mod values;

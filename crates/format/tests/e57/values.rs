@@ -3,8 +3,12 @@
 use std::fs::File;
 use std::io::BufReader;
 
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
 use e57::{E57Reader, RecordName};
 
+use pointmill_format::{Changes, Scratch, Wanted};
 use pointmill_testkit::files;
 
 use crate::common::read;
@@ -55,7 +59,7 @@ fn intensity_is_scaled_by_the_limits_or_what_stands_for_them() {
         }
     }
     let sampled = "no limits are declared for its intensity; 0 to 255 are taken, by a sample of the values";
-    assert!(cloud.warned(&format!("scans 3, 6, 7: {sampled}")), "{:?}", cloud.info.warnings);
+    assert!(cloud.warned(&format!("scans 4, 7, 8: {sampled}")), "{:?}", cloud.info.warnings);
     assert_eq!(cloud.info.warnings.len(), 4, "{:?}", cloud.info.warnings);
 }
 
@@ -95,10 +99,10 @@ fn invalid_times_are_nan() {
     let cloud = read("scans.e57");
     let bad = raw("scans.e57", 1, "IsTimeStampInvalid");
     for (i, v) in raw("scans.e57", 1, "TimeStamp").into_iter().enumerate() {
-        let seen = cloud.values("timeStamp")[200 + i];
+        let seen = cloud.values("timestamp")[200 + i];
         assert!(if bad[i] == 0.0 { seen == v } else { seen.is_nan() });
     }
-    assert!(cloud.values("timeStamp")[..200].iter().all(|v| *v == 0.0), "a scan without times");
+    assert!(cloud.values("timestamp")[..200].iter().all(|v| *v == 0.0), "a scan without times");
 }
 
 #[test]
@@ -116,4 +120,38 @@ fn normals_turn_with_their_scan_and_are_not_moved() {
         assert!((before - after).abs() < 1e-4, "{before} {after}");
     }
     assert!((0..100).any(|i| (seen[0][i] - local[0][i]).abs() > 0.1), "they did turn");
+}
+
+#[test]
+fn colours_of_declared_depth_stay_as_they_are() {
+    let cloud = read("dark.e57");
+    let expected: Vec<f64> = [0.0, 1.0, 100.0, 255.0].into_iter().flat_map(|v| [v; 3]).collect();
+    assert_eq!(cloud.values("rgb"), expected);
+    assert!(cloud.info.rgb_is_16_bit);
+}
+
+#[test]
+fn values_outside_of_their_limits_are_counted_and_not_those_that_are_invalid() {
+    let scan = pointmill_format::scan::e57::open(files::fixture("e57").join("outside.e57")).unwrap();
+    let (wanted, mut scratch) = (Wanted::all(scan.info()), Scratch::default());
+    let mut counted: BTreeMap<String, Changes> = BTreeMap::new();
+    let mut intensity: Vec<u16> = Vec::new();
+    for piece in 0..scan.pieces().len() {
+        scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
+            for (column, changes) in batch.changes() {
+                counted.entry(batch.attributes()[column].name.clone()).or_default().merge(changes);
+            }
+            intensity.extend(batch.column::<u16>("intensity").unwrap());
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    }
+    assert_eq!(intensity, [32_768, 0, 65_535, 0, 0, 65_535, 0, 0, 0, 0]);
+    // two are invalid, and a second scan of two points has neither intensity nor colour
+    let expected =
+        Changes { clamped: 2, not_finite: 2, missing: 4, extremes: Some([-0.25, 3.0]), ..Changes::default() };
+    assert_eq!(counted["intensity"], expected);
+    let expected = Changes { clamped: 3, missing: 2, extremes: Some([300.0; 2]), ..Changes::default() };
+    assert_eq!(counted["rgb"], expected);
+    assert_eq!(counted.len(), 2);
 }

@@ -6,5 +6,7 @@ mod corpus;
 mod damage;
 mod golden;
 mod hostile;
+mod mended;
 mod mutation;
 mod oracle;
+mod records;

@@ -24,7 +24,7 @@ fn sound_files_give_their_points() {
             "pcd/autzen-utm.pcd",
             1065,
             "rgb uint16x3, intensity uint16x1, classification uint8x1, return number uint8x1, number of returns \
-             uint8x1, scan direction flag uint8x1, edge of flight line uint8x1, ScanAngleRank floatx1, user data \
+             uint8x1, scan direction flag uint8x1, edge of flight line uint8x1, scan angle floatx1, user data \
              uint8x1, point source id uint16x1, gps-time doublex1",
         ),
         ("pcd/missingheader.pcd", 10, ""),

@@ -74,14 +74,26 @@ fn float_colours_above_one_are_integers() {
 }
 
 #[test]
-fn a_class_that_does_not_fit_is_an_error() {
+fn classes_keep_their_type() {
     let header = "element vertex 2\nproperty short x\nproperty short y\nproperty short classification\nend_header\n";
-    let bytes: Vec<u8> = [1i16, 2, 3, 4, 5, 300].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let bytes: Vec<u8> = [1i16, 2, -3, 4, 5, 300].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let cloud = read_bytes([ply("binary_little_endian", header).into_bytes(), bytes].concat()).unwrap();
+    assert_eq!(
+        (cloud.attributes().as_str(), cloud.values("classification")),
+        ("classification int16x1", vec![-3.0, 300.0])
+    );
+}
+
+#[test]
+fn a_colour_that_does_not_fit_is_an_error() {
+    let header = "element vertex 1\nproperty short x\nproperty short y\nproperty short red\nproperty short green\n\
+                  property short blue\nend_header\n";
+    let bytes: Vec<u8> = [1i16, 2, 3, 4, -300].iter().flat_map(|v| v.to_le_bytes()).collect();
     let bytes = [ply("binary_little_endian", header).into_bytes(), bytes].concat();
     let e = &read_bytes(&bytes).unwrap().errors[0];
     assert_eq!(
         (e.what().as_str(), e.offset()),
-        ("the value 300 does not fit its column", Some(bytes.len() as u64 - 2))
+        ("the value -300 does not fit its column", Some(bytes.len() as u64 - 2))
     );
 }
 

@@ -155,8 +155,8 @@ fn names_of_other_programs_are_matched() {
 #[test]
 fn values_that_are_not_what_the_title_says_are_attributes() {
     let cloud = read_bytes("x y z r g b class\n1 2 3 -4 5 6 300\n").unwrap();
-    assert_eq!(cloud.attributes(), "r doublex1, g doublex1, b doublex1, class doublex1");
-    assert!(cloud.warned("column 7 (class) holds values that are none of that kind"));
+    assert_eq!(cloud.attributes(), "classification int16x1, r doublex1, g doublex1, b doublex1");
+    assert!(cloud.warned("column 4 (r) holds values that are none of that kind"));
     let cloud = read_bytes("1 2 3 -0.5 7 8\n").unwrap();
     assert_eq!(cloud.attributes(), "column 4 doublex1, column 5 doublex1, column 6 doublex1");
 }

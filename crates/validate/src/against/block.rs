@@ -14,10 +14,37 @@ pub(crate) struct Block {
     pub(crate) truncated: [Vec<i64>; 3],
     /// For each attribute of the dataset but the position: the bits of its elements, point by point.
     pub(crate) words: Vec<Vec<u64>>,
+    /// What the lattice takes away of the position; filled where equal records count once.
+    pub(crate) residues: Vec<u64>,
     /// Which records take part.
     pub(crate) keep: Vec<bool>,
+    /// Of the sources: what the lattice and the format do to each record's position.
+    pub(crate) moved: Moved,
     /// Hash states of what was mixed in so far.
     states: Vec<[u64; 2]>,
+}
+
+/// By how much positions of a block of the sources move, by record.
+#[derive(Debug, Default)]
+pub(crate) struct Moved {
+    /// Index of the block's first point in its file: blocks of a file are added up in this order.
+    pub(crate) first: u64,
+    /// Positions of the sources.
+    pub(crate) world: [Vec<f64>; 3],
+    /// Their points on the job lattice, less these.
+    pub(crate) lattice: [Vec<f64>; 3],
+    /// The integers that the file has do not come back from the job lattice.
+    pub(crate) lost: Vec<bool>,
+    /// Where the dataset's integers are not certain, those of the sources on its lattice; else empty.
+    pub(crate) steps: Vec<[i64; 3]>,
+}
+
+impl Moved {
+    fn clear(&mut self) {
+        self.world.iter_mut().chain(&mut self.lattice).for_each(Vec::clear);
+        self.lost.clear();
+        self.steps.clear();
+    }
 }
 
 /// Odd constants with well-spread bits (hexadecimal digits of π and e).
@@ -57,7 +84,9 @@ impl Block {
         self.positions.iter_mut().chain(&mut self.truncated).for_each(Vec::clear);
         self.words.resize_with(attributes, Vec::new);
         self.words.iter_mut().for_each(Vec::clear);
+        self.residues.clear();
         self.keep.clear();
+        self.moved.clear();
     }
 
     /// Position of a record.
@@ -129,9 +158,37 @@ pub(crate) fn append_words(
     out.resize(out.len().next_multiple_of(attribute.elements), 0);
 }
 
+/// Words of values that their type does not hold; no stored value has such a word. Doubles have all words: the inverse of
+/// the nearest one stands for such a value there.
+const UNFIT: u64 = 1 << 63;
+
+/// [`append_words`] of as many elements as the attribute has, where values that its type does not hold exactly are no
+/// values of it.
+pub(crate) fn append_exact_words(
+    column: &Column,
+    start: usize,
+    points: usize,
+    attribute: &Attribute,
+    out: &mut Vec<u64>,
+) {
+    let (ty, elements) = (attribute.ty, attribute.elements);
+    if column.ty() == ty {
+        return append_words(Some((column, elements)), start, points, attribute, out);
+    }
+    let unfit = |word: u64| if ty.size() < 8 { word | UNFIT } else { !word };
+    with_column!(column, values => {
+        let values = values.get(start * elements..(start + points) * elements).unwrap_or_default();
+        out.extend(values.iter().map(|v| if v.fits(ty) { v.bits(ty) } else { unfit(v.bits(ty)) }));
+    });
+    out.resize(out.len().next_multiple_of(elements), 0);
+}
+
 /// A value that can be stored as another type.
 trait Bits: Copy {
     fn bits(self, ty: AttributeType) -> u64;
+
+    /// True if the other type holds it exactly.
+    fn fits(self, ty: AttributeType) -> bool;
 }
 
 macro_rules! bits {
@@ -149,6 +206,31 @@ macro_rules! bits {
                     AttributeType::Float64 => (self as f64).to_bits(),
                 }
             }
+
+            #[inline]
+            fn fits(self, ty: AttributeType) -> bool {
+                let whole = self as i128;
+                let is_whole = whole as $t == self;
+                match ty {
+                    AttributeType::Int8 => is_whole && i8::try_from(whole).is_ok(),
+                    AttributeType::UInt8 => is_whole && u8::try_from(whole).is_ok(),
+                    AttributeType::Int16 => is_whole && i16::try_from(whole).is_ok(),
+                    AttributeType::UInt16 => is_whole && u16::try_from(whole).is_ok(),
+                    AttributeType::Int32 => is_whole && i32::try_from(whole).is_ok(),
+                    AttributeType::UInt32 => is_whole && u32::try_from(whole).is_ok(),
+                    AttributeType::Int64 => is_whole && i64::try_from(whole).is_ok(),
+                    AttributeType::UInt64 => is_whole && u64::try_from(whole).is_ok(),
+                    // NaN is not equal to itself, and stays what it is
+                    AttributeType::Float32 => {
+                        let single = self as f32;
+                        single.is_nan() || single as $t == self && single as i128 == whole
+                    }
+                    AttributeType::Float64 => {
+                        let double = self as f64;
+                        double.is_nan() || double as $t == self && double as i128 == whole
+                    }
+                }
+            }
         }
     )*};
 }
@@ -156,6 +238,9 @@ bits!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
 /// The number that `word` stands for.
 pub(crate) fn value(word: u64, ty: AttributeType) -> serde_json::Value {
+    if ty.size() < 8 && word & UNFIT != 0 {
+        return format!("a value that {ty} does not hold").into();
+    }
     match ty {
         AttributeType::Int8 => (word as i8).into(),
         AttributeType::Int16 => (word as i16).into(),
@@ -181,6 +266,24 @@ mod tests {
         out.clear();
         append_words(Some((&column, 1)), 1, 1, &Attribute::new("a", AttributeType::Float64, 1), &mut out);
         assert_eq!(value(out[0], AttributeType::Float64), 5.0);
+    }
+
+    #[test]
+    fn what_a_type_does_not_hold_is_no_value_of_it() {
+        let words = |column: &Column, ty| {
+            let mut out = Vec::new();
+            append_exact_words(column, 0, column.len(), &Attribute::new("a", ty, 1), &mut out);
+            out
+        };
+        assert_eq!(words(&Column::Int8(vec![-1, 5]), AttributeType::Int16), [0xffff, 5]);
+        let narrow = words(&Column::Int32(vec![-1, 255, 300]), AttributeType::UInt8);
+        assert_eq!((narrow[0] > 255, narrow[1], narrow[2] > 255), (true, 255, true));
+        assert_eq!(value(narrow[0], AttributeType::UInt8), "a value that uint8 does not hold");
+        let wide = words(&Column::UInt64(vec![1 << 53, (1 << 53) + 1]), AttributeType::Float64);
+        let double = |v: u64| (v as f64).to_bits();
+        assert_eq!((wide[0], wide[1]), (double(1 << 53), !double((1 << 53) + 1)));
+        assert!(!i64::MAX.fits(AttributeType::Float64) && !0.5f64.fits(AttributeType::UInt8));
+        assert!(f32::NAN.fits(AttributeType::Float64) && !1e300f64.fits(AttributeType::Float32));
     }
 
     #[test]

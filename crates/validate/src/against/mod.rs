@@ -6,9 +6,13 @@
 //! collisions on purpose). Unequal sums are narrowed down in further passes ([`narrow`]).
 
 pub(crate) mod block;
+mod distinct;
 mod exact;
+mod meaning;
+mod measured;
 mod narrow;
 pub(crate) mod rules;
+mod selection;
 mod sides;
 mod sources;
 
@@ -20,6 +24,7 @@ use pointmill_format::ReadError;
 use crate::check::Check;
 use crate::finding::Finding;
 use crate::outcome::AgainstSummary;
+use measured::Parts;
 use rules::RgbDepth;
 use sides::{COLOURS, Colour, Sum, rgb_of};
 
@@ -48,7 +53,7 @@ const POSITION_RULES: [PositionRule; 4] = [
 /// What one file adds up to, by colour and position rule.
 struct FileSums {
     sums: Mutex<[[Sum; POSITION_RULES.len()]; COLOURS.len()]>,
-    /// A colour value above 255 was seen.
+    /// A colour value above 255 was seen, or the file declares 16 bits.
     wide: AtomicBool,
 }
 
@@ -60,7 +65,11 @@ impl Against {
     pub(crate) fn compare(&self, context: &Context<'_>) -> Result<AgainstSummary, ReadError> {
         let rules = &self.sums.rules;
         let position_rules = if rules.foreign { &POSITION_RULES[..] } else { &POSITION_RULES[..1] };
-        let files = self.sum_sources(position_rules, context)?;
+        let parts = Parts::new(rules, self.sources.points, context.memory_bytes);
+        let files = self.sum_sources(position_rules, &parts, context)?;
+        if let Ok(mut measured) = self.measured.lock() {
+            *measured = Some(parts.finish());
+        }
         let found = self.sums.total();
         let colours = self.colour_rules(&files);
         let candidates = self.candidates(&files, &colours, position_rules);
@@ -93,16 +102,25 @@ impl Against {
     }
 
     /// One pass over the sources: sums by file, for every colour and position rule in question.
-    fn sum_sources(&self, positions: &[PositionRule], context: &Context<'_>) -> Result<Vec<FileSums>, ReadError> {
+    fn sum_sources(
+        &self,
+        positions: &[PositionRule],
+        parts: &Parts<'_>,
+        context: &Context<'_>,
+    ) -> Result<Vec<FileSums>, ReadError> {
         let rules = &self.sums.rules;
         let files: Vec<FileSums> = self
             .sources
             .list
             .iter()
-            .map(|_| FileSums { sums: Mutex::default(), wide: AtomicBool::new(rules.rgb.is_none()) })
+            .map(|source| {
+                let is_wide = rules.rgb.is_none() || source.declares_16_bit_colour();
+                FileSums { sums: Mutex::default(), wide: AtomicBool::new(is_wide) }
+            })
             .collect();
         self.sources.each_block(rules, context.progress, "sources", |block, at| {
             let file = &files[at];
+            parts.add(block, at);
             if let Some(rgb) = rules.rgb
                 && block.words[rgb].iter().any(|v| *v > 255)
             {

@@ -4,7 +4,7 @@
 //! Second pass: the whole records of as many differing buckets as memory allows, from both sides; what is left after
 //! equal ones cancel is missing, surplus, or has another attribute.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Mutex;
 
 use pointmill_format::{Attribute, ReadError};
@@ -52,9 +52,12 @@ struct Pass<'a> {
 }
 
 /// One side's records of one position and content: how many more the sources have than the dataset.
+#[derive(Default)]
 struct Balance {
     sources: i64,
     dataset: i64,
+    /// What the lattice takes away of those of the sources, where equal records count once.
+    residues: BTreeSet<u64>,
     node: Option<Place>,
 }
 
@@ -84,27 +87,29 @@ impl Pass<'_> {
     /// Buckets whose sets of records differ; a record that the dataset has twice differs too. Takes as many passes as
     /// memory asks for.
     fn by_set(&self) -> Result<Vec<Option<u64>>, ReadError> {
-        let hash_bytes = size_of::<(u16, u128)>() as u64;
+        let hash_bytes = size_of::<(u16, u128, u64)>() as u64;
         let needed = (self.against.sources.points + self.against.sums.total().count) * hash_bytes;
         let passes = needed.div_ceil((self.context.memory_bytes / 4).max(1)).clamp(1, BUCKETS as u64) as usize;
         let mut differing = vec![None; BUCKETS];
         for pass in 0..passes {
             let buckets = BUCKETS * pass / passes..BUCKETS * (pass + 1) / passes;
-            let sides: [Mutex<Vec<(u16, u128)>>; 2] = Default::default();
+            let sides: [Mutex<Vec<(u16, u128, u64)>>; 2] = Default::default();
             self.each_record(|side, block, i, _| {
                 let at = bucket(block.position(i));
                 if buckets.contains(&at)
                     && let Ok(mut hashes) = sides[side].lock()
                 {
-                    hashes.push((at as u16, self.hash(block, i)));
+                    hashes.push((at as u16, self.hash(block, i), residue(block, i)));
                 }
             })?;
             let [mut sources, mut dataset] = sides.map(|side| side.into_inner().unwrap_or_default());
             sources.par_sort_unstable();
             dataset.par_sort_unstable();
             let mut counts = vec![0; BUCKETS];
-            sources.iter().chain(&dataset).for_each(|(b, _)| counts[usize::from(*b)] += 1);
+            sources.iter().chain(&dataset).for_each(|(b, ..)| counts[usize::from(*b)] += 1);
             sources.dedup();
+            let [sources, dataset] =
+                [sources, dataset].map(|side| side.into_iter().map(|(at, hash, _)| (at, hash)).collect::<Vec<_>>());
             for at in differences(&sources, &dataset) {
                 differing[usize::from(at)] = Some(counts[usize::from(at)]);
             }
@@ -121,8 +126,11 @@ impl Pass<'_> {
                 && let Ok(mut balances) = balances.lock()
             {
                 let row = block.row(i, &rules.attributes);
-                let balance = balances.entry(row).or_insert(Balance { sources: 0, dataset: 0, node: None });
+                let balance = balances.entry(row).or_default();
                 match side {
+                    0 if rules.drop_duplicates => {
+                        balance.sources += i64::from(balance.residues.insert(residue(block, i)));
+                    }
                     0 => balance.sources += 1,
                     _ => {
                         balance.dataset += 1;
@@ -134,8 +142,7 @@ impl Pass<'_> {
         let balances = balances.into_inner().unwrap_or_default();
         let mut by_position: BTreeMap<[u64; 3], (Vec<Row>, Vec<Row>)> = BTreeMap::new();
         for (row, balance) in balances {
-            let expected = if rules.drop_duplicates { balance.sources.min(1) } else { balance.sources };
-            let surplus = balance.dataset - expected;
+            let surplus = balance.dataset - balance.sources;
             if surplus == 0 {
                 continue;
             }
@@ -211,6 +218,11 @@ impl Pass<'_> {
             (0..block.len()).for_each(|i| work(1, block, i, Some(place)));
         })
     }
+}
+
+/// What the lattice takes away of a position; 0 for records of the dataset.
+fn residue(block: &Block, i: usize) -> u64 {
+    block.residues.get(i).copied().unwrap_or(0)
 }
 
 type Row = (Box<[u64]>, Option<Place>);

@@ -46,6 +46,8 @@ pub(crate) struct Rules {
     pub(crate) attributes: Vec<Attribute>,
     /// One for each of `attributes`.
     pub(crate) conversions: Vec<Conversion>,
+    /// 64-bit integers are stored as doubles, those beyond 2⁵³ rounded.
+    pub(crate) has_no_wide_integers: bool,
     /// Where `rgb` (uint16 × 3) stands among them.
     pub(crate) rgb: Option<usize>,
     /// The dataset has 8 bits a channel: each 16-bit value v of the rules below becomes (v · 255 + 32767) / 65535.
@@ -61,11 +63,13 @@ pub(crate) struct Rules {
     /// The job lattice's coordinate of the dataset's integer 0.
     pub(crate) shift: [i64; 3],
     pub(crate) rgb_depth: RgbDepth,
-    /// Source coordinates, closed.
+    /// World coordinates, closed.
     pub(crate) bounds: Option<Aabb>,
-    pub(crate) classes: Option<Vec<u8>>,
+    pub(crate) classes: Option<Vec<i64>>,
     /// Indices in the file that are multiples of it; 1: all.
     pub(crate) every: u64,
+    /// Points exactly at the origin of their scan are not in the dataset.
+    pub(crate) skips_origin: bool,
     /// Equal records count once.
     pub(crate) drop_duplicates: bool,
     /// Not written by pointmill: known deviations of other converters are tried too.
@@ -85,10 +89,11 @@ impl Rules {
             Some(&[x0, y0, z0, x1, y1, z1]) => Some(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] }),
             _ => None,
         };
-        let classes = numbers(&own["filter"]["classes"]).map(|c| c.iter().map(|v| *v as u8).collect());
+        let classes = numbers(&own["filter"]["classes"]).map(|c| c.iter().map(|v| *v as i64).collect());
         Self {
             conversions: vec![Conversion::AsStored; attributes.len()],
             attributes,
+            has_no_wide_integers: false,
             rgb,
             rgb_as_bytes: false,
             compare_positions: true,
@@ -104,6 +109,7 @@ impl Rules {
             bounds,
             classes,
             every: own["filter"]["every"].as_u64().unwrap_or(1).max(1),
+            skips_origin: own["filter"]["originPoints"] == "skip",
             drop_duplicates: own["duplicates"] == "drop",
             foreign: own.is_null(),
             constants: constants(&own["attributesDropped"]),
@@ -115,19 +121,43 @@ impl Rules {
         self.stored.as_ref().map_or_else(|| self.lattice.world(position), |stored| stored.world(position))
     }
 
+    /// World coordinate of a dataset's coordinate, as the job's lattice has it, and the offset in it.
+    pub(super) fn job_point(&self, axis: usize, stored: i64) -> (f64, f64) {
+        let offset = self.lattice_offset[axis];
+        ((stored + self.shift[axis]) as f64 * self.lattice.scale[axis] + offset, offset)
+    }
+
     /// The job lattice's coordinates on an axis.
     pub(crate) fn job_grid(&self, axis: usize) -> AxisGrid {
         AxisGrid { step: self.lattice.scale[axis], offset: self.lattice_offset[axis] }
     }
 
-    /// The dataset's coordinate of a world coordinate: rounded, and truncated as some converters do.
+    /// Steps of the job lattice to a world coordinate.
     #[inline]
-    pub(crate) fn quantize(&self, axis: usize, world: f64) -> (i64, i64) {
-        if !self.compare_positions {
-            return (0, 0);
-        }
-        let steps = (world - self.lattice_offset[axis]) / self.lattice.scale[axis];
-        (steps.round_ties_even() as i64 - self.shift[axis], steps as i64 - self.shift[axis])
+    pub(crate) fn job_steps(&self, axis: usize, world: f64) -> f64 {
+        (world - self.lattice_offset[axis]) / self.lattice.scale[axis]
+    }
+
+    /// The dataset's coordinate of a point of the job lattice.
+    #[inline]
+    pub(crate) fn stored_steps(&self, axis: usize, job: i64) -> i64 {
+        if self.compare_positions { job.wrapping_sub(self.shift[axis]) } else { 0 }
+    }
+
+    /// The dataset's integer next to a decoded coordinate.
+    pub(crate) fn steps(&self, axis: usize, decoded: f64) -> i64 {
+        ((decoded - self.lattice.offset[axis]) / self.lattice.scale[axis]).round_ties_even() as i64
+    }
+
+    /// World coordinate of a point of the job lattice.
+    #[inline]
+    pub(crate) fn job_world(&self, axis: usize, steps: f64) -> f64 {
+        steps * self.lattice.scale[axis] + self.lattice_offset[axis]
+    }
+
+    /// World coordinates, on the job lattice, of the dataset's integers.
+    pub(crate) fn meant(&self, stored: [i64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|a| self.job_world(a, (stored[a] + self.shift[a]) as f64))
     }
 }
 

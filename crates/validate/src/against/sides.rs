@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use pointmill_format::{OpenOptions, ReadError};
 
 use super::block::Block;
+use super::measured::Measured;
 use super::rules::Rules;
 use super::sources::Sources;
 use crate::finding::Findings;
@@ -114,6 +115,7 @@ pub(crate) trait Records: Sync {
 pub(crate) struct Against {
     pub(super) sources: Sources,
     pub(crate) sums: Sums,
+    pub(super) measured: Mutex<Option<Measured>>,
 }
 
 /// Where the comparison reads the dataset again.
@@ -126,13 +128,22 @@ pub(crate) struct Context<'a> {
 }
 
 impl Against {
+    /// What was measured during [`Self::compare`].
+    pub(crate) fn measured(&self) -> Option<Measured> {
+        self.measured.lock().map_or(None, |measured| *measured)
+    }
+
     /// Opens the sources.
     ///
     /// # Errors
     /// A file that cannot be opened or is not a scan.
     pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, rules: Rules) -> Result<Self, ReadError> {
         let sources = Sources::open(paths, options, &rules)?;
-        Ok(Self { sources, sums: Sums { rules, total: Mutex::default(), blocks: Mutex::default() } })
+        Ok(Self {
+            sources,
+            sums: Sums { rules, total: Mutex::default(), blocks: Mutex::default() },
+            measured: Mutex::default(),
+        })
     }
 
     /// Integer positions of all points of the sources that take part, in any order; `None` if that is not `count`.

@@ -1,6 +1,6 @@
 //! The scans a dataset was made from, read as blocks of records in the dataset's terms.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
@@ -11,23 +11,30 @@ use pointmill_format::{
 };
 use rayon::prelude::*;
 
-use super::block::{BLOCK_POINTS, Block, append_words};
+use super::block::{BLOCK_POINTS, Block, append_exact_words, append_words};
+use super::distinct::Residue;
 use super::exact::Exact;
-use super::rules::Conversion::{AsStored, Grey, WholeClass};
+use super::meaning::{Feed, Meaning, feed};
+use super::rules::Conversion::{self, AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
+use super::selection::Selection;
 use crate::options::{Progress, ProgressFn};
+
+/// A position moved by this part of a step of its scan is neither's: its integer does not come back.
+const HALF: f64 = 0.499_999;
 
 /// A scan, and where its columns go.
 pub(crate) struct Source {
     scan: Box<dyn Scan>,
     /// From its integers to the dataset's lattice, by axis.
     exact: [Option<Exact>; 3],
-    /// For each attribute of the dataset: the column of the scan with its name, and its elements.
-    columns: Vec<Option<(usize, usize)>>,
+    /// For each attribute of the dataset: what fills it.
+    columns: Vec<Option<Feed>>,
     /// The column that the filter by class looks at.
     classification: Option<usize>,
-    /// Columns that must have one value, by the metadata: column, elements, value.
-    constants: Vec<(usize, Vec<f64>)>,
+    selection: Selection,
+    /// Columns that must have one value, by the metadata: column, what its values mean, value.
+    constants: Vec<(usize, Meaning, Vec<f64>)>,
     /// Points whose value differs from the constant, by entry of `constants`.
     deviating: Vec<AtomicU64>,
 }
@@ -43,8 +50,9 @@ pub(crate) struct Sources {
 impl Sources {
     /// Opens the files; decodes nothing.
     pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, rules: &Rules) -> Result<Self, ReadError> {
-        let list =
-            paths.iter().map(|p| Ok(Source::new(open_scan(p, options)?, rules))).collect::<Result<Vec<_>, _>>()?;
+        let open = |p: &PathBuf| Ok(Source::new(open_scan(p, options)?, rules));
+        let mut list = paths.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+        allow_doubles(&mut list, rules);
         let pieces = list.iter().enumerate();
         let pieces = pieces.flat_map(|(i, s)| (0..s.scan.pieces().len()).map(move |piece| (i, piece))).collect();
         let points = list.iter().flat_map(|s| s.scan.pieces()).map(|p| p.points).sum();
@@ -65,7 +73,7 @@ impl Sources {
     pub(crate) fn deviating(&self) -> Vec<(String, u64)> {
         let mut all: Vec<(String, u64)> = Vec::new();
         for source in &self.list {
-            for ((column, _), count) in source.constants.iter().zip(&source.deviating) {
+            for ((column, ..), count) in source.constants.iter().zip(&source.deviating) {
                 let name = &source.scan.info().attributes[*column].name;
                 match all.iter_mut().find(|(n, _)| n == name) {
                     Some((_, sum)) => *sum += count.load(Relaxed),
@@ -120,26 +128,37 @@ impl Sources {
 }
 
 impl Source {
+    /// True if the file says that its colours have 16 bits.
+    pub(crate) fn declares_16_bit_colour(&self) -> bool {
+        self.scan.info().rgb_is_16_bit
+    }
+
     fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
         let info = scan.info();
         let find = |name: &str| info.attributes.iter().position(|a| a.name == name);
         let attributes = rules.attributes.iter().zip(&rules.conversions);
-        let columns =
-            attributes.map(|(a, c)| column_of(a, &info.attributes, rules.foreign || *c != AsStored)).collect();
+        let feed = |(a, c): (&Attribute, &Conversion)| {
+            feed(a, &rules.attributes, &info.attributes, rules.foreign || *c != AsStored)
+        };
+        let columns = attributes.map(feed).collect();
         let classification = rules.classes.is_some().then(|| find("classification")).flatten();
-        let constants: Vec<_> =
-            rules.constants.iter().filter_map(|(name, value)| Some((find(name)?, value.clone()))).collect();
+        let constant = |(name, value): &(String, Vec<f64>)| {
+            let column = find(name)?;
+            Some((column, Meaning::of(&info.attributes[column]), value.clone()))
+        };
+        let constants: Vec<_> = rules.constants.iter().filter_map(constant).collect();
         let deviating = constants.iter().map(|_| AtomicU64::new(0)).collect();
         let exact = std::array::from_fn(|a| {
             let own = info.lattice.map(|l| AxisGrid { step: l.scale[a], offset: l.offset[a] });
             own.and_then(|own| Exact::new(own, rules.job_grid(a)))
         });
-        Self { exact, columns, classification, constants, deviating, scan }
+        let selection = Selection::new(info, rules);
+        Self { exact, columns, classification, selection, constants, deviating, scan }
     }
 
     fn wanted(&self) -> Wanted {
         let mut wanted = Wanted::positions(self.scan.info());
-        let columns = self.columns.iter().flatten().map(|c| c.0);
+        let columns = self.columns.iter().flatten().map(|c| c.column);
         for i in columns.chain(self.classification).chain(self.constants.iter().map(|c| c.0)) {
             wanted.set(i, true);
         }
@@ -151,19 +170,32 @@ impl Source {
     fn fill(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
         block.reset(rules.attributes.len());
         block.keep.resize(points, true);
+        block.moved.lost.resize(points, false);
+        block.moved.first = batch.first_point + start as u64;
         for axis in 0..3 {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
+        if rules.drop_duplicates {
+            self.fill_residues(batch, start, points, rules, block);
+        }
+        self.selection.apply(batch, start, &mut block.keep);
         if let Some(stored) = &rules.stored {
             for i in 0..points {
-                let words = stored.stored(block.position(i));
+                let step = block.position(i);
+                let words = stored.stored(step);
+                block.moved.steps.push(step);
                 words.into_iter().enumerate().for_each(|(axis, word)| block.positions[axis][i] = word);
             }
         }
         for (i, attribute) in rules.attributes.iter().enumerate() {
-            let column = self.columns[i].map(|(c, elements)| (&batch.columns[c], elements));
+            let feed = self.columns[i].as_ref();
             let words = &mut block.words[i];
-            append_words(column, start, points, attribute, words);
+            if rules.conversions[i] == WholeClass {
+                let class = Attribute::new("classification", AttributeType::Float64, 1);
+                append_words(feed.map(|f| (&batch.columns[f.column], f.elements)), start, points, &class, words);
+            } else {
+                append_feed(feed, batch, start..start + points, attribute, words);
+            }
             match rules.conversions[i] {
                 AsStored => {}
                 WholeClass => words.iter_mut().for_each(|w| *w = whole_class(*w)),
@@ -181,14 +213,31 @@ impl Source {
             for (i, keep) in block.keep.iter_mut().enumerate() {
                 // a scan without classes has never been classified: class 0
                 let class = column.map_or(0.0, |c| with_column!(c, v => v.get(start + i).map_or(0.0, |v| *v as f64)));
-                *keep &= classes.iter().any(|c| f64::from(*c) == class);
+                *keep &= classes.iter().any(|c| *c as f64 == class);
             }
         }
-        for ((column, value), deviating) in self.constants.iter().zip(&self.deviating) {
+        for ((column, meaning, value), deviating) in self.constants.iter().zip(&self.deviating) {
             let is_rgb = self.scan.info().attributes[*column].name == "rgb";
-            let count = count_deviating(&batch.columns[*column], start, value, &block.keep, is_rgb);
+            let count = count_deviating(&batch.columns[*column], start, (meaning, value), &block.keep, is_rgb);
             deviating.fetch_add(count, Relaxed);
         }
+    }
+
+    fn fill_residues(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
+        let own = self.scan.info().lattice;
+        let world = |axis: usize, i: usize| match (&batch.positions, &own) {
+            (Positions::Quantized(p), Some(l)) => f64::from(p[axis][i]) * l.scale[axis] + l.offset[axis],
+            (Positions::Quantized(p), None) => f64::from(p[axis][i]),
+            (Positions::World(p), _) => p[axis][i],
+        };
+        block.residues.extend((0..points).map(|i| {
+            let mut residue = Residue::default();
+            for axis in 0..3 {
+                let stored = block.positions[axis][i];
+                residue.add(rules, own.as_ref(), axis, world(axis, start + i), stored);
+            }
+            residue.word()
+        }));
     }
 
     fn fill_axis(
@@ -200,23 +249,29 @@ impl Source {
         rules: &Rules,
         block: &mut Block,
     ) {
-        let bounds = rules.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |b| (b.min[axis], b.max[axis]));
+        let lattice = self.scan.info().lattice;
         let mut take = |i: usize, world: f64, exact: Option<i64>| {
-            let (rounded, truncated) = rules.quantize(axis, world);
-            block.positions[axis].push(exact.unwrap_or(rounded));
+            let steps = rules.job_steps(axis, world);
+            let job = exact.unwrap_or(steps.round_ties_even() as i64);
+            let moved = &mut block.moved;
+            let change = rules.job_world(axis, job as f64) - world;
+            moved.world[axis].push(world);
+            moved.lattice[axis].push(change);
+            moved.lost[i] |= lattice.is_some_and(|own| change.abs() >= HALF * own.scale[axis]);
+            block.positions[axis].push(rules.stored_steps(axis, job));
             if rules.foreign {
-                block.truncated[axis].push(truncated);
+                block.truncated[axis].push(rules.stored_steps(axis, steps as i64));
             }
             // a point without a finite position is none
-            block.keep[i] &= world.is_finite() && bounds.0 <= world && world <= bounds.1;
+            block.keep[i] &= world.is_finite();
         };
-        match (&batch.positions, self.scan.info().lattice) {
+        match (&batch.positions, lattice) {
             (Positions::Quantized(values), Some(lattice)) => {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();
-                let exact = Some(&self.exact[axis]).filter(|_| rules.compare_positions).copied().flatten();
-                let on_dataset = |v| exact.map(|e| e.nearest(v) - rules.shift[axis]);
-                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_dataset(*v)));
+                let exact = self.exact[axis];
+                let on_job = |v| exact.map(|e| e.nearest(v));
+                values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_job(*v)));
             }
             (Positions::World(values), _) => {
                 values[axis][start..start + points].iter().enumerate().for_each(|(i, v)| take(i, *v, None));
@@ -229,48 +284,65 @@ impl Source {
     }
 }
 
-/// Bits of a single, to those of the whole number next to it; 0 if that is not finite or beyond ±2²⁴.
-fn whole_class(bits: u64) -> u64 {
-    let class = f32::from_bits(bits as u32).round();
-    // adding 0 makes −0 the 0 that it means
-    let class = if class.abs() <= 16_777_216.0 { class + 0.0 } else { 0.0 };
-    u64::from(class.to_bits())
+/// The words of some points of a batch, as `attribute` has them.
+fn append_feed(
+    feed: Option<&Feed>,
+    batch: &PointBatch,
+    points: Range<usize>,
+    attribute: &Attribute,
+    out: &mut Vec<u64>,
+) {
+    let (start, count) = (points.start, points.len());
+    match feed {
+        Some(Feed { column, meaning: Some(meaning), elements, .. }) => {
+            let meant = meaning.values(&batch.columns[*column], start, count);
+            append_words(Some((&meant, *elements)), 0, count, attribute, out);
+        }
+        Some(Feed { column, exact: true, .. }) => {
+            append_exact_words(&batch.columns[*column], start, count, attribute, out);
+        }
+        other => {
+            let column = other.map(|f| (&batch.columns[f.column], f.elements));
+            append_words(column, start, count, attribute, out);
+        }
+    }
 }
 
-/// The column of a scan, and its elements, that an attribute of the dataset was filled from.
-///
-/// Scans that mean different things by one name (another type, another scale) have attributes of their own; those after
-/// the first are called "name (2)", "name (3)", …. Wide integers may be stored as doubles.
-fn column_of(stored: &Attribute, columns: &[Attribute], any_type: bool) -> Option<(usize, usize)> {
-    let named = |c: &&Attribute| {
-        let suffix = stored.name.strip_prefix(&*c.name);
-        let is_number = |n: &str| n.parse::<u32>().is_ok_and(|n| n >= 2);
-        suffix.is_some_and(|s| {
-            s.is_empty() || s.strip_prefix(" (").and_then(|s| s.strip_suffix(')')).is_some_and(is_number)
-        })
-    };
-    let same = |c: &&Attribute| {
-        let ty = match c.ty {
-            AttributeType::Int64 | AttributeType::UInt64 => AttributeType::Float64,
-            other => other,
-        };
-        let same_type = ty == stored.ty || c.ty == stored.ty;
-        // other converters do as they like with types
-        any_type || same_type && c.elements == stored.elements && c.scale == stored.scale && c.offset == stored.offset
-    };
-    let exact = columns.iter().position(|c| c.name == stored.name && same(&c));
-    let found = exact.or_else(|| columns.iter().position(|c| named(&c) && same(&c)));
-    found.map(|i| (i, columns[i].elements))
+/// Doubles may round 64-bit integers where the format has no such integers, or where scans have the quantity in types
+/// that only a double holds both of.
+fn allow_doubles(list: &mut [Source], rules: &Rules) {
+    for (i, _) in rules.attributes.iter().enumerate().filter(|(_, a)| a.ty == AttributeType::Float64) {
+        let type_of = |s: &Source| Some(s.scan.info().attributes[s.columns[i].as_ref()?.column].ty);
+        let mut types: Vec<AttributeType> = list.iter().filter_map(type_of).collect();
+        types.dedup();
+        if rules.has_no_wide_integers || types.len() > 1 {
+            list.iter_mut().filter_map(|s| s.columns[i].as_mut()).for_each(|feed| feed.exact = false);
+        }
+    }
+}
+
+/// Bits of a double, to those of the single next to its whole number; 0 if that is not finite or beyond ±2²⁴.
+fn whole_class(bits: u64) -> u64 {
+    let class = f64::from_bits(bits).round();
+    // adding 0 makes −0 the 0 that it means
+    let class = if class.abs() <= 16_777_216.0 { class as f32 + 0.0 } else { 0.0 };
+    u64::from(class.to_bits())
 }
 
 /// Points that are kept and have another value. `is_rgb`: 8-bit values may stand for 16-bit ones.
 #[allow(clippy::unnecessary_cast)] // one body for every type of column
-fn count_deviating(column: &Column, start: usize, value: &[f64], keep: &[bool], is_rgb: bool) -> u64 {
+fn count_deviating(
+    column: &Column,
+    start: usize,
+    (meaning, value): (&Meaning, &[f64]),
+    keep: &[bool],
+    is_rgb: bool,
+) -> u64 {
     let elements = value.len().max(1);
-    let differs = |v: f64, constant: f64| v != constant && !(is_rgb && v * 257.0 == constant);
+    let differs = |e: usize, v: f64, constant: f64| !meaning.is(v, e, constant) && !(is_rgb && v * 257.0 == constant);
     with_column!(column, values => {
         let points = values.chunks_exact(elements).skip(start).zip(keep);
-        points.filter(|(v, keep)| **keep && v.iter().zip(value).any(|(v, c)| differs(*v as f64, *c))).count() as u64
+        points.filter(|(v, keep)| **keep && v.iter().zip(value).enumerate().any(|(e, (v, c))| differs(e, *v as f64, *c))).count() as u64
     })
 }
 
@@ -280,9 +352,17 @@ mod tests {
 
     #[test]
     fn classes_become_whole_and_finite() {
-        let cases = [(2.0, 2.0), (2.6, 3.0), (-0.2, 0.0), (f32::NAN, 0.0), (f32::INFINITY, 0.0), (3e8, 0.0)];
+        let cases = [
+            (2.0, 2.0),
+            (2.6, 3.0),
+            (-0.2, 0.0),
+            (f64::NAN, 0.0),
+            (f64::INFINITY, 0.0),
+            (3e8, 0.0),
+            (16_777_217.0, 0.0),
+        ];
         for (class, expected) in cases {
-            assert_eq!(whole_class(class.to_bits().into()), u64::from(f32::to_bits(expected)), "{class}");
+            assert_eq!(whole_class(class.to_bits()), u64::from(f32::to_bits(expected)), "{class}");
         }
     }
 }

@@ -8,6 +8,7 @@ use super::formulas::{BATCH, power};
 use super::order::Key;
 use super::positions::Axis;
 use super::task::Task;
+use crate::accuracy::Side;
 use crate::against::rules::grey;
 use crate::check::Check;
 use crate::finding::Finding;
@@ -146,33 +147,35 @@ fn levels_in_range(task: &Task<'_>, raw: &Raw) {
     }
 }
 
-/// Colours before averaging. Entries of the originals must be those of exactly the points below level 3; where they
-/// are not, the colour is unknown.
+/// Colours before averaging: those of the originals, which must be of points below level 3 and differ from what these
+/// show; all other points show their own.
 fn originals(task: &Task<'_>, raw: &Raw, flags: &mut [u8]) -> Vec<u32> {
     let mut colours: Vec<u32> = raw.colours.iter().map(|w| w & 0xff_ffff).collect();
     if !task.header.averaged() {
         return colours;
     }
-    // a level above 3 is a separate error; it was not averaged
-    let mut missing: Vec<bool> = (0..raw.len()).map(|i| raw.level(i) < 3).collect();
     let Some(entries) = &raw.originals else {
-        flags.iter_mut().zip(missing).for_each(|(f, missing)| *f |= u8::from(missing) * COLOUR_UNKNOWN);
+        // a level above 3 is a separate error; it was not averaged
+        let unknown = (0..raw.len()).filter(|i| raw.level(*i) < 3);
+        unknown.for_each(|i| flags[i] |= COLOUR_UNKNOWN);
         return colours;
     };
-    let mut surplus = Vec::new();
+    let (mut finest, mut unchanged) = (Vec::new(), Vec::new());
     for entry in entries {
         let i = (u64::from(entry.index) - raw.index(0)) as usize; // the slot's own, by the table
-        colours[i] = entry.word & 0xff_ffff;
-        if !std::mem::take(&mut missing[i]) {
-            surplus.push(i);
+        let original = entry.word & 0xff_ffff;
+        if raw.level(i) >= 3 {
+            finest.push(i);
             flags[i] |= COLOUR_UNKNOWN;
+        } else if original == colours[i] {
+            unchanged.push(i);
         }
+        colours[i] = original;
     }
-    let absent: Vec<usize> = (0..raw.len()).filter(|i| missing[*i]).collect();
-    absent.iter().for_each(|i| flags[*i] |= COLOUR_UNKNOWN);
-    for (wrong, expected, found) in
-        [(absent, "an entry, its level is below 3", "none"), (surplus, "no entry, its level is 3 or more", "one")]
-    {
+    for (wrong, expected, found) in [
+        (finest, "no entry, its level is 3 or more", "one"),
+        (unchanged, "no entry, its colour was not changed", "one"),
+    ] {
         if let Some(first) = wrong.first() {
             let values = [expected.into(), found.into()];
             points_finding(task, raw, Check::Originals, "original", wrong.len() as u64, *first, values);
@@ -236,6 +239,7 @@ fn errors(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[Axis; 3]) -> Erro
     if points.ambiguous.contains(&true) {
         return errors;
     }
+    errors.side = side(task, raw, points, axes);
     for plane in 0..task.header.planes() {
         let bits = 10 * (plane as u32 + 1);
         for (a, axis) in axes.iter().enumerate() {
@@ -252,4 +256,27 @@ fn errors(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[Axis; 3]) -> Erro
         }
     }
     errors
+}
+
+/// What decoding does to the points of a batch, with all planes that are there.
+fn side(task: &Task<'_>, raw: &Raw, points: &Points, axes: &[Axis; 3]) -> Side {
+    let (lattice, bits) = (&task.description.lattice, task.header.bits());
+    let mut side = Side::default();
+    let mut rows: Vec<([u64; 3], [i64; 3])> = Vec::with_capacity(raw.len());
+    for i in 0..raw.len() {
+        let x = points.lattice(i);
+        let decoded = [0, 1, 2].map(|a| axes[a].decoded(raw.q(i, a as u32), bits));
+        let meant = [0, 1, 2].map(|a| points.r[a][i]);
+        side.deviation.add([0, 1, 2].map(|a| decoded[a] - meant[a]), [0, 1, 2].map(|a| axes[a].world(x[a])));
+        let world = [0, 1, 2].map(|a| task.header.origin[a] + decoded[a]);
+        side.lost += u64::from([0, 1, 2].map(|a| lattice.quantize(a, world[a])) != x);
+        rows.push((decoded.map(f64::to_bits), x));
+    }
+    let is_apart = |a: usize| side.deviation.max[a] < 0.49 * lattice.scale[a];
+    if !(0..3).all(is_apart) {
+        rows.sort_unstable();
+        let places = rows.chunk_by(|a, b| a.0 == b.0).filter(|p| p.first().map(|r| r.1) != p.last().map(|r| r.1));
+        side.merged = Some(places.map(|place| place.len() as u64).sum());
+    }
+    side
 }

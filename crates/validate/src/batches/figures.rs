@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::description::{Description, Figures};
 use super::header::Header;
+use crate::accuracy::Side;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
@@ -13,6 +14,8 @@ pub(crate) struct Errors {
     pub(crate) max: [[f64; 3]; 3],
     /// Sums of squares.
     pub(crate) squares: [[f64; 3]; 3],
+    /// Of all planes that are there.
+    pub(crate) side: Side,
 }
 
 impl Errors {
@@ -31,6 +34,7 @@ impl Errors {
                 self.squares[plane][axis] += batch.squares[plane][axis];
             }
         }
+        self.side.merge(&batch.side);
     }
 
     /// Root of the mean square of `points`.

@@ -41,6 +41,7 @@ use std::path::Path;
 use pointmill_format::{DatasetKind, ReadError};
 use serde_json::json;
 
+use crate::accuracy::{self, Known};
 use crate::against::{Against, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
@@ -119,8 +120,18 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
             None
         }
     };
+    let is_measured = walked.unreadable == 0 && walked.uncertain == 0 && walked.foreign == 0;
+    let known = Known {
+        points: header.points,
+        projection: description.json["projection"].as_str().unwrap_or_default(),
+        bounds: walked.world,
+        lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
+        format: is_measured.then_some(walked.errors.side),
+    };
+    let accuracy = accuracy::judge(path, &known, &findings);
     let mut outcome = finish(findings, Some(&header));
     outcome.against = summary;
+    outcome.accuracy = accuracy;
     Ok(outcome)
 }
 

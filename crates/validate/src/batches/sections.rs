@@ -99,6 +99,9 @@ fn originals(bytes: &Bytes, at: u64, points: u64, findings: &Findings) -> Result
         findings.push(Finding::new(Check::Sections, "count of originals", format!("at most {most}"), count));
         return Ok(None);
     }
+    if count == 0 {
+        findings.push(Finding::new(Check::Sections, "count of originals", "at least 1, or no section", count));
+    }
     Ok(Some(count))
 }
 

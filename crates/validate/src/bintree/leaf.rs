@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::precision;
 use super::summary::Summary;
 use super::tree::{AXES, compare_boxes};
+use crate::accuracy::Deviation;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::place::Place;
@@ -35,6 +36,8 @@ pub(super) struct Exactness {
     pub(super) error: f64,
     /// The largest that is allowed.
     pub(super) bound: f64,
+    /// Of all points from those of the lattice, if they are certain.
+    pub(super) deviation: Deviation,
 }
 
 /// What a leaf is checked against.
@@ -168,7 +171,8 @@ impl Leaf<'_> {
     /// unknown to the index or an offset makes no number.
     pub(super) fn check_positions(&self, points: &Points) -> Exactness {
         let lattice = &self.header.lattice;
-        let mut exactness = Exactness { certain: true, error: 0.0, bound: 0.0 };
+        let deviation = Deviation::default();
+        let mut exactness = Exactness { certain: true, error: 0.0, bound: 0.0, deviation };
         self.findings.checked(Check::Positions, points.len() as u64);
         for (axis, name) in AXES.into_iter().enumerate() {
             let (scale, center) = (lattice.scale[axis], self.center[axis]);
@@ -199,6 +203,12 @@ impl Leaf<'_> {
             exactness.bound = exactness.bound.max(bound);
             far.report(Check::Positions, name, self);
             inexact.report(Check::Positions, format!("offset of {name}"), self);
+        }
+        if exactness.certain {
+            for i in 0..points.len() {
+                let meant = lattice.world(points.step(i));
+                exactness.deviation.add([0, 1, 2].map(|a| points.decoded[a][i] - meant[a]), meant);
+            }
         }
         exactness
     }

@@ -30,6 +30,7 @@ use std::path::Path;
 use pointmill_format::bintree::{Bintree, PACKED_FILE};
 use pointmill_format::{DatasetKind, ReadError};
 
+use crate::accuracy::{self, Known, Side};
 use crate::against::{Against, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
@@ -63,7 +64,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     };
     let sums = against.as_ref().map(|a| &a.sums);
     let scan = Scan { tree: &tree, readable: &readable, lattice_known, sums, findings: &findings, progress };
-    let Scanned { summaries, ends, quality } = scan.run()?;
+    let Scanned { summaries, ends, quality, deviation } = scan.run()?;
     let leaves_unread = tree.leaves().filter(|(index, _)| !readable[*index as usize]).count() as u64;
     let unknown = Unknown { lattice: !lattice_known, uncertain: quality.uncertain, unread: leaves_unread };
     let summaries = splits::check(&tree, summaries, &findings);
@@ -73,15 +74,27 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let records = Records { tree: &tree, readable: &readable };
     let memory_bytes = options.memory_bytes;
     let context = Context { records: &records, findings: &findings, progress, memory_bytes };
-    let against = compare(against.as_ref(), &tree, &unknown, &context)?;
+    let summary = compare(against.as_ref(), &tree, &unknown, &context)?;
 
     let header = dataset.header();
+    let measured = against.as_ref().and_then(Against::measured);
+    let is_certain = unknown.integers().is_none() && unknown.unread == 0;
+    let certain = is_certain.then_some(Side { deviation, lost: 0, merged: Some(0) });
+    let known = Known {
+        points: header.points,
+        projection: &header.projection,
+        bounds: tree.nodes().first().map(|root| [0, 1, 2].map(|a| [root.bounds.min[a], root.bounds.max[a]])),
+        lattice: measured.map(|m| m.lattice),
+        format: certain.or(measured.and_then(|m| m.format)),
+    };
+    let accuracy = accuracy::judge(folder, &known, &findings);
     Ok(Outcome {
         encoding: Some(header.layout.name()),
         points: header.points,
         nodes: dataset.nodes().len() as u64,
         leaves: Some(quality),
-        against,
+        against: summary,
+        accuracy,
         ..Outcome::new(findings)
     })
 }

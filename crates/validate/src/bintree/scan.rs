@@ -12,6 +12,7 @@ use super::leaf::{Exactness, Leaf, Points};
 use super::records::Filler;
 use super::summary::Summary;
 use super::tree::Tree;
+use crate::accuracy::Deviation;
 use crate::against::Sums;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
@@ -41,6 +42,8 @@ pub(super) struct Scanned {
     /// Of leaves below degenerate nodes.
     pub(super) ends: HashMap<u32, Ends>,
     pub(super) quality: LeafQuality,
+    /// Of decoded positions from the lattice, over the leaves whose integers are certain.
+    pub(super) deviation: Deviation,
 }
 
 impl Scan<'_> {
@@ -64,7 +67,10 @@ impl Scan<'_> {
         });
         let visits = visits.collect::<Result<Vec<_>, ReadError>>()?;
         let quality = self.quality(visits.iter().flatten().map(|(_, exactness)| exactness));
+        let mut deviation = Deviation::default();
+        visits.iter().flatten().for_each(|(_, exactness)| deviation.merge(&exactness.deviation));
         Ok(Scanned {
+            deviation,
             summaries: visits.into_iter().map(|visit| visit?.0).collect(),
             ends: ends.into_inner().unwrap_or_default(),
             quality,
@@ -101,7 +107,7 @@ impl Scan<'_> {
         {
             ends.insert(index, points.ends(stride));
         }
-        let unknown = Exactness { certain: false, error: 0.0, bound: 0.0 };
+        let unknown = Exactness { certain: false, error: 0.0, bound: 0.0, deviation: Deviation::default() };
         let exactness = if self.lattice_known { leaf.check_positions(points) } else { unknown };
         let summary = if exactness.certain { Summary::of(&points.steps) } else { None };
         if let Some(summary) = &summary {

@@ -29,6 +29,13 @@ impl Geometry {
         self.lattice.scale.iter().copied().fold(0.0, f64::max)
     }
 
+    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube: nothing where these are
+    /// whole steps, else less than a unit on each axis.
+    pub(crate) fn sampling_slack(&self) -> f64 {
+        let [x, y, z] = self.lattice.scale;
+        if x == y && y == z { 0.0 } else { 2.0 * (self.cube.max[0] - self.cube.min[0]) / 31f64.exp2() }
+    }
+
     /// Spacing of a level, world units.
     pub(crate) fn spacing_at(&self, level: u8) -> f64 {
         self.spacing / f64::from(level).exp2()

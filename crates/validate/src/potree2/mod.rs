@@ -3,7 +3,8 @@
 //! # Tolerances
 //! * Boxes and the tight box: 4 ulps of the cube's largest coordinate on the axis; everything else about positions is
 //!   exact, on integers.
-//! * Distances (spacing, coverage): one step of the lattice.
+//! * Distances (spacing, coverage): of datasets that state their sampling, two units of 31-bit fractions of the cube where
+//!   scales differ, else nothing but the last bits of doubles; of others, one step of the lattice.
 //! * Sides of the cube against each other: 10⁻⁹, relative, and two ulps of its largest coordinate; spacing against
 //!   side / 128: 10⁻⁹, relative.
 //! * Attributes, counts, byte ranges, checksums: none.
@@ -17,6 +18,7 @@ mod cache;
 mod checks;
 mod expect;
 mod grid;
+mod lattices;
 mod quality;
 mod records;
 mod tree;
@@ -29,6 +31,7 @@ use pointmill_format::potree2::{Dataset, Encoding, METADATA_FILE, OCTREE_FILE};
 use pointmill_format::{DatasetKind, ReadError};
 use serde_json::Value;
 
+use crate::accuracy::{self, Known, Side};
 use crate::against::{Against, Context, Rules};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
@@ -36,6 +39,7 @@ use crate::options::{Options, ProgressFn};
 use crate::outcome::{LevelQuality, Outcome};
 use checks::spacing::Sampling;
 use expect::Geometry;
+use lattices::Lattices;
 use records::Records;
 use tree::Tree;
 use walk::{Task, Walked, walk};
@@ -61,7 +65,9 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
             let attributes = metadata.attributes.iter().map(|a| a.attribute.clone());
             let attributes = attributes.filter(|a| a.name != "position").collect();
             let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
-            Some(Against::open(paths, &options.open, Rules::new(attributes, metadata.lattice, own))?)
+            let mut rules = Rules::new(attributes, metadata.lattice, own);
+            rules.has_no_wide_integers = true;
+            Some(Against::open(paths, &options.open, rules)?)
         }
     };
 
@@ -78,6 +84,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         findings: &findings,
         neighbourhoods: options.neighbourhoods && geometry.spacing_is_sane(),
         sampling: Sampling::from_word(metadata.extra.get("pointmill").and_then(|own| own["sampling"].as_str())),
+        lattices: Lattices::new(metadata.lattice, metadata.extra.get("pointmill").unwrap_or(&Value::Null)),
         sums: against.as_ref().map(|a| &a.sums),
         progress,
         cache_bytes: usize::try_from(options.memory_bytes / 4).unwrap_or(usize::MAX),
@@ -95,6 +102,16 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         None => None,
     };
 
+    let is_measured = walked.unreadable == 0 && tree.nodes.iter().all(|n| n.readable);
+    let position = metadata.attributes.iter().find(|a| a.attribute.name == "position");
+    let known = Known {
+        points: metadata.points,
+        projection: &metadata.projection,
+        bounds: position.and_then(|p| bounds_of(&p.min, &p.max)),
+        lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
+        format: is_measured.then_some(Side { deviation: walked.deviation, lost: 0, merged: Some(0) }),
+    };
+    let accuracy = accuracy::judge(folder, &known, &findings);
     let quality = quality(&tree, &walked, &geometry);
     Ok(Outcome {
         encoding: Some(metadata.encoding.name()),
@@ -102,8 +119,14 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         nodes: tree.nodes.len() as u64,
         quality,
         against: summary,
+        accuracy,
         ..Outcome::new(findings)
     })
+}
+
+fn bounds_of(min: &[f64], max: &[f64]) -> Option<[[f64; 2]; 3]> {
+    let bounds: Vec<[f64; 2]> = min.iter().zip(max).map(|(min, max)| [*min, *max]).collect();
+    bounds.try_into().ok()
 }
 
 /// `metadata.json` as a JSON value; `None` if it is none.

@@ -12,6 +12,7 @@ use pointmill_format::potree2::{Dataset, Encoding, Node};
 use pointmill_format::{NodePoints, ReadError};
 use rayon::prelude::*;
 
+use crate::accuracy::{Deviation, Ordered};
 use crate::against::Sums;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
@@ -21,6 +22,7 @@ use crate::potree2::checks::spacing::Sampling;
 use crate::potree2::checks::{coverage, node_points, ranges, spacing};
 use crate::potree2::expect::Geometry;
 use crate::potree2::grid::{Grid, Origin, Site};
+use crate::potree2::lattices::Lattices;
 use crate::potree2::quality::Tally;
 use crate::potree2::records::fill_blocks;
 use crate::potree2::tree::{Tree, TreeNode};
@@ -34,6 +36,7 @@ pub(crate) struct Task<'a> {
     /// Check spacing and coverage, and measure quality.
     pub(crate) neighbourhoods: bool,
     pub(crate) sampling: Sampling,
+    pub(crate) lattices: Lattices,
     /// Where records are summed for the comparison with the sources.
     pub(crate) sums: Option<&'a Sums>,
     pub(crate) progress: &'a ProgressFn<'a>,
@@ -48,6 +51,8 @@ pub(crate) struct Walked {
     pub(crate) tallies: Vec<Tally>,
     /// Nodes whose points could not be read.
     pub(crate) unreadable: u64,
+    /// Of decoded positions from the points of the lattice.
+    pub(crate) deviation: Deviation,
 }
 
 /// Visits every node.
@@ -66,6 +71,7 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
         pairs: Findings::new(task.findings.format(), task.max_problems),
         cells: Findings::new(task.findings.format(), task.max_problems),
         unreadable: AtomicU64::new(0),
+        deviations: Ordered::default(),
         done: AtomicU64::new(0),
         stop: AtomicBool::new(false),
         failure: Mutex::default(),
@@ -84,7 +90,10 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
         Sampling::Unknown => walk.pairs,
     };
     task.findings.absorb(Check::Spacing, &kept);
+    let mut deviation = Deviation::default();
+    walk.deviations.finish().for_each(|d| deviation.merge(&d));
     Ok(Walked {
+        deviation,
         seen: walk.seen.into_inner().unwrap_or_else(PoisonError::into_inner),
         tallies: walk.tallies,
         unreadable: walk.unreadable.into_inner(),
@@ -102,6 +111,7 @@ struct Walk<'a> {
     pairs: Findings,
     cells: Findings,
     unreadable: AtomicU64,
+    deviations: Ordered<usize, Deviation>,
     done: AtomicU64,
     stop: AtomicBool,
     failure: Mutex<Option<ReadError>>,
@@ -158,6 +168,7 @@ impl Walk<'_> {
             }
             let mut seen = ranges::Seen::new(task.dataset.metadata());
             seen.add(points);
+            self.deviations.put(index, task.lattices.deviation(positions));
             self.seen.lock().unwrap_or_else(PoisonError::into_inner).merge(&seen);
             if let Some(sums) = task.sums {
                 sums.add(|block, sink| fill_blocks(points, sums.rules(), block, sink));
@@ -229,14 +240,16 @@ impl Walk<'_> {
         let mut next = above;
         while let Some(Above { level, grid, up }) = next {
             let tally = &self.tallies[usize::from(*level)];
-            coverage::check(node.key, positions, *level, grid, &self.task.geometry, tally, self.task.findings);
+            let limit = coverage::limit(&self.task.geometry, self.task.sampling, *level, node.key.level);
+            let drawn = coverage::Drawn { level: *level, limit, grid };
+            coverage::check(node.key, positions, &drawn, &self.task.geometry, tally, self.task.findings);
             next = *up;
         }
     }
 
     fn check_sampling(&self, node: &TreeNode, positions: &[[i32; 3]], grid: &Grid) {
         let tally = &self.tallies[usize::from(node.key.level)];
-        spacing::pairs(node.key, grid, &self.task.geometry, tally, &self.pairs);
+        spacing::pairs(node.key, grid, self.task.sampling, &self.task.geometry, tally, &self.pairs);
         if self.task.sampling != Sampling::Poisson {
             spacing::cells(node.key, positions, &self.task.geometry, &self.cells);
         }

@@ -240,12 +240,15 @@ impl Cloud {
                 parts.class[at] = p.class;
                 parts.lattice[at] = p.x;
                 parts.morton.push(at);
-                if lod[*i] < 3 {
+                if mean[*i] != self.word(p) {
                     parts.originals.push((at as u32, self.word(p)));
                 }
             }
         }
         parts.originals.sort_unstable();
+        if parts.originals.is_empty() {
+            parts.flags = 3;
+        }
         let errors = (0..self.planes).map(|plane| {
             let rms = figures[1][plane].map(|sum| (sum / n as f64).sqrt());
             ((10 * (plane + 1)).to_string(), json!({ "max": figures[0][plane], "rms": rms }))

@@ -106,8 +106,11 @@ fn a_candidate_that_lost_its_level() {
     for level in 0..3 {
         let mut parts = good();
         let at = of_level(&parts, level);
-        let i = parts.originals.iter().position(|(index, _)| *index == at as u32).unwrap();
-        parts.colours[at] = parts.originals.remove(i).1 | 3 << 24;
+        let own = match parts.originals.iter().position(|(index, _)| *index == at as u32) {
+            Some(i) => parts.originals.remove(i).1,
+            None => parts.colours[at] & 0xff_ffff, // alone in its cell
+        };
+        parts.colours[at] = own | 3 << 24;
         let outcome = parts.validate();
         assert_eq!(broken(&outcome), [Check::Levels], "{:#?}", outcome.problems);
         // the cells of its level and, as far as it is their candidate too, of finer ones
@@ -123,8 +126,6 @@ fn a_level_of_a_point_that_is_not_the_nearest() {
         let at = of_level(&parts, 3);
         let colour = parts.colours[at] & 0xff_ffff;
         parts.colours[at] = colour | level << 24;
-        parts.originals.push((at as u32, colour));
-        parts.originals.sort_unstable();
         let outcome = parts.validate();
         assert_only(&outcome, Check::Levels, 1);
         assert!(outcome.problems[0].subject.contains(&at.to_string()), "{:#?}", outcome.problems);

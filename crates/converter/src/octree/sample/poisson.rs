@@ -12,7 +12,8 @@
 //!
 //! Distances are compared in `f32`, in units of the spacing from the node's corner (0 to 128, so a coordinate is off by
 //! 2^-18 at most): a pair conflicts below `1 + MARGIN`, which is more than all rounding together. So no pair is ever
-//! closer than the spacing, exactly; and a candidate that was omitted lies within 1.00002 spacings of one that was not.
+//! closer than the spacing, exactly; and a candidate that was omitted lies within 1.00004 spacings of one that was not
+//! (`CONFLICT_BELOW`, and the same rounding once more).
 
 use super::spacing::{SPACING_BITS, cell_shift};
 use crate::cloud::morton::interleave;

@@ -39,8 +39,8 @@ pub(super) fn compress(
             }
         }
     }
-    if sections.originals.is_some() {
-        let section = Section { offset: layout.originals, bytes: finished.originals_bytes };
+    if let Some(bytes) = finished.averaging.originals_bytes() {
+        let section = Section { offset: layout.originals, bytes };
         sections.originals = Some(copy.plain(section)?.offset);
     }
     let text = end.description.to_json();

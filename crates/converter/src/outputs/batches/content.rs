@@ -6,6 +6,7 @@ use pointmill_format::{Attribute, AttributeType};
 use super::settings::colour_of;
 use crate::cloud::Cloud;
 use crate::outputs::attributes::{choose, left_out};
+use crate::outputs::number::number;
 use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
 use crate::warning::Warning;
@@ -129,7 +130,7 @@ impl Content {
     /// Range of the integers that grey stands for.
     pub(super) fn intensity_range(&self) -> Option<[u64; 2]> {
         match self.colour {
-            Colour::Intensity { ty, least, greatest, .. } if ty != AttributeType::Float32 => {
+            Colour::Intensity { ty: AttributeType::UInt8 | AttributeType::UInt16, least, greatest, .. } => {
                 Some([least as u64, greatest as u64])
             }
             _ => None,
@@ -166,12 +167,11 @@ fn grey_of(bytes: &[u8], ty: AttributeType, least: f64, greatest: f64) -> u8 {
     match (ty, bytes) {
         (AttributeType::UInt8, [v, ..]) => grey(u16::from(*v), least as u16, greatest as u16),
         (AttributeType::UInt16, [a, b, ..]) => grey(u16::from_le_bytes([*a, *b]), least as u16, greatest as u16),
-        (AttributeType::Float32, [a, b, c, d, ..]) => {
-            let v = f64::from(f32::from_le_bytes([*a, *b, *c, *d]));
-            let range = greatest - least;
-            if range > 0.0 { ((v - least) / range * 255.0 + 0.5) as u8 } else { 255 }
-        }
-        _ => 255,
+        _ => match number(bytes, ty) {
+            v if v.is_nan() => 0,
+            v if greatest > least => ((v - least) / (greatest - least) * 255.0 + 0.5) as u8,
+            _ => 255,
+        },
     }
 }
 
@@ -208,6 +208,10 @@ mod tests {
         assert_eq!(of(AttributeType::Float32, &0.5f32.to_le_bytes(), 0.0, 1.0), grey(128));
         assert_eq!(of(AttributeType::Float32, &f32::NAN.to_le_bytes(), 0.0, 1.0), grey(0));
         assert_eq!(of(AttributeType::Float32, &3f32.to_le_bytes(), 3.0, 3.0), grey(255));
+        assert_eq!(of(AttributeType::Float32, &f32::NAN.to_le_bytes(), 0.0, 0.0), grey(0), "nothing but NaN");
+        assert_eq!(of(AttributeType::Float64, &0.5f64.to_le_bytes(), 0.0, 1.0), grey(128));
+        assert_eq!(of(AttributeType::Int16, &(-5i16).to_le_bytes(), -10.0, 0.0), grey(128));
+        assert_eq!(of(AttributeType::UInt64, &(1u64 << 40).to_le_bytes(), 0.0, (1u64 << 40) as f64), grey(255));
         let mut out = Vec::new();
         content(Colour::None).words(&[0; 24], 12, 0, &mut out);
         assert_eq!(out, [grey(255); 2]);

@@ -18,7 +18,8 @@ pub(super) fn details(frame: &Frame, finished: &Finished, settings: &BatchesSett
     let points = finished.layout.points.max(1) as f64;
     let longest = finished.records.iter().map(longest_side).fold(0.0, f64::max);
     let figures = finished.errors.figures();
-    let errors = Precision::ALL.map(|p| (p.bits().to_string(), json!(figures.get(p))));
+    let present = Precision::ALL.into_iter().filter(|p| *p <= finished.precision);
+    let errors = present.map(|p| (p.bits().to_string(), json!(figures.get(p))));
     let mut details = Map::new();
     details.insert("batches".into(), finished.layout.batches.into());
     details.insert("cell".into(), frame.grid.cell.into());

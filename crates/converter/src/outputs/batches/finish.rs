@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use pointmill_format::Attribute;
 use pointmill_format::batches::{
-    AttributeEntry, BATCH_POINTS, BatchRecord, Description, ErrorSums, Finish, Flags, Layout, Precision,
-    SECTION_ALIGNMENT, lod_of,
+    AttributeEntry, Averaging, BATCH_POINTS, BatchRecord, Description, ErrorSums, Finish, Layout, Precision, lod_of,
+    rgb_of,
 };
 use serde_json::json;
 
@@ -18,11 +18,13 @@ use super::task::TaskResults;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::outputs::origin::own_key;
+use crate::outputs::recovery::Lost;
+use crate::report::FormatErrors;
 
 /// Bytes of originals that are written at once.
 const WRITE_BYTES: usize = 4 << 20;
 
-/// A point whose cell was finished after its task.
+/// A point whose cell was finished after its task. The originals of the task do not know its colour.
 #[derive(Debug, Clone, Copy)]
 struct Patch {
     /// Colour word before averaging.
@@ -32,18 +34,34 @@ struct Patch {
     shown: u32,
 }
 
+impl Patch {
+    /// True if the file showed another colour than the point's own before this, and if it does now.
+    fn changes(&self) -> [bool; 2] {
+        [self.written, self.shown].map(|word| rgb_of(word) != rgb_of(self.word))
+    }
+}
+
 /// What the finished file is.
 pub(super) struct Finished {
     pub(super) precision: Precision,
     pub(super) records: Vec<BatchRecord>,
     /// Of all plane counts, whether they are in the file or not.
     pub(super) errors: ErrorSums,
+    /// Points that do not come back.
+    pub(super) lost: Lost,
     pub(super) lod_points: [u64; LEVELS + 1],
     pub(super) layout: Layout,
-    pub(super) originals_bytes: u64,
+    pub(super) averaging: Averaging,
     /// Header and description.
     pub(super) end: Finish,
     pub(super) bytes: u64,
+}
+
+impl Finished {
+    /// What the planes in the file did to positions.
+    pub(super) fn format_errors(&self) -> FormatErrors {
+        FormatErrors::measured(&self.errors.deviations(self.precision), self.lost.points, self.lost.merged)
+    }
 }
 
 /// Writes all that can only be known when every task is done.
@@ -71,20 +89,21 @@ pub(super) fn finish(
         }
     }
     output.write(&record_bytes(&records), layout.records.offset)?;
-    let count = if settings.originals { put_originals(output, &layout, &state, &patches)? } else { 0 };
+    let changes = |when: usize| patches.values().filter(|patch| patch.changes()[when]).count() as u64;
+    let averaging = Averaging::of(results.changed - changes(0) + changes(1), settings.originals);
+    if let Averaging::Changed { originals: Some(count) } = averaging {
+        put_originals(output, &layout, &state, &patches, count)?;
+    }
     let mut errors = ErrorSums::default();
     state.errors.iter().for_each(|e| errors.merge(e));
     let mut description = describe(cloud, frame, content);
     description.errors = errors.figures();
-    let mut end = layout.finish(&frame.grid, &frame.tight, count, description).map_err(refused)?;
-    if !settings.originals {
-        leave_out_originals(&layout, &mut end);
-    }
+    let end = layout.finish(&frame.grid, &frame.tight, averaging, description).map_err(refused)?;
     output.write(&end.description_bytes, end.description_offset)?;
     output.write(&end.header_bytes, 0)?;
     let bytes = end.description_offset + end.header.description_bytes;
-    let originals_bytes = if settings.originals { Layout::originals_bytes(count) } else { 0 };
-    Ok(Finished { precision: layout.precision(), records, errors, lod_points, layout, originals_bytes, end, bytes })
+    let (precision, lost) = (layout.precision(), state.lost);
+    Ok(Finished { precision, records, errors, lost, lod_points, layout, averaging, end, bytes })
 }
 
 /// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.
@@ -119,19 +138,18 @@ fn record_bytes(records: &[BatchRecord]) -> Vec<u8> {
     bytes
 }
 
-/// Writes the originals in storage order and returns their number.
+/// Writes the `count` originals in storage order: those of the tasks, where no patch says otherwise, and of the patches.
 fn put_originals(
     output: &BatchFile<'_>,
     layout: &Layout,
     state: &State,
     patches: &BTreeMap<u32, Patch>,
-) -> Result<u64, ConvertError> {
+    count: u64,
+) -> Result<(), ConvertError> {
     let mut parts = state.originals.clone();
     parts.sort_unstable_by_key(|(first, _)| *first);
-    let chosen_late = |(index, p): (&u32, &Patch)| {
-        (usize::from(lod_of(p.written)) >= LEVELS).then(|| u64::from(*index) | u64::from(p.word) << 32)
-    };
-    let mut late = patches.iter().filter_map(chosen_late).peekable();
+    let changed = |(index, p): (&u32, &Patch)| p.changes()[1].then(|| u64::from(*index) | u64::from(p.word) << 32);
+    let mut late = patches.iter().filter_map(changed).peekable();
     let index_of = |entry: u64| entry as u32;
     let mut writer = Sequence { output, at: layout.originals + 8, bytes: Vec::new(), count: 0 };
     let mut part = Vec::new();
@@ -139,8 +157,12 @@ fn put_originals(
         part.clear();
         output.originals.take(segment, &mut part)?;
         let entries = part.as_chunks::<ORIGINAL_BYTES>().0;
-        let last = entries.last().map_or(0, |e| index_of(u64::from_le_bytes(*e)));
-        if late.peek().is_none_or(|entry| index_of(*entry) > last) {
+        let [Some(first), Some(last)] = [entries.first(), entries.last()] else { continue };
+        let [first, last] = [first, last].map(|entry| index_of(u64::from_le_bytes(*entry)));
+        while let Some(entry) = late.next_if(|entry| index_of(*entry) < first) {
+            writer.put(&entry.to_le_bytes())?;
+        }
+        if patches.range(first..=last).next().is_none() {
             writer.put(&part)?;
             continue;
         }
@@ -149,15 +171,19 @@ fn put_originals(
             while let Some(entry) = late.next_if(|entry| index_of(*entry) < index) {
                 writer.put(&entry.to_le_bytes())?;
             }
-            writer.put(bytes)?;
+            if !patches.contains_key(&index) {
+                writer.put(bytes)?;
+            }
         }
     }
     for entry in late {
         writer.put(&entry.to_le_bytes())?;
     }
     writer.flush()?;
-    output.write(&writer.count.to_le_bytes(), layout.originals)?;
-    Ok(writer.count)
+    if writer.count != count {
+        return Err(ConvertError::Internal(format!("{} originals instead of {count}", writer.count)));
+    }
+    output.write(&count.to_le_bytes(), layout.originals)
 }
 
 /// Entries of the originals, one behind the other.
@@ -181,15 +207,6 @@ impl Sequence<'_> {
         self.bytes.clear();
         Ok(())
     }
-}
-
-/// The header of a file without that section: the description takes its place.
-fn leave_out_originals(layout: &Layout, end: &mut Finish) {
-    end.description_offset = layout.end_of_points().next_multiple_of(SECTION_ALIGNMENT);
-    end.header.sections.description = end.description_offset;
-    end.header.sections.originals = None;
-    end.header.flags = Flags(end.header.flags.0 & !Flags::ORIGINALS);
-    end.header_bytes = end.header.encode();
 }
 
 fn describe(cloud: &Cloud<'_>, frame: &Frame, content: &Content) -> Description {

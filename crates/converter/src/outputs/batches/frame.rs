@@ -3,6 +3,7 @@
 use pointmill_format::batches::{Grid, morton32};
 use pointmill_format::{Aabb, DatasetKind, Lattice, WriteError};
 
+use super::density::fitting_cell;
 use crate::cloud::morton::interleave;
 use crate::cloud::{Cloud, JobBounds, JobPoint, StoredOrigin, StoredPoint};
 use crate::error::{ConvertError, Unsupported};
@@ -10,9 +11,6 @@ use crate::plan::{PlanError, PlanFault, Setting};
 
 /// Levels of buckets: what is called a start is a Morton code of that many bits per axis.
 pub(super) const BUCKET_LEVELS: u32 = 21;
-
-/// Points of a surface that a cell of level 0 should hold where the plan does not state its size.
-const POINTS_PER_CELL: f64 = 64.0;
 
 /// How stored integers become positions, cells and Morton codes. Every step is monotonous on each axis, so boxes of
 /// points become boxes of codes.
@@ -129,27 +127,6 @@ impl Frame {
 #[inline]
 pub(super) fn code_of([x, y, z]: [u32; 3]) -> u64 {
     interleave([z, y, x])
-}
-
-/// A power of two such that cells hold about [`POINTS_PER_CELL`] points of a surface: from the number of points in the
-/// occupied cells of the partition, which depends on the points and the headers alone.
-fn fitting_cell(cloud: &Cloud<'_>, tight: &Aabb) -> f64 {
-    let extent = tight.extent().into_iter().fold(0.0, f64::max);
-    if extent <= 0.0 {
-        return 1.0;
-    }
-    let area: f64 = cloud
-        .cells
-        .iter()
-        .map(|cell| {
-            // a cell is larger than the cloud if the cloud is small
-            let side = (cloud.frame.cube.side / 2f64.powi(i32::from(cell.key.level))).min(extent);
-            side * side
-        })
-        .sum();
-    let cell = (POINTS_PER_CELL * area / cloud.points() as f64).sqrt();
-    let cell = cell.clamp(extent / f64::from(1 << 24), extent);
-    2f64.powi(cell.log2().round() as i32)
 }
 
 /// A cloud or request that the format cannot hold.

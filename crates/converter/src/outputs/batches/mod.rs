@@ -4,6 +4,7 @@
 mod buckets;
 mod compress;
 mod content;
+mod density;
 mod figures;
 mod finish;
 mod frame;
@@ -22,11 +23,12 @@ use serde_json::{Map, Value};
 pub use settings::BatchesSettings;
 
 use super::output::{DiskSize, Output, Target, Wants};
+use super::recovery::Recovery;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
-use crate::report::OutputReport;
+use crate::report::{self, OutputReport};
 use crate::runtime::Runtime;
 use crate::sources::Schema;
 use buckets::Task;
@@ -82,7 +84,7 @@ impl Output for BatchesSettings {
         let is_usual = plan.attributes == AttributeChoice::Usual;
         let extras = if is_usual { 0 } else { kept.saturating_sub(colour) };
         let planes = u64::from(self.planes.unwrap_or(3));
-        // Colour word, and index and word of an original for points of the coarser levels.
+        // Colour word, and at most an index and word of an original.
         let originals = if self.originals { 8 } else { 0 };
         DiskSize { per_point: 4 * planes + 4 + originals + extras, per_1000_points: BATCH_BYTES }
     }
@@ -112,7 +114,8 @@ impl Output for BatchesSettings {
         // what is compressed is written raw first, elsewhere
         let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
         let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, cloud.store.unused_bytes());
-        let output = BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals);
+        let output =
+            BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals, Recovery::new(cloud), frame.grid.origin);
         let shop = Workshop {
             frame: &frame,
             content: &content,
@@ -131,6 +134,7 @@ impl Output for BatchesSettings {
         file.sync("syncing the batches")?;
         Ok(OutputReport {
             points: results.ledger.points(),
+            accuracy: report::accuracy(cloud, results.ledger.points(), finished.format_errors()),
             attributes: cloud.names(content.kept.iter().copied()),
             attributes_dropped: content.dropped,
             bytes: finished.bytes,
@@ -170,6 +174,7 @@ fn encode(rt: &Runtime<'_>, shop: &Workshop<'_>, tasks: &[Task]) -> Result<TaskR
     for mut results in each {
         all.ledger.merge(&results.ledger);
         all.lod_points.iter_mut().zip(results.lod_points).for_each(|(a, b)| *a += b);
+        all.changed += results.changed;
         all.edges.append(&mut results.edges);
     }
     all.edges.sort_unstable_by_key(|(index, _)| *index);

@@ -10,6 +10,7 @@ use pointmill_format::batches::{
 use super::frame::refused;
 use crate::cloud::{Segment, Store};
 use crate::error::ConvertError;
+use crate::outputs::recovery::{Lost, Recovery};
 use crate::runtime::DiskFile;
 
 /// Bytes of an entry of the originals: storage index and colour word.
@@ -19,6 +20,9 @@ pub(super) const ORIGINAL_BYTES: usize = 8;
 pub(super) struct BatchFile<'a> {
     pub(super) file: &'a DiskFile,
     pub(super) layout: &'a Layout,
+    recovery: Recovery,
+    /// World coordinates of the grid's origin.
+    origin: [f64; 3],
     state: Mutex<State>,
     /// Entries of the originals, as they came.
     pub(super) originals: Store,
@@ -31,6 +35,8 @@ pub(super) struct State {
     pub(super) records: Vec<Option<BatchRecord>>,
     /// By Morton batch.
     pub(super) errors: Vec<ErrorSums>,
+    /// Points that do not come back.
+    pub(super) lost: Lost,
     /// Parts of batches that tasks share, by Morton batch.
     fragments: HashMap<u32, Vec<Fragment>>,
     /// First storage index, and where the entries are.
@@ -74,11 +80,17 @@ pub(super) struct Encoder {
 }
 
 impl<'a> BatchFile<'a> {
-    pub(super) fn new(file: &'a DiskFile, layout: &'a Layout, originals: Store) -> Self {
+    pub(super) fn new(
+        file: &'a DiskFile,
+        layout: &'a Layout,
+        originals: Store,
+        recovery: Recovery,
+        origin: [f64; 3],
+    ) -> Self {
         let batches = layout.batches as usize;
         let state =
             State { records: vec![None; batches], errors: vec![ErrorSums::default(); batches], ..State::default() };
-        Self { file, layout, state: Mutex::new(state), originals }
+        Self { file, layout, recovery, origin, state: Mutex::new(state), originals }
     }
 
     /// The storage index of the first point of a piece.
@@ -119,10 +131,28 @@ impl<'a> BatchFile<'a> {
                 self.put_values(section, 4, first_point, &le_bytes(words))?;
             }
         }
+        let lost = self.lost_of(relative, encoded);
         let mut state = self.lock()?;
+        state.lost.merge(lost);
         state.records[slot as usize] = Some(encoded.record);
         state.errors[batch as usize] = encoded.errors;
         Ok(())
+    }
+
+    /// Points of a batch that do not come back from the planes that are written.
+    fn lost_of(&self, relative: [&[f64]; 3], encoded: &EncodedBatch) -> Lost {
+        let precision = self.layout.precision();
+        if self.recovery.is_certain(encoded.errors.deviations(precision).max) {
+            return Lost::default();
+        }
+        let decoder = encoded.record.decoder(precision);
+        let world = |r: [f64; 3]| std::array::from_fn(|a| self.origin[a] + r[a]);
+        let words = encoded.hi10.iter().zip(&encoded.mid10).zip(&encoded.lo10);
+        self.recovery.count(words.enumerate().map(|(i, ((hi, mid), lo))| {
+            let decoded = world(decoder.position_of_words(*hi, *mid, *lo));
+            // the point of the lattice is nearest to its own coordinates
+            (decoded, self.recovery.integers(world(relative.map(|r| r[i]))))
+        }))
     }
 
     /// Writes consecutive values of a section with `size` bytes per point.

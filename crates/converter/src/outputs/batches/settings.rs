@@ -1,13 +1,12 @@
 //! What can be chosen of quantised batches.
 
-use pointmill_format::AttributeType;
-
 use crate::sources::Schema;
 
 /// Settings of quantised batches (`docs/formats/batches.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchesSettings {
-    /// Cell of the coarsest level of detail, world units; `None`: from the scene's extent and density.
+    /// Cell of the coarsest level of detail, world units; `None`: the power of two whose occupied cells hold about 64
+    /// points each.
     pub lod_cell: Option<f64>,
     /// Position planes of ten bits to write, 1 to 3; `None`: those that the scene needs.
     pub planes: Option<u8>,
@@ -19,18 +18,12 @@ pub struct BatchesSettings {
 
 impl Default for BatchesSettings {
     fn default() -> Self {
-        Self { lod_cell: Some(1.0), planes: None, zstd_level: None, originals: true }
+        Self { lod_cell: None, planes: None, zstd_level: None, originals: true }
     }
 }
 
 /// What batches are coloured by: the colour, else the intensity.
 pub(super) fn colour_of(schema: &Schema) -> Option<usize> {
-    let intensity = || {
-        let is_usual = |&i: &usize| {
-            let a = &schema.attributes[i];
-            a.elements == 1 && matches!(a.ty, AttributeType::UInt16 | AttributeType::UInt8 | AttributeType::Float32)
-        };
-        schema.find("intensity").filter(is_usual)
-    };
+    let intensity = || schema.find("intensity").filter(|&i| schema.attributes[i].elements == 1);
     schema.rgb().or_else(intensity)
 }

@@ -1,6 +1,6 @@
 //! One task: load, sort, choose levels of detail, encode.
 
-use pointmill_format::batches::{le_bytes, lod_of};
+use pointmill_format::batches::{le_bytes, lod_of, rgb_of};
 
 use super::buckets::Task;
 use super::content::Content;
@@ -53,6 +53,8 @@ pub(super) struct TaskResults {
     pub(super) ledger: Ledger,
     /// Points by level of detail, before open cells are joined.
     pub(super) lod_points: [u64; LEVELS + 1],
+    /// Points whose colour averaging changed, before open cells are joined.
+    pub(super) changed: u64,
     /// By task.
     pub(super) edges: Vec<(usize, [Option<Edges>; LEVELS])>,
 }
@@ -172,7 +174,11 @@ impl<'a> Worker<'a> {
             for ((index, shown), word) in (first..).zip(shown).zip(&self.words[piece.range.clone()]) {
                 let level = usize::from(lod_of(*shown)).min(LEVELS);
                 self.results.lod_points[level] += 1;
-                if level < LEVELS && self.shop.keeps_originals {
+                if rgb_of(*shown) == rgb_of(*word) {
+                    continue;
+                }
+                self.results.changed += 1;
+                if self.shop.keeps_originals {
                     let entry = u64::from(index) | u64::from(*word) << 32;
                     self.originals.extend_from_slice(&entry.to_le_bytes());
                 }

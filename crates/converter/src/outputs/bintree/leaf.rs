@@ -9,6 +9,7 @@ use super::settings::{RGBA, class_of};
 use crate::cloud::{Cloud, Range};
 use crate::error::{ConvertError, Unsupported};
 use crate::outputs::attributes::left_out;
+use crate::outputs::number::number;
 use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
 use crate::sources::Schema;
@@ -166,24 +167,5 @@ fn name_constants(schema: &Schema, ranges: &[Range], dropped: &mut [DroppedAttri
         if let Some(values) = schema.find(&d.name).and_then(|i| ranges[i].constant()) {
             d.why = DropReason::Constant(values.to_vec());
         }
-    }
-}
-
-/// A little-endian number of any type.
-fn number(bytes: &[u8], ty: AttributeType) -> f64 {
-    fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
-        bytes.first_chunk().copied().unwrap_or([0; N])
-    }
-    match ty {
-        AttributeType::Int8 => f64::from(i8::from_le_bytes(array(bytes))),
-        AttributeType::UInt8 => f64::from(u8::from_le_bytes(array(bytes))),
-        AttributeType::Int16 => f64::from(i16::from_le_bytes(array(bytes))),
-        AttributeType::UInt16 => f64::from(u16::from_le_bytes(array(bytes))),
-        AttributeType::Int32 => f64::from(i32::from_le_bytes(array(bytes))),
-        AttributeType::UInt32 => f64::from(u32::from_le_bytes(array(bytes))),
-        AttributeType::Int64 => i64::from_le_bytes(array(bytes)) as f64,
-        AttributeType::UInt64 => u64::from_le_bytes(array(bytes)) as f64,
-        AttributeType::Float32 => f64::from(f32::from_le_bytes(array(bytes))),
-        AttributeType::Float64 => f64::from_le_bytes(array(bytes)),
     }
 }

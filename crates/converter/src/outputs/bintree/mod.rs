@@ -21,8 +21,8 @@ mod upper;
 
 use std::io::BufWriter;
 
-use pointmill_format::DatasetKind;
 use pointmill_format::bintree::{CORE_BYTES, Header, INDEX_FILE, IndexWriter, Layout, Node};
+use pointmill_format::{AttributeType, DatasetKind, Deviations};
 use serde_json::{Map, Value};
 
 pub use self::settings::BintreeSettings;
@@ -33,13 +33,15 @@ use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
 use self::subtree::{Builder, Built};
 use self::upper::Upper;
+use super::attributes::changed;
 use super::origin::own_key;
 use super::output::{DiskSize, Output, Target, Wants};
+use super::recovery::Lost;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
-use crate::report::OutputReport;
+use crate::report::{self, FormatErrors, OutputReport};
 use crate::runtime::{Runtime, Sequential};
 use crate::sources::Schema;
 use crate::warning::Warning;
@@ -115,22 +117,39 @@ impl Output for BintreeSettings {
         let leaf_bytes = leaves.finish(rt)?;
 
         let mut ledger = Ledger::default();
-        built.iter().for_each(|b| ledger.merge(&b.ledger));
+        let (mut deviations, mut lost) = (Deviations::default(), Lost::default());
+        for subtree in &built {
+            ledger.merge(&subtree.ledger);
+            deviations.merge(&subtree.deviations);
+            lost.merge(subtree.lost);
+        }
         ledger.check(&cloud.stats.checksum)?;
         let nodes = assemble(&upper, built);
         let index_bytes = write_index(cloud, self, &columns, &nodes, to)?;
         let (tree, details) = figures(&nodes);
         let leaves = nodes.iter().filter(|n| n.is_leaf()).count();
+        let odd = class_of(cloud.schema()).and_then(|class| {
+            let (attribute, changes) = (&cloud.schema().attributes[class], &cloud.stats.odd_classes);
+            changed(self.kind(), attribute, AttributeType::Float32, changes)
+        });
+        let (attributes_changed, mut warnings): (Vec<_>, Vec<_>) = odd.into_iter().unzip();
         let is_many = self.layout == Layout::Files && leaves > MANY_FILES;
+        warnings.extend(is_many.then_some(Warning::ManyFiles { leaves }));
         Ok(OutputReport {
             points: ledger.points(),
+            accuracy: report::accuracy(
+                cloud,
+                ledger.points(),
+                FormatErrors::measured(&deviations, lost.points, lost.merged),
+            ),
             attributes: columns.names(),
             attributes_dropped: columns.dropped,
             bytes: leaf_bytes + index_bytes,
             checksum: ledger.unaltered().to_string(),
             tree,
             details,
-            warnings: is_many.then_some(Warning::ManyFiles { leaves }).into_iter().collect(),
+            attributes_changed,
+            warnings,
             ..OutputReport::default()
         })
     }

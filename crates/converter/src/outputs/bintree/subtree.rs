@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, RecordLayout, leaf_center};
-use pointmill_format::{Aabb, Lattice};
+use pointmill_format::{Aabb, Deviations, Lattice};
 
 use super::files::Leaves;
 use super::item::Item;
@@ -14,6 +14,7 @@ use super::settings::BintreeSettings;
 use super::upper::Task;
 use crate::cloud::{Cloud, JobBounds, Ledger, Moments, MortonSorter, StoredOrigin, StoredPoint, position};
 use crate::error::ConvertError;
+use crate::outputs::recovery::{Lost, Recovery};
 use crate::runtime::os_hints;
 
 /// Leaves above this are counted in the memory of a task.
@@ -24,6 +25,8 @@ pub(super) struct Built {
     /// In preorder; indices count from the subtree's own root.
     pub(super) nodes: Vec<Node>,
     pub(super) ledger: Ledger,
+    pub(super) deviations: Deviations,
+    pub(super) lost: Lost,
 }
 
 /// One thread's means to build subtrees.
@@ -38,6 +41,10 @@ pub(super) struct Builder<'a> {
     sorter: MortonSorter,
     order: Vec<u32>,
     bytes: Vec<u8>,
+    recovery: Recovery,
+    /// Of the subtree so far.
+    deviations: Deviations,
+    lost: Lost,
 }
 
 /// A node that is still to be divided.
@@ -87,6 +94,9 @@ impl<'a> Builder<'a> {
             sorter: MortonSorter::default(),
             order: Vec::new(),
             bytes: Vec::new(),
+            recovery: Recovery::new(cloud),
+            deviations: Deviations::default(),
+            lost: Lost::default(),
         }
     }
 
@@ -126,7 +136,8 @@ impl<'a> Builder<'a> {
             }
         }
         unite(&mut nodes);
-        Ok(Built { nodes, ledger })
+        let (deviations, lost) = (std::mem::take(&mut self.deviations), std::mem::take(&mut self.lost));
+        Ok(Built { nodes, ledger, deviations, lost })
     }
 
     /// One node: a leaf is written; of any other the children go on the stack, the low one on top.
@@ -258,10 +269,32 @@ impl<'a> Builder<'a> {
             let rest = leaf.push(world.of(item.q), columns.class(stored));
             columns.fill(stored, rest);
         }
+        let deviations = *leaf.deviations();
         let bounds = leaf.finish();
+        self.deviations.merge(&deviations);
+        if !self.recovery.is_certain(deviations.max) {
+            self.lost.merge(self.lost_of(range, center));
+        }
         let start = self.leaves.put(path, start + range.start as u64, &self.bytes)?;
         Ok(Node::new(bounds, items.len() as u64, NodeKind::Leaf { center, start }))
     }
+
+    /// Points of the leaf just encoded that do not come back from its bytes.
+    fn lost_of(&self, range: &Range<usize>, center: [f64; 3]) -> Lost {
+        let origin = self.cloud.frame.origin;
+        let points = self.order.iter().zip(self.bytes.chunks_exact(self.columns.record.stride()));
+        self.recovery.count(points.map(|(&i, bytes)| {
+            let offset = record_offset(bytes);
+            let decoded = std::array::from_fn(|a| center[a] + f64::from(offset[a]));
+            (decoded, origin.job(self.items[range.start + i as usize].q).0)
+        }))
+    }
+}
+
+/// The offset from the center at the start of a leaf record.
+fn record_offset(record: &[u8]) -> [f32; 3] {
+    let words = record.as_chunks::<4>().0;
+    std::array::from_fn(|a| words.get(a).map_or(0.0, |w| f32::from_le_bytes(*w)))
 }
 
 struct World<'a> {

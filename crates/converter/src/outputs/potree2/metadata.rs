@@ -6,6 +6,7 @@ use pointmill_format::potree2::{AttributeStats, Encoding as StoredEncoding, Hier
 use pointmill_format::{Aabb, Attribute, AttributeType, Lattice};
 use serde_json::Map;
 
+use super::layout::viewable;
 use super::settings::{Encoding, HIERARCHY_STEP, Potree2Settings};
 use crate::cloud::{Cloud, JobPoint, Ledger};
 use crate::octree::{Octree, SPACING_BITS};
@@ -31,7 +32,8 @@ pub(super) fn metadata(
     position.max = lattice.world(stored(stats.bounds.max)).to_vec();
     let mut attributes = vec![position];
     attributes.extend(choice.kept.iter().map(|&i| {
-        let attribute = &cloud.schema().attributes[i];
+        let mut attribute = cloud.schema().attributes[i].clone();
+        attribute.ty = viewable(attribute.ty);
         let range = &facts.ranges[i];
         // A range must be there and finite; a column of NaN has none.
         let finite = |v: &[f64]| v.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect::<Vec<_>>();

@@ -1,5 +1,6 @@
 //! The Potree 2.0 octree: payloads behind one another in `octree.bin`, and the two files around them.
 
+mod accuracy;
 mod layout;
 mod metadata;
 mod payload;
@@ -13,15 +14,16 @@ pub(crate) use layout::OutputLayout;
 pub(crate) use payload::PayloadEncoder;
 pub use settings::{Encoding, Potree2Settings};
 
+use self::layout::viewable;
 use self::settings::HIERARCHY_STEP;
-use super::attributes::choose;
+use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
 use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
-use crate::report::OutputReport;
+use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Runtime};
 use crate::sources::{POSITION_BYTES, Schema};
 
@@ -103,11 +105,19 @@ impl Output for Potree2Settings {
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
         to.write("metadata.json", json.as_bytes())?;
+        let doubled = choice.kept.iter().filter_map(|&i| {
+            let (attribute, changes) = (&schema.attributes[i], cloud.stats.doubled.get(i)?);
+            changed(self.kind(), attribute, viewable(attribute.ty), changes)
+        });
+        let (attributes_changed, warnings) = doubled.unzip();
         Ok(OutputReport {
             points: tree.ledger.points(),
             duplicates_dropped: tree.ledger.duplicates_dropped(),
+            accuracy: report::accuracy(cloud, tree.ledger.points(), accuracy::errors(cloud, metadata.lattice.offset)),
             attributes: cloud.names(choice.kept.iter().copied()),
             attributes_dropped: choice.dropped,
+            attributes_changed,
+            warnings,
             bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
             checksum: tree.ledger.unaltered().to_string(),
             tree: metadata::tree_report(&tree),

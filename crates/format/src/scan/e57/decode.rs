@@ -3,11 +3,12 @@
 use super::fields::Field;
 use super::file::{E57Scan, ScanPlan};
 use super::pose::{Pose, spherical_to_cartesian};
+use super::scaling::{Scaled, Scaling};
 use super::schema::{Fill, PositionFields, Roles, Triple};
 use super::streams::Streams;
 use super::unpack::{each, each_integer, fill};
 use crate::scan::decode::fitting_batch;
-use crate::{Column, Fault, Positions, ReadError, Scratch, Sink, Wanted, with_column};
+use crate::{Changes, Column, Fault, Positions, ReadError, Scratch, Sink, Wanted, with_column};
 
 /// [`crate::Scan::decode`].
 pub(super) fn piece(
@@ -23,7 +24,7 @@ pub(super) fn piece(
     };
     let plan = &scan.scans[cut.scan];
     if let Some(fault) = &cut.lost {
-        let what = format!("{}; {} points of scan {} are lost", fault.what, cut.records, plan.index);
+        let what = format!("{}; {} points of scan {} are lost", fault.what, cut.records, plan.index + 1);
         return Err(ReadError::broken(scan.source.path(), fault.byte, what).advise(fault.advice.clone()));
     }
     let is_wanted = |column: usize| wanted.is_wanted(column);
@@ -42,16 +43,53 @@ pub(super) fn piece(
         xyz.iter_mut().for_each(|axis| axis.resize(n, 0.0));
         values.positions(&plan.positions, &plan.pose, xyz.each_mut().map(Vec::as_mut_slice));
     }
+    let xs: &[f64] = match &batch.positions {
+        Positions::World([x, ..]) => x,
+        Positions::Quantized(_) => &[],
+    };
+    let mut counted = Vec::new();
     for (i, (column, attribute)) in batch.columns.iter_mut().zip(scan.info.attributes.iter()).enumerate() {
         let len = if is_wanted(i) { n * attribute.elements } else { 0 };
         with_column!(&mut *column, v => v.resize(len, Default::default()));
         if len > 0 {
-            values.column(plan, plan.fills[i], column);
+            let mut tally = Tally { xs, changes: Changes::default() };
+            values.column(plan, plan.fills[i], column, &mut tally);
+            counted.push((i, tally.changes));
         }
     }
+    counted.iter().for_each(|(column, changes)| batch.count_changes(*column, changes));
     // the last batch of the piece: whether the sink wants more makes no difference
     let _ = sink(batch);
     Ok(())
+}
+
+/// Counts what becomes of the values of a column. Points without a position do not count: they are none.
+struct Tally<'a> {
+    /// Of all points; NaN where a position is invalid.
+    xs: &'a [f64],
+    changes: Changes,
+}
+
+impl Tally<'_> {
+    fn is_point(&self, i: usize) -> bool {
+        self.xs.get(i).is_none_or(|x| !x.is_nan())
+    }
+
+    /// A value outside of its range.
+    #[cold]
+    fn outside(&mut self, i: usize, value: f64) {
+        if !self.is_point(i) {
+        } else if value.is_finite() {
+            self.changes.clamp(value);
+        } else {
+            self.changes.not_finite += 1;
+        }
+    }
+
+    /// A value that is not there.
+    fn missing(&mut self, i: usize) {
+        self.changes.missing += u64::from(self.is_point(i));
+    }
 }
 
 /// The packed values of a run of records.
@@ -117,27 +155,34 @@ impl Values<'_> {
         pose.apply([x, y, z]);
     }
 
-    fn column(&self, plan: &ScanPlan, fill: Fill, column: &mut Column) {
+    fn column(&self, plan: &ScanPlan, fill: Fill, column: &mut Column, tally: &mut Tally<'_>) {
         match (fill, column) {
             (Fill::ScanIndex(index), Column::UInt16(out)) => out.fill(index),
             (Fill::Colour { fields, scaling, invalid }, Column::UInt16(out)) => {
+                let is_invalid = self.invalid(invalid);
                 let out = out.as_chunks_mut::<3>().0;
                 for (element, (field, scaling)) in fields.into_iter().zip(scaling).enumerate() {
-                    self.each(field, |i, v| {
+                    self.scaled(field, scaling, &is_invalid, tally, |i, v| {
                         if let Some(rgb) = out.get_mut(i) {
-                            rgb[element] = scaling.apply(v);
+                            rgb[element] = v;
                         }
                     });
                 }
-                self.each_invalid(invalid, |i| out[i] = [0; 3]);
+                self.each_invalid(invalid, |i| {
+                    out[i] = [0; 3];
+                    tally.missing(i);
+                });
             }
             (Fill::Intensity { field, scaling, invalid }, Column::UInt16(out)) => {
-                self.each(field, |i, v| {
+                self.scaled(field, scaling, &self.invalid(invalid), tally, |i, v| {
                     if let Some(out) = out.get_mut(i) {
-                        *out = scaling.apply(v);
+                        *out = v;
                     }
                 });
-                self.each_invalid(invalid, |i| out[i] = 0);
+                self.each_invalid(invalid, |i| {
+                    out[i] = 0;
+                    tally.missing(i);
+                });
             }
             (Fill::Normal { fields, axis }, Column::Float32(out)) => {
                 let mut normal: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; self.n]);
@@ -145,30 +190,68 @@ impl Values<'_> {
                 plan.pose.rotate(normal.each_mut().map(Vec::as_mut_slice));
                 out.iter_mut().zip(&normal[axis]).for_each(|(out, v)| *out = *v as f32);
             }
-            (Fill::Plain { field, invalid }, column) => self.plain(field, invalid, column),
-            (_, column) => with_column!(column, v => v.fill(Default::default())),
+            (Fill::Plain { field, invalid, add }, column) => self.plain(field, invalid, add, column, tally),
+            (_, column) => {
+                with_column!(column, v => v.fill(Default::default()));
+                (0..self.n).for_each(|i| tally.missing(i));
+            }
         }
     }
 
+    /// For each record whether its state is not 0 ("valid"); empty without such a field.
+    fn invalid(&self, state: Option<usize>) -> Vec<bool> {
+        let mut is_invalid = vec![false; if state.is_some() { self.n } else { 0 }];
+        self.each_invalid(state, |i| is_invalid[i] = true);
+        is_invalid
+    }
+
+    /// A field scaled to 16 bits; what is outside the range counts, but where it is invalid.
+    #[inline(always)]
+    fn scaled(
+        &self,
+        field: usize,
+        scaling: Scaling,
+        is_invalid: &[bool],
+        tally: &mut Tally<'_>,
+        mut put: impl FnMut(usize, u16),
+    ) {
+        self.each(field, |i, v| match scaling.apply(v) {
+            Scaled::Within(v) => put(i, v),
+            Scaled::Outside(nearest) => {
+                if !is_invalid.get(i).copied().unwrap_or(false) {
+                    tally.outside(i, v);
+                }
+                put(i, nearest);
+            }
+        });
+    }
+
     /// A field as it is. Integers that lie outside their declared range (a fault of the file) stay within their type.
-    fn plain(&self, field: usize, invalid: Option<usize>, column: &mut Column) {
+    fn plain(&self, field: usize, invalid: Option<usize>, add: i64, column: &mut Column, tally: &mut Tally<'_>) {
         let (encoding, bytes) = (self.fields[field].encoding, self.streams.field(field));
         macro_rules! integers {
             ($out:ident, $ty:ty) => {{
                 each_integer(encoding, bytes, self.n, |i, v| {
                     if let Some(out) = $out.get_mut(i) {
                         // `min` and `max` of the type fit: the schema does not use uint64
+                        let v = v.saturating_add(add);
                         *out = v.clamp(<$ty>::MIN as i64, <$ty>::MAX as i64) as $ty;
+                        if i128::from(*out) != i128::from(v) {
+                            tally.outside(i, v as f64);
+                        }
                     }
                 });
-                self.each_invalid(invalid, |i| $out[i] = 0);
+                self.each_invalid(invalid, |i| {
+                    $out[i] = 0;
+                    tally.missing(i);
+                });
             }};
         }
         macro_rules! floats {
             ($out:ident, $ty:ty) => {{
                 each(encoding, bytes, self.n, |i, v| {
                     if let Some(out) = $out.get_mut(i) {
-                        *out = v as $ty;
+                        *out = (v + add as f64) as $ty;
                     }
                 });
                 self.each_invalid(invalid, |i| $out[i] = <$ty>::NAN);

@@ -1,8 +1,7 @@
 //! The fields of a prototype: what a record consists of and how its bits are stored.
 
-use ::e57::{Record, RecordDataType, RecordName};
-
-use super::xml::TEXT_MARK;
+use super::xml::element::Element;
+use super::xml::numbers::Numbers;
 
 /// How the values of a field are stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,66 +30,138 @@ impl Encoding {
     }
 }
 
+/// What a field is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[allow(missing_docs)] // the names are those of the standard
+pub(super) enum Name {
+    CartesianX,
+    CartesianY,
+    CartesianZ,
+    CartesianInvalidState,
+    SphericalRange,
+    SphericalAzimuth,
+    SphericalElevation,
+    SphericalInvalidState,
+    Intensity,
+    IsIntensityInvalid,
+    ColorRed,
+    ColorGreen,
+    ColorBlue,
+    IsColorInvalid,
+    RowIndex,
+    ColumnIndex,
+    ReturnCount,
+    ReturnIndex,
+    TimeStamp,
+    IsTimeStampInvalid,
+    /// Of an extension, or of none that is known.
+    Other {
+        prefix: String,
+        tag: String,
+    },
+}
+
+const NAMES: [(Name, &str); 20] = [
+    (Name::CartesianX, "cartesianX"),
+    (Name::CartesianY, "cartesianY"),
+    (Name::CartesianZ, "cartesianZ"),
+    (Name::CartesianInvalidState, "cartesianInvalidState"),
+    (Name::SphericalRange, "sphericalRange"),
+    (Name::SphericalAzimuth, "sphericalAzimuth"),
+    (Name::SphericalElevation, "sphericalElevation"),
+    (Name::SphericalInvalidState, "sphericalInvalidState"),
+    (Name::Intensity, "intensity"),
+    (Name::IsIntensityInvalid, "isIntensityInvalid"),
+    (Name::ColorRed, "colorRed"),
+    (Name::ColorGreen, "colorGreen"),
+    (Name::ColorBlue, "colorBlue"),
+    (Name::IsColorInvalid, "isColorInvalid"),
+    (Name::RowIndex, "rowIndex"),
+    (Name::ColumnIndex, "columnIndex"),
+    (Name::ReturnCount, "returnCount"),
+    (Name::ReturnIndex, "returnIndex"),
+    (Name::TimeStamp, "timeStamp"),
+    (Name::IsTimeStampInvalid, "isTimeStampInvalid"),
+];
+
 /// One field.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Field {
-    pub(super) name: RecordName,
+    pub(super) name: Name,
     pub(super) encoding: Encoding,
     /// The range that the prototype gives, as meant values; `None` if it gives none or that of its whole type.
     pub(super) range: Option<(f64, f64)>,
 }
 
 impl Field {
-    /// The field that the `e57` crate describes.
-    pub(super) fn new(record: &Record) -> Self {
-        let encoding = match record.data_type {
-            RecordDataType::Single { .. } => Encoding::Single,
-            RecordDataType::Double { .. } => Encoding::Double,
-            RecordDataType::Integer { min: TEXT_MARK, max: TEXT_MARK } => Encoding::Text,
-            RecordDataType::Integer { min, max } => Encoding::Integer { min, max },
-            RecordDataType::ScaledInteger { min, max, scale, offset } => Encoding::Scaled { min, max, scale, offset },
+    /// The field that an element of a prototype describes.
+    ///
+    /// # Errors
+    /// A type that has no bits of fixed length, or an empty range.
+    pub(super) fn read(element: &Element<'_>, numbers: &Numbers) -> Result<Self, String> {
+        let tag = element.name;
+        let known = NAMES.iter().find(|(_, name)| element.prefix.is_empty() && *name == tag);
+        let name = match known {
+            Some((name, _)) => name.clone(),
+            None => Name::Other { prefix: element.prefix.to_owned(), tag: tag.to_owned() },
         };
-        let pair = match record.data_type {
-            RecordDataType::Single { min, max } => min.map(f64::from).zip(max.map(f64::from)),
-            RecordDataType::Double { min, max } => min.zip(max),
-            RecordDataType::Integer { min, max } => Some((min as f64, max as f64)),
-            RecordDataType::ScaledInteger { min, max, scale, offset } => {
+        let float = |name: &str| element.attribute(name).and_then(|text| numbers.float(text));
+        let ends = || -> Result<(i64, i64), String> {
+            let min = numbers.attribute(element, "minimum")?.unwrap_or(i64::MIN);
+            let max = numbers.attribute(element, "maximum")?.unwrap_or(i64::MAX);
+            if max < min { Err(format!("{tag} ranges from {min} to {max}")) } else { Ok((min, max)) }
+        };
+        let encoding = match (element.attribute("type").unwrap_or_default(), element.attribute("precision")) {
+            ("Float", None | Some("double")) => Encoding::Double,
+            ("Float", Some("single")) => Encoding::Single,
+            ("Float", Some(other)) => return Err(format!("{tag} is of the precision {}", quoted(other))),
+            ("Integer", _) => ends().map(|(min, max)| Encoding::Integer { min, max })?,
+            ("ScaledInteger", _) => {
+                let (min, max) = ends()?;
+                let (scale, offset) = (float("scale").unwrap_or(1.0), float("offset").unwrap_or(0.0));
+                Encoding::Scaled { min, max, scale, offset }
+            }
+            ("String", _) => Encoding::Text,
+            (other, _) => return Err(format!("{tag} is of type {}", quoted(other))),
+        };
+        Ok(Self::new(name, encoding, float("minimum").zip(float("maximum"))))
+    }
+
+    /// `declared`: the range of a floating-point field.
+    fn new(name: Name, encoding: Encoding, declared: Option<(f64, f64)>) -> Self {
+        let pair = match encoding {
+            // single precision is written with few digits
+            Encoding::Single => declared.map(|(a, b)| (f64::from(a as f32), f64::from(b as f32))),
+            Encoding::Double => declared,
+            Encoding::Integer { min, max } => Some((min as f64, max as f64)),
+            Encoding::Scaled { min, max, scale, offset } => {
                 let (a, b) = (min as f64 * scale + offset, max as f64 * scale + offset);
                 Some((a.min(b), a.max(b)))
             }
+            Encoding::Text => None,
         };
-        let is_whole_type = match record.data_type {
-            RecordDataType::Single { .. } | RecordDataType::Double { .. } => pair.is_some_and(|(_, b)| b >= 3e38),
-            RecordDataType::Integer { min, max } | RecordDataType::ScaledInteger { min, max, .. } => {
+        let is_whole_type = match encoding {
+            Encoding::Single | Encoding::Double | Encoding::Text => pair.is_some_and(|(_, b)| b >= 3e38),
+            Encoding::Integer { min, max } | Encoding::Scaled { min, max, .. } => {
                 max.abs_diff(min) > u64::from(u32::MAX)
             }
         };
         let range = pair.filter(|(a, b)| a < b && a.is_finite() && b.is_finite() && !is_whole_type);
-        Self { name: record.name.clone(), encoding, range }
+        Self { name, encoding, range }
     }
 
     /// The name as it stands in the file, without the prefix of an extension.
     pub(super) fn tag(&self) -> &str {
         match &self.name {
-            RecordName::Unknown { name, .. } => name,
-            RecordName::RowIndex => "rowIndex",
-            RecordName::ColumnIndex => "columnIndex",
-            RecordName::ReturnCount => "returnCount",
-            RecordName::ReturnIndex => "returnIndex",
-            RecordName::TimeStamp => "timeStamp",
-            RecordName::CartesianX => "cartesianX",
-            RecordName::CartesianY => "cartesianY",
-            RecordName::CartesianZ => "cartesianZ",
-            RecordName::SphericalRange => "sphericalRange",
-            RecordName::SphericalAzimuth => "sphericalAzimuth",
-            RecordName::SphericalElevation => "sphericalElevation",
-            RecordName::ColorRed => "colorRed",
-            RecordName::ColorGreen => "colorGreen",
-            RecordName::ColorBlue => "colorBlue",
-            RecordName::Intensity => "intensity",
-            _ => "invalid state",
+            Name::Other { tag, .. } => tag,
+            known => NAMES.iter().find(|(name, _)| name == known).map_or("", |(_, tag)| tag),
         }
     }
+}
+
+/// The start of a text, for a message.
+fn quoted(text: &str) -> String {
+    format!("{:?}", text.chars().take(40).collect::<String>())
 }
 
 #[cfg(test)]
@@ -106,13 +177,14 @@ mod tests {
 
     #[test]
     fn a_range_counts_only_if_it_says_something() {
-        let range = |data_type| Field::new(&Record { name: RecordName::Intensity, data_type }).range;
-        assert_eq!(range(RecordDataType::U8), Some((0.0, 255.0)));
-        assert_eq!(range(RecordDataType::UNIT_F32), Some((0.0, 1.0)));
-        assert_eq!(range(RecordDataType::Integer { min: i64::MIN, max: i64::MAX }), None);
-        assert_eq!(range(RecordDataType::Integer { min: 3, max: 3 }), None);
-        assert_eq!(range(RecordDataType::Single { min: Some(f32::MIN), max: Some(f32::MAX) }), None);
-        let scaled = RecordDataType::ScaledInteger { min: -10, max: 10, scale: -0.5, offset: 1.0 };
-        assert_eq!(range(scaled), Some((-4.0, 6.0)));
+        let range = |encoding, declared| Field::new(Name::Intensity, encoding, declared).range;
+        let integer = |min, max| range(Encoding::Integer { min, max }, None);
+        assert_eq!(integer(0, 255), Some((0.0, 255.0)));
+        assert_eq!(range(Encoding::Single, Some((0.0, 1.0))), Some((0.0, 1.0)));
+        assert_eq!([integer(i64::MIN, i64::MAX), integer(3, 3)], [None; 2]);
+        assert_eq!(range(Encoding::Single, Some((f64::from(f32::MIN), f64::from(f32::MAX)))), None);
+        assert_eq!(range(Encoding::Double, None), None);
+        let scaled = Encoding::Scaled { min: -10, max: 10, scale: -0.5, offset: 1.0 };
+        assert_eq!(range(scaled, None), Some((-4.0, 6.0)));
     }
 }

@@ -9,13 +9,15 @@
 //!   has NaN coordinates, so that counts stay exact. A missing z (or elevation) is 0, with a warning.
 //! * `rgb` and `intensity` are scaled to 16 bits: by the declared limits of the scan, else by the range of the field in
 //!   the prototype, else (floats without any) by the usual range that holds a sample of the values, with a warning.
-//!   Colours and intensities that are marked as invalid are 0.
+//!   Values outside of that range take its nearest end, NaN and infinity 0; both are counted
+//!   ([`crate::PointBatch::changes`]). Colours and intensities that are marked as invalid are 0 and count as missing.
 //! * `point source id` is the number of the scan in the file, from 0; beyond 65,535 it stays there.
 //! * `NormalX`, `NormalY`, `NormalZ` (of the extension for surface normals) turn with the scan.
 //! * All other fields keep their names, and their integers as they are stored ([`Attribute::scale`] and `offset` give
 //!   what scaled ones mean). A scan that lacks a field has zeros. Times marked as invalid are NaN, or 0 as integers.
 //! * `rowIndex` and `columnIndex` come only if [`E57Options::keep_row_column`] asks for them.
-//! * Images and text fields are not read, as [`ScanInfo::warnings`] reports; other extensions are skipped.
+//! * Text fields are not read, as [`ScanInfo::warnings`] reports. Images are described ([`ScanInfo::images`]); their
+//!   bytes come with [`read_blob`].
 //!
 //! ```no_run
 //! use pointmill_format::scan::e57;
@@ -33,14 +35,14 @@
 //! # Ok::<(), pointmill_format::ReadError>(())
 //! ```
 //!
-//! Sources: ASTM E2807-11; D. Huber, "The ASTM E57 file format for 3D imaging data exchange", 2011. XML and prototypes
-//! are read by the crate `e57`; its point readers handle every value alone, in sequence, and are not used.
+//! Sources: ASTM E2807-11; D. Huber, "The ASTM E57 file format for 3D imaging data exchange", 2011.
 
 mod cuts;
 mod decode;
 mod fields;
 mod file;
 mod header;
+mod images;
 mod notes;
 mod open;
 mod options;
@@ -60,6 +62,7 @@ use crate::Attribute;
 use crate::{Piece, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
 use file::E57Scan;
 
+pub use images::read_blob;
 pub use options::E57Options;
 
 /// True if the first bytes of a file say that it is E57.
@@ -81,7 +84,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
 /// # Errors
 /// Those of [`open`].
 pub fn open_with(path: impl AsRef<Path>, options: E57Options) -> Result<Box<dyn Scan>, ReadError> {
-    Ok(Box::new(open::open(path.as_ref(), options)?))
+    Ok(Box::new(open::open(path.as_ref(), &options)?))
 }
 
 impl Scan for E57Scan {

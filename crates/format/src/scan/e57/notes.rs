@@ -41,7 +41,7 @@ mod tests {
         (0..1000).for_each(|i| notes.add(i, note(&format!("c{i}"))));
         let warnings = notes.warnings();
         assert_eq!(warnings.len(), MAX_WARNINGS + 1);
-        assert_eq!(warnings[0].to_string(), "scan 2: b");
-        assert_eq!(warnings[1].to_string(), "scans 0, 1, 2, 3, 4 and 4 more: a");
+        assert_eq!(warnings[0].to_string(), "scan 3: b");
+        assert_eq!(warnings[1].to_string(), "scans 1, 2, 3, 4, 5 and 4 more: a");
     }
 }

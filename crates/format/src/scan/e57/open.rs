@@ -3,8 +3,6 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use ::e57::PointCloud;
-
 use super::cuts::{self, Cut};
 use super::decode::Values;
 use super::fields::Field;
@@ -15,9 +13,11 @@ use super::packets::Section;
 use super::pages::{Pages, logical, logical_len, physical};
 use super::pose::Pose;
 use super::scaling::{self, Scaling};
-use super::schema::{Roles, ScanFields, Schema, fields};
+use super::schema::{Roles, ScanFields, Schema};
 use super::streams::Streams;
-use super::{header, xml};
+use super::xml::Cloud;
+use super::{header, images, xml};
+use crate::scan::chosen::chosen;
 use crate::scan::source::Source;
 use crate::{
     Aabb, Advice, AxisGrid, Counted, Crs, Fault, Piece, ReadError, Resolution, ScanInfo, ScanPart, ScanWarning,
@@ -33,7 +33,7 @@ const MAX_FROM_NOTHING: u64 = 65_536;
 /// A scan on the way to a [`ScanPlan`].
 struct Draft<'a> {
     index: usize,
-    cloud: &'a PointCloud,
+    cloud: &'a Cloud,
     fields: Vec<Field>,
     roles: Roles,
     pose: Pose,
@@ -41,23 +41,26 @@ struct Draft<'a> {
 }
 
 /// [`super::open_with`].
-pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadError> {
+pub(super) fn open(path: &Path, options: &E57Options) -> Result<E57Scan, ReadError> {
     let source = Source::open(path)?;
     let mut warnings = Vec::new();
-    let xml_bytes = header::read_xml(&source, &mut warnings)?;
-    let document = xml::parse(&xml_bytes).map_err(|why| {
+    let xml_bytes = header::read_xml(&source, options.max_xml, &mut warnings)?;
+    let mut document = xml::parse(&xml_bytes, &mut warnings).map_err(|why| {
         let what = format!("the XML section cannot be read: {why}");
         ReadError::broken(path, 24, Fault::Header(what)).advise(Advice::ExportAgain)
     })?;
-    warn_of_the_rest(&document, &mut warnings);
+    drop(xml_bytes);
+    let images = images::describe(&document, &mut warnings);
+    let scans_there = document.clouds.len();
+    choose(&mut document.clouds, options.scans.as_deref(), &mut warnings);
     let mut notes = Notes::default();
     let mut drafts = drafts(&source, &document.clouds, options, &mut notes)?;
     cut_all(&source, &document.clouds, &mut drafts, &mut notes);
     let scalings: Vec<_> = drafts.iter().map(|draft| scalings(&source, draft, &mut notes)).collect();
     let views: Vec<_> = drafts.iter().zip(&scalings).map(|(draft, s)| draft.view(s)).collect();
     let Schema { attributes, fills } = Schema::new(&views).map_err(|what| ReadError::unsupported(path, what))?;
-    if document.clouds.len() > usize::from(u16::MAX) + 1 {
-        warnings.push(ScanWarning::SourceIdsShared { scans: document.clouds.len() });
+    if scans_there > usize::from(u16::MAX) + 1 {
+        warnings.push(ScanWarning::SourceIdsShared { scans: scans_there });
     }
     warnings.extend(notes.warnings());
     let bounds_declared = bounds(&drafts);
@@ -71,12 +74,15 @@ pub(super) fn open(path: &Path, options: E57Options) -> Result<E57Scan, ReadErro
     }
     let info = ScanInfo {
         path: path.to_path_buf(),
-        format: format_name(document.clouds.len()),
+        format: format_name(document.clouds.len(), scans_there),
         points_declared: document.clouds.iter().fold(0, |sum: u64, c| sum.saturating_add(c.records)),
         bounds_declared,
         lattice: None,
         resolution,
         parts,
+        images,
+        // they are scaled to 16 bits from their limits
+        rgb_is_16_bit: true,
         attributes: attributes.into(),
         crs: crs(document.coordinate_metadata.as_deref(), &mut warnings),
         file_bytes: source.len(),
@@ -95,19 +101,26 @@ impl Draft<'_> {
 /// All scans that declare points.
 fn drafts<'a>(
     source: &Source,
-    clouds: &'a [PointCloud],
-    options: E57Options,
+    clouds: &'a [Cloud],
+    options: &E57Options,
     notes: &mut Notes,
 ) -> Result<Vec<Draft<'a>>, ReadError> {
     let mut drafts = Vec::new();
-    for (index, cloud) in clouds.iter().enumerate().filter(|(_, cloud)| cloud.records > 0) {
-        let refuse = |what: &str| ReadError::unsupported(source.path(), format!("scan {index}: {what}"));
-        let fields = fields(cloud);
+    for cloud in clouds {
+        let index = cloud.index;
+        if !cloud.has_points {
+            notes.add(index, ScanWarning::PointsUndescribed);
+        }
+        if cloud.records == 0 {
+            continue;
+        }
+        let refuse = |what: &str| ReadError::unsupported(source.path(), format!("scan {}: {what}", index + 1));
+        let fields = cloud.fields.clone();
         let roles = Roles::new(&fields, index, options, notes).map_err(refuse)?;
         if fields.iter().all(|f| f.encoding.bits() == 0) && cloud.records > MAX_FROM_NOTHING {
             return Err(refuse(&format!("{} points without a bit of data", cloud.records)));
         }
-        let (pose, note) = Pose::new(cloud);
+        let (pose, note) = Pose::new(cloud.pose);
         note.into_iter().for_each(|note| notes.add(index, note));
         drafts.push(Draft { index, cloud, fields, roles, pose, cuts: Vec::new() });
     }
@@ -115,7 +128,7 @@ fn drafts<'a>(
 }
 
 /// Cuts every scan into pieces.
-fn cut_all(source: &Source, clouds: &[PointCloud], drafts: &mut [Draft<'_>], notes: &mut Notes) {
+fn cut_all(source: &Source, clouds: &[Cloud], drafts: &mut [Draft<'_>], notes: &mut Notes) {
     let mut window = Vec::new();
     // heads alone are read: a page at a time
     let mut pages = Pages::new(source, &mut window, 1);
@@ -157,12 +170,12 @@ fn scalings(source: &Source, draft: &Draft<'_>, notes: &mut Notes) -> (Option<[S
         (low, high)
     };
     let intensity = roles.intensity.map(|i| {
-        let declared = scaling::intensity(cloud.intensity_limits.as_ref(), &fields[i]);
+        let declared = cloud.intensity_limits.and_then(|limits| scaling::declared(limits, &fields[i]));
         Scaling::new(declared.or(fields[i].range).unwrap_or_else(|| sampled("intensity", &[i])))
     });
     let colour = roles.colour.map(|ids| {
         let channels = ids.map(|i| &fields[i]);
-        let declared = scaling::colours(cloud.color_limits.as_ref(), channels);
+        let declared = scaling::colours(cloud.colour_limits, channels);
         let common = |range| [range; 3];
         let or_fields = declared.or_else(|| scaling::union(&channels).map(common));
         or_fields.unwrap_or_else(|| common(sampled("colour", &ids))).map(Scaling::new)
@@ -242,18 +255,18 @@ fn combined(scans: impl Iterator<Item = Resolution>) -> Resolution {
 }
 
 /// The descriptions of all scans, those without points among them.
-fn parts(clouds: &[PointCloud], drafts: &[Draft<'_>]) -> Vec<ScanPart> {
+fn parts(clouds: &[Cloud], drafts: &[Draft<'_>]) -> Vec<ScanPart> {
     let (mut drafts, mut end) = (drafts.iter().peekable(), 0);
-    let part = |(index, cloud): (usize, &PointCloud)| {
+    let part = |cloud: &Cloud| {
         let start = end;
-        if let Some(draft) = drafts.next_if(|draft| draft.index == index) {
+        if let Some(draft) = drafts.next_if(|draft| draft.index == cloud.index) {
             end += draft.cuts.iter().map(|cut| cut.records).sum::<u64>();
         }
-        let pose = Pose::new(cloud).0;
+        let pose = Pose::new(cloud.pose).0;
         let (rotation, translation) = pose.parts();
         ScanPart {
-            number: index + 1,
-            name: cloud.name.clone().unwrap_or_default(),
+            number: cloud.index + 1,
+            name: cloud.name.clone(),
             points: cloud.records,
             range: start..end,
             bounds: pose.bounds_declared(cloud),
@@ -261,7 +274,7 @@ fn parts(clouds: &[PointCloud], drafts: &[Draft<'_>]) -> Vec<ScanPart> {
             translation,
         }
     };
-    clouds.iter().enumerate().map(part).collect()
+    clouds.iter().map(part).collect()
 }
 
 /// The box of all scans, if each declares one.
@@ -284,15 +297,22 @@ fn crs(text: Option<&str>, warnings: &mut Vec<ScanWarning>) -> Crs {
     Crs { epsg: code, ..Crs::default() }
 }
 
-fn warn_of_the_rest(document: &xml::Document, warnings: &mut Vec<ScanWarning>) {
-    if document.images != Some(0) {
-        warnings.push(ScanWarning::Images { count: document.images });
-    }
-    if document.clouds.is_empty() {
+/// Leaves the scans that were chosen.
+fn choose(clouds: &mut Vec<Cloud>, choices: Option<&[String]>, warnings: &mut Vec<ScanWarning>) {
+    if clouds.is_empty() {
         warnings.push(ScanWarning::NoScans);
+        return;
     }
+    let names: Vec<&str> = clouds.iter().map(|cloud| cloud.name.as_str()).collect();
+    let is_chosen = chosen(choices, &names);
+    if !is_chosen.contains(&true) {
+        warnings.push(ScanWarning::NoneChosen { scans: clouds.len() });
+    }
+    clouds.retain(|cloud| is_chosen.get(cloud.index).copied().unwrap_or(false));
 }
 
-fn format_name(scans: usize) -> String {
-    format!("E57 1.0, {scans} scan{}", if scans == 1 { "" } else { "s" })
+/// "E57 1.0, 2 of 3 scans".
+fn format_name(read: usize, there: usize) -> String {
+    let of = if read == there { String::new() } else { format!("{read} of ") };
+    format!("E57 1.0, {of}{there} scan{}", if there == 1 { "" } else { "s" })
 }

@@ -20,9 +20,14 @@ pub(super) fn physical(logical: u64) -> u64 {
     (logical / DATA).saturating_mul(PAGE).saturating_add(logical % DATA)
 }
 
-/// The logical length of the file: whole pages only.
+/// The logical length of the file. Of a last page that is not whole, what is there counts.
 pub(super) fn logical_len(source: &Source) -> u64 {
-    source.len() / PAGE * DATA
+    source.len() / PAGE * DATA + (source.len() % PAGE).min(DATA)
+}
+
+/// Pages of the file, a last one that is not whole among them.
+fn page_count(source: &Source) -> u64 {
+    source.len().div_ceil(PAGE)
 }
 
 /// Verified bytes of a file, read a window of pages at a time.
@@ -34,12 +39,14 @@ pub(super) struct Pages<'a> {
     /// The pages in the window: the first one and how many were verified.
     first: u64,
     good: u64,
+    /// Bytes of these.
+    len: usize,
 }
 
 impl<'a> Pages<'a> {
     /// `window`: memory to use; `ahead`: pages that one read fetches, ≥ 1.
     pub(super) fn new(source: &'a Source, window: &'a mut Vec<u8>, ahead: u64) -> Self {
-        Self { source, window, ahead, first: 0, good: 0 }
+        Self { source, window, ahead, first: 0, good: 0, len: 0 }
     }
 
     /// Fills `out` from the logical offset `at`.
@@ -50,7 +57,10 @@ impl<'a> Pages<'a> {
         let mut filled = 0;
         while filled < out.len() {
             let page = self.page(at / DATA)?;
-            let bytes = &page[(at % DATA) as usize..];
+            let bytes = page.get((at % DATA) as usize..).unwrap_or_default();
+            if bytes.is_empty() {
+                return Err(self.ends_before(at / DATA));
+            }
             let n = bytes.len().min(out.len() - filled);
             out[filled..filled + n].copy_from_slice(&bytes[..n]);
             filled += n;
@@ -59,38 +69,48 @@ impl<'a> Pages<'a> {
         Ok(())
     }
 
-    /// The data of one page.
+    /// The data of one page; of the last one what is there.
     fn page(&mut self, index: u64) -> Result<&[u8], ReadError> {
         if index < self.first || index - self.first >= self.good {
             self.load(index)?;
         }
         let start = ((index - self.first) * PAGE) as usize;
-        Ok(&self.window[start..start + DATA as usize])
+        Ok(&self.window[start..(start + DATA as usize).min(self.len)])
+    }
+
+    fn ends_before(&self, index: u64) -> ReadError {
+        let (len, path) = (self.source.len(), self.source.path());
+        let what = match (len / PAGE, len % PAGE) {
+            (whole, 0) => format!("page {index} is wanted, the file has {whole}"),
+            (whole, rest) => format!("page {index} is wanted, the file has {whole} and {rest} bytes of another"),
+        };
+        ReadError::broken(path, len, what).advise(Advice::CutShort)
     }
 
     /// Reads the window that starts with page `index`. It ends before the next bad page, which is an error only when
     /// it is requested.
     fn load(&mut self, index: u64) -> Result<(), ReadError> {
-        let pages = self.ahead.min((self.source.len() / PAGE).saturating_sub(index));
+        let pages = self.ahead.min(page_count(self.source).saturating_sub(index));
         if pages == 0 {
-            let what = format!("page {index} is wanted, the file has {}", self.source.len() / PAGE);
-            return Err(ReadError::broken(self.source.path(), self.source.len(), what).advise(Advice::CutShort));
+            return Err(self.ends_before(index));
         }
         self.good = 0;
-        let bytes = self.source.slice_at(index * PAGE, pages * PAGE, self.window)?;
-        let good = bytes.chunks_exact(PAGE as usize).take_while(|page| is_sound(page)).count() as u64;
+        let len = (pages * PAGE).min(self.source.len() - index * PAGE);
+        let bytes = self.source.slice_at(index * PAGE, len, self.window)?;
+        let good = bytes.chunks(PAGE as usize).take_while(|page| is_sound(page)).count() as u64;
         if good == 0 {
             return Err(ReadError::broken(self.source.path(), index * PAGE, Fault::Checksum { page: index })
                 .advise(Advice::Damaged));
         }
-        (self.first, self.good) = (index, good);
+        (self.first, self.good, self.len) = (index, good, (good * PAGE).min(len) as usize);
         Ok(())
     }
 }
 
+/// True if a page matches its checksum, as far as that is there: the last page of a file may lack bytes of it.
 fn is_sound(page: &[u8]) -> bool {
-    let (data, stored) = page.split_at(DATA as usize);
-    crc32c::crc32c(data).to_be_bytes() == stored
+    let Some((data, stored)) = page.split_at_checked(DATA as usize) else { return true };
+    stored.is_empty() || crc32c::crc32c(data).to_be_bytes().starts_with(stored)
 }
 
 #[cfg(test)]
@@ -126,5 +146,38 @@ mod tests {
         let error = pages.read(3 * DATA - 1, &mut out).unwrap_err();
         assert!(error.to_string().contains("page 3 does not match its checksum (byte 3072)"), "{error}");
         assert!(pages.read(5 * DATA - 1, &mut out[..2]).unwrap_err().to_string().contains("has 5 (byte 5120)"));
+    }
+
+    #[test]
+    fn a_last_page_that_is_not_whole_gives_what_is_there() {
+        let mut page: Vec<u8> = (0..DATA).map(|i| (i % 249) as u8).collect();
+        page.extend(crc32c::crc32c(&page).to_be_bytes());
+        let two = [page.as_slice(), &page].concat();
+        // as many bytes of the second page as are there, of which so many are data
+        for (there, data) in [(1, 1), (700, 700), (1020, 1020), (1021, 1020), (1023, 1020)] {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), &two[..1024 + there]).unwrap();
+            let source = Source::open(file.path()).unwrap();
+            assert_eq!(logical_len(&source), DATA + data as u64);
+            let (mut window, mut out) = (Vec::new(), vec![0; 1020 + data]);
+            let mut pages = Pages::new(&source, &mut window, 64);
+            pages.read(0, &mut out).unwrap();
+            assert_eq!(out[1020..], page[..data]);
+            let error = pages.read(1020, &mut vec![0; data + 1]).unwrap_err().to_string();
+            assert!(
+                error.contains(if data < 1020 { "page 1 is wanted, the file has 1 and" } else { "page 2" }),
+                "{error}"
+            );
+        }
+        let mut bytes = two[..2046].to_vec();
+        bytes[2045] ^= 1;
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), &bytes).unwrap();
+        let source = Source::open(file.path()).unwrap();
+        let error = Pages::new(&source, &mut Vec::new(), 64).read(1020, &mut [0]).unwrap_err();
+        assert!(
+            error.to_string().contains("page 1 does not match its checksum"),
+            "what is there of it counts: {error}"
+        );
     }
 }

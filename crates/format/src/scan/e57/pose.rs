@@ -1,7 +1,6 @@
 //! Where a scan stands: rotation and translation, in double precision.
 
-use ::e57::{CartesianBounds, PointCloud, SphericalBounds};
-
+use super::xml::{Cloud, Placement};
 use crate::{Aabb, AxisGrid, Resolution, ScanWarning};
 
 /// From the scan's own coordinates to those of the file.
@@ -13,20 +12,17 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// The pose of a scan. `Err` holds a pose without rotation and why the file's cannot be one.
-    pub(super) fn new(cloud: &PointCloud) -> (Self, Option<ScanWarning>) {
-        let Some(transform) = &cloud.transform else { return (Self::identity(), None) };
-        let t = &transform.translation;
-        let q = &transform.rotation;
-        let translation = [t.x, t.y, t.z];
-        let norm = [q.w, q.x, q.y, q.z].iter().fold(0.0f64, |sum, v| sum.hypot(*v));
+    /// The pose that a file gives, and what is wrong with it: it may be without the rotation.
+    pub(super) fn new(placement: Option<Placement>) -> (Self, Option<ScanWarning>) {
+        let Placement { rotation: q, translation } = placement.unwrap_or(Placement::IDENTITY);
+        let norm = q.iter().fold(0.0f64, |sum, v| sum.hypot(*v));
         if !norm.is_finite() || norm == 0.0 {
             return (Self { rotation: None, translation }, Some(ScanWarning::Rotation { normalised: false }));
         }
         let note = ((norm - 1.0).abs() > 1e-6).then_some(ScanWarning::Rotation { normalised: true });
         // a quaternion within rounding of 1 is one: dividing by its norm would only add noise
         let by = if (norm - 1.0).abs() <= 4.0 * f64::EPSILON { 1.0 } else { norm };
-        let [w, x, y, z] = [q.w / by, q.x / by, q.y / by, q.z / by];
+        let [w, x, y, z] = q.map(|v| v / by);
         let is_identity = x == 0.0 && y == 0.0 && z == 0.0;
         let rotation = [
             [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -60,10 +56,6 @@ impl Pose {
         let steps = own.into_iter().map(step).collect::<Option<Vec<_>>>();
         let finest = steps.and_then(|steps| steps.into_iter().reduce(f64::min));
         [finest.map_or(Resolution::Double, Resolution::Step); 3]
-    }
-
-    fn identity() -> Self {
-        Self { rotation: None, translation: [0.0; 3] }
     }
 
     /// Moves points, one slice an axis, of equal length.
@@ -104,23 +96,21 @@ impl Pose {
 
     /// What the file declares of a scan's bounds, in the file's coordinates: the moved box, the box around the largest
     /// range, or nothing.
-    pub(super) fn bounds_declared(&self, cloud: &PointCloud) -> Option<Aabb> {
-        let cartesian = cloud.cartesian_bounds.as_ref().and_then(cartesian_box);
-        let bounds = cartesian.or_else(|| cloud.spherical_bounds.as_ref().and_then(range_box))?;
+    pub(super) fn bounds_declared(&self, cloud: &Cloud) -> Option<Aabb> {
+        let bounds = cloud.bounds.and_then(cartesian_box).or_else(|| cloud.range_max.and_then(range_box))?;
         let moved = self.moved(&bounds);
         (!moved.is_empty() && moved.extent().iter().all(|e| e.is_finite())).then_some(moved)
     }
 }
 
-fn cartesian_box(b: &CartesianBounds) -> Option<Aabb> {
-    let bounds = Aabb { min: [b.x_min?, b.y_min?, b.z_min?], max: [b.x_max?, b.y_max?, b.z_max?] };
+fn cartesian_box(ends: [[f64; 2]; 3]) -> Option<Aabb> {
+    let bounds = Aabb { min: ends.map(|[min, _]| min), max: ends.map(|[_, max]| max) };
     // writers without a bound write the largest double
     (!bounds.is_empty() && bounds.extent().iter().all(|e| *e < 1e100)).then_some(bounds)
 }
 
-fn range_box(b: &SphericalBounds) -> Option<Aabb> {
-    let range = b.range_max.filter(|r| (0.0..1e100).contains(r))?;
-    Some(Aabb { min: [-range; 3], max: [range; 3] })
+fn range_box(range: f64) -> Option<Aabb> {
+    (0.0..1e100).contains(&range).then_some(Aabb { min: [-range; 3], max: [range; 3] })
 }
 
 /// Turns range, azimuth and elevation into x, y and z, in place (ASTM E2807 §6.4: azimuth from +x towards +y,
@@ -138,18 +128,9 @@ pub(super) fn spherical_to_cartesian(xyz: [&mut [f64]; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::e57::{Quaternion, Transform, Translation};
 
-    fn pose(q: [f64; 4], t: [f64; 3]) -> (Pose, Option<ScanWarning>) {
-        let cloud = cloud(q, t);
-        Pose::new(&cloud)
-    }
-
-    fn cloud(q: [f64; 4], t: [f64; 3]) -> PointCloud {
-        let mut cloud = PointCloud::default();
-        let rotation = Quaternion { w: q[0], x: q[1], y: q[2], z: q[3] };
-        cloud.transform = Some(Transform { rotation, translation: Translation { x: t[0], y: t[1], z: t[2] } });
-        cloud
+    fn pose(rotation: [f64; 4], translation: [f64; 3]) -> (Pose, Option<ScanWarning>) {
+        Pose::new(Some(Placement { rotation, translation }))
     }
 
     fn moved(pose: &Pose, p: [f64; 3]) -> [f64; 3] {
@@ -184,18 +165,12 @@ mod tests {
     #[test]
     fn declared_bounds_are_moved_with_the_scan() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
-        let mut cloud = cloud([half, 0.0, 0.0, half], [100.0, 0.0, 0.0]);
-        let mut bounds = CartesianBounds::default();
-        (bounds.x_min, bounds.y_min, bounds.z_min) = (Some(0.0), Some(0.0), Some(0.0));
-        (bounds.x_max, bounds.y_max, bounds.z_max) = (Some(1.0), Some(2.0), Some(3.0));
-        cloud.cartesian_bounds = Some(bounds);
-        let b = Pose::new(&cloud).0.bounds_declared(&cloud).unwrap();
+        let (pose, _) = pose([half, 0.0, 0.0, half], [100.0, 0.0, 0.0]);
+        let cloud = |z_max| Cloud { bounds: Some([[0.0, 1.0], [0.0, 2.0], [0.0, z_max]]), ..Cloud::default() };
+        let b = pose.bounds_declared(&cloud(3.0)).unwrap();
         let expected = Aabb { min: [98.0, 0.0, 0.0], max: [100.0, 1.0, 3.0] };
         assert!((0..3).all(|a| (b.min[a] - expected.min[a]).abs() < 1e-9 && (b.max[a] - expected.max[a]).abs() < 1e-9));
-        if let Some(b) = &mut cloud.cartesian_bounds {
-            b.z_max = Some(f64::MAX);
-        }
-        assert_eq!(Pose::new(&cloud).0.bounds_declared(&cloud), None);
+        assert_eq!(pose.bounds_declared(&cloud(f64::MAX)), None);
     }
 
     #[test]

@@ -7,15 +7,23 @@
 //! 3. the usual range ([0, 1], [0, 255] or [0, 65535]) that holds a sample of the values, else what the sample spans;
 //!    then with a warning.
 
-use ::e57::{ColorLimits, IntensityLimits, RecordValue};
-
 use super::fields::{Encoding, Field};
+use super::xml::Limit;
 
-/// `value ↦ (value − low) · factor`, rounded and kept within 0 and 65,535; NaN becomes 0.
+/// `value ↦ (value − low) · factor`, rounded (halves up) and kept within 0 and 65,535; NaN and infinity become 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scaling {
     low: f64,
     factor: f64,
+}
+
+/// What became of a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Scaled {
+    /// It is within the range, or so near that it rounds to its end.
+    Within(u16),
+    /// It is not, and takes the nearest end, or 0 if it is not finite.
+    Outside(u16),
 }
 
 impl Scaling {
@@ -25,37 +33,32 @@ impl Scaling {
     }
 
     #[inline(always)]
-    pub(super) fn apply(self, value: f64) -> u16 {
-        // a cast saturates
-        ((value - self.low) * self.factor + 0.5) as u16
+    pub(super) fn apply(self, value: f64) -> Scaled {
+        let scaled = (value - self.low) * self.factor + 0.5;
+        if (0.0..65_536.0).contains(&scaled) {
+            Scaled::Within(scaled as u16)
+        } else {
+            // a cast saturates
+            Scaled::Outside(if value.is_finite() { scaled as u16 } else { 0 })
+        }
     }
 }
 
-/// The declared range of intensity.
-pub(super) fn intensity(limits: Option<&IntensityLimits>, field: &Field) -> Option<(f64, f64)> {
-    let limits = limits?;
-    range(limits.intensity_min.as_ref(), limits.intensity_max.as_ref(), field)
-}
-
 /// The declared ranges of red, green and blue.
-pub(super) fn colours(limits: Option<&ColorLimits>, fields: [&Field; 3]) -> Option<[(f64, f64); 3]> {
-    let limits = limits?;
-    let red = range(limits.red_min.as_ref(), limits.red_max.as_ref(), fields[0])?;
-    let green = range(limits.green_min.as_ref(), limits.green_max.as_ref(), fields[1])?;
-    Some([red, green, range(limits.blue_min.as_ref(), limits.blue_max.as_ref(), fields[2])?])
+pub(super) fn colours(limits: Option<[[Limit; 2]; 3]>, fields: [&Field; 3]) -> Option<[(f64, f64); 3]> {
+    let [red, green, blue] = limits?;
+    Some([declared(red, fields[0])?, declared(green, fields[1])?, declared(blue, fields[2])?])
 }
 
-/// A range, if the limits make one. A scaled integer limit has the scale of its field.
-fn range(low: Option<&RecordValue>, high: Option<&RecordValue>, field: &Field) -> Option<(f64, f64)> {
-    let meant = |value: &RecordValue| match (value, field.encoding) {
-        (RecordValue::Single(v), _) => f64::from(*v),
-        (RecordValue::Double(v), _) => *v,
-        (RecordValue::ScaledInteger(v), Encoding::Scaled { scale, offset, .. }) => *v as f64 * scale + offset,
-        (RecordValue::ScaledInteger(v) | RecordValue::Integer(v), _) => *v as f64,
+/// A range, if the limits make one.
+pub(super) fn declared(limits: [Limit; 2], field: &Field) -> Option<(f64, f64)> {
+    let meant = |limit: Limit| match (limit, field.encoding) {
+        (Limit::Stored(v), Encoding::Scaled { scale, offset, .. }) => v * scale + offset,
+        (Limit::Stored(v) | Limit::Value(v), _) => v,
     };
-    let range = (meant(low?), meant(high?));
+    let [low, high] = limits.map(meant);
     // writers without limits write 0 and 0, or the ends of their type
-    (range.0 < range.1 && range.0 > -1e30 && range.1 < 1e30).then_some(range)
+    (low < high && low > -1e30 && high < 1e30).then_some((low, high))
 }
 
 /// The union of the ranges, if all fields have one.
@@ -81,12 +84,15 @@ mod tests {
 
     #[test]
     fn ends_and_middle_of_a_range() {
+        use Scaled::{Outside, Within};
         let s = Scaling::new((0.0, 255.0));
-        assert_eq!([0.0, 1.0, 128.0, 255.0].map(|v| s.apply(v)), [0, 257, 32_896, 65_535]);
+        assert_eq!([0.0, 1.0, 128.0, 255.0].map(|v| s.apply(v)), [0, 257, 32_896, 65_535].map(Within));
         let s = Scaling::new((-66.0, 66.0));
-        assert_eq!([-66.0, 0.0, 66.0, 67.0, -1e9, f64::NAN].map(|v| s.apply(v)), [0, 32_768, 65_535, 65_535, 0, 0]);
+        assert_eq!([-66.0, 0.0, 66.0, 66.0005].map(|v| s.apply(v)), [0, 32_768, 65_535, 65_535].map(Within));
+        assert_eq!([67.0, -1e9].map(|v| s.apply(v)), [65_535, 0].map(Outside));
+        assert_eq!([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(|v| s.apply(v)), [Outside(0); 3]);
         let s = Scaling::new((0.0, 65_535.0));
-        assert!((0..=u16::MAX).all(|v| s.apply(f64::from(v)) == v));
+        assert!((0..=u16::MAX).all(|v| s.apply(f64::from(v)) == Within(v)));
     }
 
     #[test]

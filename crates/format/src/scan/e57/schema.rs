@@ -1,11 +1,10 @@
 //! From the prototypes of all scans to one set of columns, and where each scan finds their values.
 
-use ::e57::{PointCloud, Record, RecordName};
-
-use super::fields::{Encoding, Field};
+use super::fields::{Encoding, Field, Name};
 use super::notes::Notes;
 use super::options::E57Options;
 use super::scaling::Scaling;
+use crate::scan::quantities::{NORMALS, quantity};
 use crate::{Attribute, AttributeType, AxisGrid, Resolution, ScanWarning};
 
 /// Columns that a file may have: more is not a scan.
@@ -40,8 +39,8 @@ pub(super) enum Fill {
     Intensity { field: usize, scaling: Scaling, invalid: Option<usize> },
     /// One component of a direction that turns with the scan.
     Normal { fields: [usize; 3], axis: usize },
-    /// As it is; NaN (integers: 0) where the `invalid` field is not 0.
-    Plain { field: usize, invalid: Option<usize> },
+    /// As it is, plus `add`; NaN (integers: 0) where the `invalid` field is not 0.
+    Plain { field: usize, invalid: Option<usize>, add: i64 },
 }
 
 /// The fields of a scan by role.
@@ -65,10 +64,10 @@ impl Roles {
     pub(super) fn new(
         fields: &[Field],
         scan: usize,
-        options: E57Options,
+        options: &E57Options,
         notes: &mut Notes,
     ) -> Result<Self, &'static str> {
-        use RecordName as N;
+        use Name as N;
         let is_text = |i: usize| fields[i].encoding == Encoding::Text;
         let find = |name: N| fields.iter().position(|f| f.name == name).filter(|i| !is_text(*i));
         let triple = |names: [N; 3]| {
@@ -115,7 +114,7 @@ impl Roles {
                 N::TimeStamp => roles.extras.push((i, find(N::IsTimeStampInvalid))),
                 N::ReturnCount | N::ReturnIndex => roles.extras.push((i, None)),
                 N::RowIndex | N::ColumnIndex if options.keep_row_column => roles.extras.push((i, None)),
-                N::Unknown { .. } if roles.normal.is_none_or(|n| !n.contains(&i)) => roles.extras.push((i, None)),
+                N::Other { .. } if roles.normal.is_none_or(|n| !n.contains(&i)) => roles.extras.push((i, None)),
                 N::ColorRed | N::ColorGreen | N::ColorBlue if roles.colour.is_none() => {
                     notes.add(scan, ScanWarning::ColourIncomplete);
                 }
@@ -132,7 +131,7 @@ impl Roles {
             Fill::Zero | Fill::ScanIndex(_) => {}
             Fill::Colour { fields, invalid, .. } => fields.into_iter().chain(invalid).for_each(mark),
             Fill::Normal { fields, .. } => fields.into_iter().for_each(mark),
-            Fill::Intensity { field, invalid, .. } | Fill::Plain { field, invalid } => {
+            Fill::Intensity { field, invalid, .. } | Fill::Plain { field, invalid, .. } => {
                 mark(field);
                 invalid.into_iter().for_each(mark);
             }
@@ -168,11 +167,6 @@ impl PositionFields {
         let triples = self.cartesian.into_iter().chain(self.spherical).flatten().flatten();
         triples.chain(self.cartesian_invalid).chain(self.spherical_invalid).for_each(|field| needed[field] = true);
     }
-}
-
-/// The fields of a cloud.
-pub(super) fn fields(cloud: &PointCloud) -> Vec<Field> {
-    cloud.prototype.iter().map(|record: &Record| Field::new(record)).collect()
 }
 
 /// One scan as the schema sees it: its index, fields, their roles, the scaling of colour and intensity.
@@ -225,6 +219,16 @@ impl Kind {
         }
     }
 
+    /// What holds the values plus a small whole number.
+    fn plus(self, add: i64) -> Self {
+        match self {
+            Self::Integer { min, max, scale, offset } => {
+                Self::Integer { min: min.saturating_add(add), max: max.saturating_add(add), scale, offset }
+            }
+            float => float,
+        }
+    }
+
     fn attribute(self, name: String) -> Attribute {
         let ty = match self {
             Self::Integer { min, max, .. } => smallest(min, max),
@@ -236,6 +240,19 @@ impl Kind {
             (attribute.scale, attribute.offset) = (vec![scale], vec![offset]);
         }
         attribute
+    }
+}
+
+/// The name of an extra column: that of its quantity, where others have it, too.
+fn usual_name<'a>(name: &Name, tag: &'a str, ty: AttributeType) -> &'a str {
+    // what the standard has itself, or a part of a normal, is not the quantity if an extension has it
+    let is_usual = |n: &&str| !matches!(*n, "intensity" | "point source id") && !NORMALS.contains(n);
+    match name {
+        Name::ReturnIndex => "return number",
+        Name::ReturnCount => "number of returns",
+        Name::TimeStamp => "timestamp",
+        Name::Other { .. } => quantity(tag, ty).filter(is_usual).unwrap_or(tag),
+        _ => tag,
     }
 }
 
@@ -284,7 +301,7 @@ impl Schema {
     }
 
     fn extras(&mut self, scans: &[ScanFields<'_>]) -> Result<(), String> {
-        let mut columns: Vec<(&RecordName, &str, Kind)> = Vec::new();
+        let mut columns: Vec<(&Name, &str, Kind)> = Vec::new();
         for scan in scans {
             for (i, _) in &scan.roles.extras {
                 let field = &scan.fields[*i];
@@ -302,10 +319,15 @@ impl Schema {
             }
         }
         for (name, tag, kind) in columns {
-            let attribute = kind.attribute(self.free_name(tag));
+            // the index of a return counts from 0, the number of a return from 1
+            let add = i64::from(*name == Name::ReturnIndex);
+            let mut attribute = kind.plus(add).attribute(String::new());
+            let usual = usual_name(name, tag, attribute.ty);
+            let is_free = self.attributes.iter().all(|a| a.name != usual);
+            attribute.name = self.free_name(if is_free { usual } else { tag });
             self.push(attribute, scans, |s| {
                 let extra = s.roles.extras.iter().find(|(i, _)| s.fields[*i].name == *name);
-                extra.map(|(field, invalid)| Fill::Plain { field: *field, invalid: *invalid })
+                extra.map(|(field, invalid)| Fill::Plain { field: *field, invalid: *invalid, add })
             });
         }
         Ok(())

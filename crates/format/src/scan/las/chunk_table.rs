@@ -20,6 +20,29 @@ pub(super) struct Chunk {
     pub(super) bytes: u64,
 }
 
+/// What a chunk table says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Entries {
+    /// In file order. With chunks of a fixed size, each has the most points it can have.
+    pub(super) chunks: Vec<Chunk>,
+    /// Bytes between the first chunk and the table.
+    pub(super) data_bytes: u64,
+}
+
+/// Why a chunk table cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct TableFault {
+    pub(super) why: String,
+    /// The entries, if it has some and they contradict the file.
+    pub(super) entries: Option<Entries>,
+}
+
+impl From<String> for TableFault {
+    fn from(why: String) -> Self {
+        Self { why, entries: None }
+    }
+}
+
 /// What the search for chunks needs to know.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
@@ -51,26 +74,37 @@ impl Layout {
     /// Reads the chunk table. With chunks of a fixed size the last one's `points` is the most it can have.
     ///
     /// # Errors
-    /// Why the table cannot be used, as text; the points may still be whole.
-    pub(super) fn read_table(&self, source: &Source) -> Result<Vec<Chunk>, String> {
+    /// Why the table cannot be used; the points may still be whole.
+    pub(super) fn read_table(&self, source: &Source) -> Result<Vec<Chunk>, TableFault> {
         let table = self.table_offset(source)?;
-        let head: [u8; 8] = source.array_at(table).map_err(|e| e.what())?;
-        let (version, count) = (u32_at(&head, 0), u64::from(u32_at(&head, 4)));
-        let data_bytes = table - self.chunks_start();
-        if version != 0 || count > data_bytes / self.record_len as u64 + EMPTY_CHUNKS {
-            return Err(format!("it declares version {version} and {count} chunks in {data_bytes} bytes of points"));
+        let Entries { mut chunks, data_bytes } = self.read_entries(source, table)?;
+        if let Err(why) = self.check(&chunks, data_bytes) {
+            return Err(TableFault { why, entries: Some(Entries { chunks, data_bytes }) });
         }
-        // an entry is two corrected integers of at most 32 bits and their contexts: 16 bytes are ample
-        let coded = source.vec_at(table + 8, 16 * count + 64).map_err(|e| e.what())?;
-        let mut chunks = catch_panic(|| self.decode_entries(coded, count as usize))
-            .unwrap_or_else(Err)
-            .map_err(|e| format!("it does not decode: {e}"))?;
-        self.check(&chunks, data_bytes)?;
         while chunks.pop_if(|chunk| chunk.points == 0).is_some() {}
         Ok(chunks)
     }
 
-    fn check(&self, chunks: &[Chunk], data_bytes: u64) -> Result<(), String> {
+    /// The entries of the table at byte `table`, whatever they say.
+    pub(super) fn read_entries(&self, source: &Source, table: u64) -> Result<Entries, TableFault> {
+        let head: [u8; 8] = source.array_at(table).map_err(|e| e.what())?;
+        let (version, count) = (u32_at(&head, 0), u64::from(u32_at(&head, 4)));
+        let data_bytes = table - self.chunks_start();
+        if version != 0 || count > data_bytes / self.record_len as u64 + EMPTY_CHUNKS {
+            let why = format!("it declares version {version} and {count} chunks in {data_bytes} bytes of points");
+            return Err(why.into());
+        }
+        // an entry is two corrected integers of at most 32 bits and their contexts: 16 bytes are ample
+        let coded = source.vec_at(table + 8, 16 * count + 64).map_err(|e| e.what())?;
+        let chunks = catch_panic(|| self.decode_entries(coded, count as usize))
+            .unwrap_or_else(Err)
+            .map_err(|e| format!("it does not decode: {e}"))?;
+        Ok(Entries { chunks, data_bytes })
+    }
+
+    /// # Errors
+    /// Why `chunks` cannot be those of `data_bytes` bytes.
+    pub(super) fn check(&self, chunks: &[Chunk], data_bytes: u64) -> Result<(), String> {
         let last = chunks.len().saturating_sub(1);
         for (i, chunk) in chunks.iter().enumerate() {
             let exact = i < last || self.chunk_points.is_none();
@@ -81,11 +115,11 @@ impl Layout {
                 return Err(format!("chunk {i} claims {} points in {} bytes", chunk.points, chunk.bytes));
             }
         }
-        let sum: u64 = chunks.iter().map(|c| c.bytes).sum();
-        if sum != data_bytes {
-            return Err(format!("its chunks have {sum} bytes, the points {data_bytes}"));
+        match chunks.iter().map(|c| c.bytes).sum::<u64>() {
+            sum if sum == data_bytes => Ok(()),
+            0 => Err(format!("it has no entries for {data_bytes} bytes of points")),
+            sum => Err(format!("its chunks have {sum} bytes, the points {data_bytes}")),
         }
-        Ok(())
     }
 
     /// The table's place stands before the points or, if the writer could not go back, in the last 8 bytes.
@@ -100,7 +134,10 @@ impl Layout {
             return Ok(offset);
         }
         let tail: [u8; 8] = source.array_at(source.len().saturating_sub(8)).map_err(|e| e.what())?;
-        fits(i64_at(&tail, 0)).ok_or_else(|| format!("it should be at byte {first} of {}", source.len()))
+        fits(i64_at(&tail, 0)).ok_or_else(|| match first {
+            -1 | 0 => "the file does not say where it is".to_owned(),
+            _ => format!("it should be at byte {first} of {}", source.len()),
+        })
     }
 
     fn decode_entries(&self, coded: Vec<u8>, count: usize) -> Result<Vec<Chunk>, String> {

@@ -106,6 +106,16 @@ pub(super) fn count_points(source: &Source, items: &Vec<LazItem>, at: u64, chunk
     count
 }
 
+/// True if the bytes of one chunk of sequential records hold exactly its points: the last one ends with the bytes.
+pub(super) fn is_exactly(source: &Source, items: &Vec<LazItem>, at: u64, chunk: Chunk) -> bool {
+    let record_len = items.iter().map(|item| usize::from(item.size())).sum();
+    let reader = source.reader(at, at + chunk.bytes);
+    let Ok(mut decompressor) = Decompressor::sequential(items, record_len, reader) else { return false };
+    let mut record = vec![0; record_len];
+    let all = (0..chunk.points).all(|_| decompressor.fill(&mut record).1.is_ok());
+    all && matches!(decompressor.into_inner().read(&mut [0]), Ok(0))
+}
+
 /// The layers that `wanted` needs. Waveform packets are never among them.
 pub(super) fn selection(schema: &Schema, wanted: &Wanted) -> DecompressionSelection {
     use DecompressionSelection as S;

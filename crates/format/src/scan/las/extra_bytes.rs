@@ -1,4 +1,8 @@
-//! The Extra Bytes record: LASF_Spec 4, one descriptor of 192 bytes per attribute (LAS 1.4 R15 §2.6, table 24).
+//! Extra Bytes records: LASF_Spec 4, one descriptor of 192 bytes per attribute (LAS 1.4 R15 §2.6, table 24).
+//!
+//! The specification knows one such record. In the field there are several: each program that adds attributes appends
+//! its own, or a new one for all attributes behind the old one. What they describe can be told from the widths: a point
+//! has a known number of extra bytes.
 
 use super::bytes::{f64_at, i64_at, text, u64_at};
 use super::header::Header;
@@ -6,6 +10,9 @@ use super::records::Records;
 use crate::{Attribute, AttributeType, ScanWarning};
 
 const DESCRIPTOR: usize = 192;
+
+/// Of more records, all are joined without looking for the ones that fit.
+const MAX_CHOICE: usize = 10;
 
 /// A documented attribute behind the standard fields.
 #[derive(Debug)]
@@ -21,14 +28,7 @@ impl ExtraBytes {
     pub(super) fn read_all(header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) -> Vec<Self> {
         let mut at = header.format_len();
         let mut found = Vec::new();
-        if records.kept.iter().filter(|r| r.is("LASF_Spec", 4)).count() > 1 {
-            warnings.push(ScanWarning::ExtraBytesRecords);
-        }
-        let data = records.find("LASF_Spec", 4).map_or(&[][..], |r| &r.data);
-        if !data.len().is_multiple_of(DESCRIPTOR) {
-            warnings.push(ScanWarning::ExtraBytesLength { bytes: data.len(), descriptor: DESCRIPTOR });
-        }
-        for descriptor in data.chunks_exact(DESCRIPTOR) {
+        for descriptor in descriptors(records, header.record_len - at, warnings) {
             let name = text(&descriptor[4..36]);
             let Some(len) = byte_len(descriptor).filter(|len| at + len <= header.record_len) else {
                 let (data_type, record_len) = (descriptor[2], header.record_len);
@@ -46,6 +46,85 @@ impl ExtraBytes {
         }
         found
     }
+}
+
+/// The descriptors of the records that describe the points, in order. `extra`: bytes of a point to describe.
+fn descriptors<'a>(records: &'a Records, extra: usize, warnings: &mut Vec<ScanWarning>) -> Vec<&'a [u8]> {
+    let all: Vec<&[u8]> = records.kept.iter().filter(|r| r.is("LASF_Spec", 4)).map(|r| &r.data[..]).collect();
+    for data in all.iter().filter(|data| !data.len().is_multiple_of(DESCRIPTOR)) {
+        warnings.push(ScanWarning::ExtraBytesLength { bytes: data.len(), descriptor: DESCRIPTOR });
+    }
+    let all: Vec<Table<'a>> = all.into_iter().filter(|data| data.len() >= DESCRIPTOR).map(Table::new).collect();
+    let taken = choose(&all, extra);
+    if all.len() > 1 {
+        let numbers = taken.iter().map(|i| i + 1).collect();
+        let widths = all.iter().map(|table| table.width).collect();
+        warnings.push(ScanWarning::ExtraBytesRecords { widths, taken: numbers, extra });
+    }
+    taken.into_iter().flat_map(|i| all[i].descriptors.iter().copied()).collect()
+}
+
+/// One Extra Bytes record.
+struct Table<'a> {
+    descriptors: Vec<&'a [u8]>,
+    /// Bytes of a point that it describes; beyond all records if one of its types does not exist.
+    width: usize,
+}
+
+impl<'a> Table<'a> {
+    fn new(data: &'a [u8]) -> Self {
+        let descriptors: Vec<&[u8]> = data.chunks_exact(DESCRIPTOR).collect();
+        let widths = descriptors.iter().map(|d| byte_len(d));
+        let width = widths.sum::<Option<usize>>().unwrap_or(usize::from(u16::MAX) + 1);
+        Self { descriptors, width }
+    }
+
+    /// Type, name, scale and offset of each attribute: not its range or description, which programs update.
+    fn layout(&self) -> Vec<(u8, u8, String, &'a [u8])> {
+        const NO_DATA_SCALE_OFFSET: u8 = 0b1_1001;
+        // without a type, the options are a length
+        let options = |d: &[u8]| if d[2] == 0 { d[3] } else { d[3] & NO_DATA_SCALE_OFFSET };
+        self.descriptors.iter().map(|d| (d[2], options(d), text(&d[4..36]), &d[112..160])).collect()
+    }
+
+    fn names(&self) -> impl Iterator<Item = String> {
+        self.descriptors.iter().map(|d| text(&d[4..36]))
+    }
+}
+
+/// Indices of the records to join, in order.
+///
+/// The same record again counts once. Of the rest, those are taken whose widths add up to `extra`; if there are several
+/// such choices, or none, the one that repeats no name, describes the most bytes in the most records, and is the latest.
+fn choose(all: &[Table<'_>], extra: usize) -> Vec<usize> {
+    let is_first = |i: &usize| all[..*i].iter().all(|earlier| earlier.layout() != all[*i].layout());
+    let distinct: Vec<usize> = (0..all.len()).filter(is_first).collect();
+    if distinct.len() > MAX_CHOICE {
+        return distinct;
+    }
+    let every: Vec<usize> = (0..all.len()).collect();
+    let width = |choice: &[usize]| choice.iter().map(|i| all[*i].width).sum::<usize>();
+    let members = |bits: usize| (0..distinct.len()).filter(move |i| bits >> i & 1 == 1);
+    let choices = (1..1usize << distinct.len()).map(|bits| members(bits).map(|i| distinct[i]).collect::<Vec<_>>());
+    let best = choices
+        .filter(|choice| width(choice) <= extra)
+        .max_by_key(|choice| (width(choice) == extra, !repeats_a_name(all, choice), width(choice), choice.len()));
+    match best {
+        Some(best) if width(&best) == extra => best,
+        // two attributes that are described alike
+        _ if width(&every) == extra => every,
+        Some(best) => best,
+        // a single one that is too wide describes its first attributes
+        None => distinct.into_iter().take(1).collect(),
+    }
+}
+
+fn repeats_a_name(all: &[Table<'_>], choice: &[usize]) -> bool {
+    let mut names: Vec<String> = choice.iter().flat_map(|i| all[*i].names()).collect();
+    let there = names.len();
+    names.sort_unstable();
+    names.dedup();
+    names.len() < there
 }
 
 /// Bytes a point: `None` for a type that does not exist.
@@ -132,6 +211,56 @@ mod tests {
         assert_eq!(scalar_type(31), None);
         assert_eq!(byte_len(&descriptor(23, 0, b"")), Some(6));
         assert_eq!(byte_len(&descriptor(0, 7, b"")), Some(7));
+    }
+
+    /// Which of records of these types are taken for points of `extra` bytes; one name per character.
+    fn chosen(records: &[&[(u8, &str)]], extra: usize) -> Vec<usize> {
+        let table = |record: &&[(u8, &str)]| -> Vec<u8> {
+            record.iter().flat_map(|(ty, name)| descriptor(*ty, 0, name.as_bytes())).collect()
+        };
+        let data: Vec<Vec<u8>> = records.iter().map(table).collect();
+        choose(&data.iter().map(|d| Table::new(d)).collect::<Vec<_>>(), extra)
+    }
+
+    #[test]
+    fn records_are_joined_where_their_widths_add_up() {
+        let (a, b, c): (&[_], &[_], &[_]) = (&[(3, "a"), (4, "b")], &[(1, "c")], &[(9, "d"), (5, "e")]);
+        assert_eq!(chosen(&[a, b, c], 13), [0, 1, 2]);
+        assert_eq!(chosen(&[a, a, b], 5), [0, 2], "the same record counts once");
+        assert_eq!(chosen(&[b, b], 2), [0, 1], "unless there are bytes for both");
+        assert_eq!(chosen(&[a, b, c], 12), [0, 2], "those that fit");
+        assert_eq!(chosen(&[a], 100), [0]);
+        assert_eq!(chosen(&[], 4), [0; 0]);
+    }
+
+    #[test]
+    fn a_new_record_for_all_attributes_takes_the_place_of_older_ones() {
+        let (old, new): (&[_], &[_]) = (&[(3, "a"), (4, "b")], &[(3, "a"), (4, "b"), (1, "c")]);
+        assert_eq!(chosen(&[old, new], 5), [1]);
+        assert_eq!(chosen(&[new, old], 5), [0]);
+        // nothing adds up: no name twice, as much as fits
+        assert_eq!(chosen(&[old, new], 8), [1]);
+        assert_eq!(chosen(&[old, new], 4), [0]);
+        assert_eq!(chosen(&[old, new], 3), [0], "its first attributes");
+        let renamed: &[_] = &[(3, "x"), (4, "y")];
+        assert_eq!(chosen(&[old, renamed], 4), [1], "the latest of two that fit");
+        let broken: &[_] = &[(99, "q")];
+        assert_eq!(chosen(&[broken, old], 4), [1]);
+    }
+
+    #[test]
+    fn a_range_that_was_updated_makes_no_other_record() {
+        let old = descriptor(3, 0, b"a");
+        let mut new = old.clone();
+        new[64..72].fill(7);
+        new[160..163].copy_from_slice(b"new");
+        assert_eq!(choose(&[Table::new(&old), Table::new(&new)], 2), [0]);
+    }
+
+    #[test]
+    fn many_records_are_joined_without_a_search() {
+        let many: Vec<Vec<u8>> = (0..40).map(|i| descriptor(1, 0, format!("n{i}").as_bytes())).collect();
+        assert_eq!(choose(&many.iter().map(|d| Table::new(d)).collect::<Vec<_>>(), 7).len(), 40);
     }
 
     #[test]

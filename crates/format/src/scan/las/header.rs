@@ -48,6 +48,14 @@ impl Header {
         RECORD_LEN[usize::from(self.point_format)]
     }
 
+    /// Takes the number of points from elsewhere if the header says that there are none.
+    pub(super) fn take_point_count(&mut self, count: u64, warnings: &mut Vec<ScanWarning>) {
+        if self.point_count == 0 && count > 0 {
+            warnings.push(ScanWarning::CompatibilityCount { count });
+            self.point_count = count;
+        }
+    }
+
     /// Reads and checks the header. What does not keep points from being read becomes a line in `warnings`.
     pub(super) fn read(source: &Source, warnings: &mut Vec<ScanWarning>) -> Result<Self, ReadError> {
         let path = source.path();

@@ -3,6 +3,7 @@
 //! A loop a column, over blocks of records that stay in the first-level cache, with the record length known to the
 //! compiler for the common formats. `examples/las_speed.rs` measures it.
 
+use super::compatible::Recovered;
 use super::schema::{Field, FieldKind};
 use crate::{Column, PointBatch, Positions, Wanted, with_column};
 
@@ -87,6 +88,13 @@ fn fill_column<const LEN: usize>(
     let range = first * elements..(first + points) * elements;
     if let (FieldKind::Bits { shift, mask }, Column::UInt8(out)) = (kind, &mut *column) {
         return gather::<LEN, 1, _>(block, len, at, &mut out[range], |[b]| b >> shift & mask);
+    }
+    if let FieldKind::Recovered(from) = kind {
+        return match column {
+            Column::UInt8(out) => from.fill_bytes(block, len, at, &mut out[range]),
+            Column::Int16(out) => Recovered::fill_angles(block, len, at, &mut out[range]),
+            _ => {}
+        };
     }
     macro_rules! values {
         ($out:ident, $size:literal, $from:expr) => {

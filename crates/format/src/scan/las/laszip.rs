@@ -36,26 +36,41 @@ pub(super) struct LaszipRecord {
     pub(super) items: Vec<LazItem>,
 }
 
+/// Why the points cannot be decompressed, as text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum LaszipFault {
+    /// The record contradicts itself or the header.
+    Broken(String),
+    /// The file may be sound; a codec that this reader does not have would be needed.
+    Unknown(String),
+}
+
 impl LaszipRecord {
     /// # Errors
-    /// What does not fit, as text.
-    pub(super) fn parse(record: &Record, header: &Header) -> Result<Self, String> {
+    /// What does not fit, or is not known.
+    pub(super) fn parse(record: &Record, header: &Header) -> Result<Self, LaszipFault> {
         let data = &record.data;
         let count = usize::from(u16_at(data, 32));
         if data.len() < FIXED + ITEM * count || count == 0 {
-            return Err(format!("the LASzip record has {} bytes and declares {count} items", data.len()));
+            return Err(LaszipFault::Broken(format!(
+                "the LASzip record has {} bytes and declares {count} items",
+                data.len()
+            )));
         }
         let arrangement = match u16_at(data, 0) {
             0 => Arrangement::Plain,
             1 => Arrangement::Pointwise,
             2 => Arrangement::Chunked,
             3 => Arrangement::Layered,
-            other => return Err(format!("LASzip compressor {other} is not known")),
+            other => return Err(LaszipFault::Unknown(format!("LASzip compressor {other} is not known"))),
         };
         if u16_at(data, 2) != 0 {
-            return Err(format!("LASzip coder {} is not known", u16_at(data, 2)));
+            return Err(LaszipFault::Unknown(format!("LASzip coder {} is not known", u16_at(data, 2))));
         }
-        let items = LazVlr::from_buffer(data).map_err(|e| format!("the LASzip record: {e}"))?.items().clone();
+        let items = LazVlr::from_buffer(data)
+            .map_err(|e| LaszipFault::Broken(format!("the LASzip record: {e}")))?
+            .items()
+            .clone();
         check_items(&items, header, arrangement)?;
         // u32::MAX by the specification; 0 is what lascopcindex writes
         let chunk_points = Some(u32_at(data, 12)).filter(|n| *n != 0 && *n != u32::MAX);
@@ -69,11 +84,12 @@ impl LaszipRecord {
 }
 
 /// The items must be those of the point format, in order, each of its usual size and a version that is decoded.
-fn check_items(items: &[LazItem], header: &Header, arrangement: Arrangement) -> Result<(), String> {
+fn check_items(items: &[LazItem], header: &Header, arrangement: Arrangement) -> Result<(), LaszipFault> {
     use LazItemType as I;
     let extra = header.record_len - header.format_len();
     if extra > MAX_EXTRA_BYTES {
-        return Err(format!("{extra} compressed extra bytes per point are more than the {MAX_EXTRA_BYTES} supported"));
+        let what = format!("{extra} compressed extra bytes per point are more than the {MAX_EXTRA_BYTES} supported");
+        return Err(LaszipFault::Unknown(what));
     }
     let n = extra as u16;
     let mut expected = match header.point_format {
@@ -95,21 +111,26 @@ fn check_items(items: &[LazItem], header: &Header, arrangement: Arrangement) -> 
     }
     let found: Vec<I> = items.iter().map(LazItem::item_type).collect();
     if found != expected {
-        return Err(format!(
+        return Err(LaszipFault::Broken(format!(
             "the LASzip items {found:?} are not those of point format {} with records of {} bytes",
             header.point_format, header.record_len
-        ));
+        )));
     }
     if let Some(item) = items.iter().find(|item| item.size() != size(item.item_type())) {
-        return Err(format!("the LASzip item {:?} claims {} bytes", item.item_type(), item.size()));
+        let what = format!("the LASzip item {:?} claims {} bytes", item.item_type(), item.size());
+        return Err(LaszipFault::Broken(what));
     }
     let versions = if layered { 3..=4 } else { 1..=2 };
     let fits = arrangement == Arrangement::Plain || layered == (arrangement == Arrangement::Layered);
     match items.iter().find(|item| !versions.contains(&item.version())) {
         Some(item) if arrangement != Arrangement::Plain => {
-            Err(format!("LASzip item {:?} of version {} is not known", item.item_type(), item.version()))
+            let what = format!("LASzip item {:?} of version {} is not known", item.item_type(), item.version());
+            Err(LaszipFault::Unknown(what))
         }
-        _ if !fits => Err(format!("point format {} cannot be arranged as {arrangement:?}", header.point_format)),
+        _ if !fits => {
+            let what = format!("point format {} cannot be arranged as {arrangement:?}", header.point_format);
+            Err(LaszipFault::Broken(what))
+        }
         _ => Ok(()),
     }
 }

@@ -8,6 +8,9 @@
 //!   where it is larger, the points that are there are read.
 //! * A LAZ file without a usable chunk table is still read: layered chunks (formats 6–10) are found one by one, others
 //!   are decoded in sequence as one piece. COPC files are read as the LAZ files that they are.
+//! * Several Extra Bytes records are joined where their widths add up; points that LASzip stored in its compatibility
+//!   mode (formats 6–10 as 1, 3, 4 or 5) have the fields of the format that they were made from.
+//! * A broken chunk table is mended where the mended one can be proven.
 //! * Waveform packets (formats 4, 5, 9, 10) are not read, all other values of these formats are.
 //!
 //! ```no_run
@@ -31,6 +34,7 @@
 
 mod bytes;
 mod chunk_table;
+mod compatible;
 mod crs;
 mod decode;
 mod decompress;
@@ -40,6 +44,7 @@ mod geotiff;
 mod header;
 mod kernels;
 mod laszip;
+mod mend;
 mod pieces;
 mod records;
 mod schema;
@@ -51,7 +56,7 @@ use crate::{Advice, Fault, Piece, ReadError, Scan, ScanInfo, ScanWarning, Scratc
 use chunk_table::Layout;
 use file::LasScan;
 use header::Header;
-use laszip::{Arrangement, LaszipRecord};
+use laszip::{Arrangement, LaszipFault, LaszipRecord};
 use pieces::Planner;
 use records::Records;
 use schema::Schema;
@@ -71,11 +76,16 @@ impl LasScan {
     fn open(path: &Path) -> Result<Self, ReadError> {
         let source = Source::open(path)?;
         let mut warnings = Vec::new();
-        let header = Header::read(&source, &mut warnings)?;
+        let mut header = Header::read(&source, &mut warnings)?;
         let records = Records::read(&source, &header, &mut warnings)?;
-        let laszip = find_laszip(&source, &header, &records, &mut warnings)?;
         let schema = Schema::new(&header, &records, &mut warnings);
-        let crs = crs::read(&records, header.wkt_counts, &mut warnings);
+        if schema.compatible.is_some() {
+            header.take_point_count(compatible::point_count(&records), &mut warnings);
+        }
+        let laszip = find_laszip(&source, &header, &records, &mut warnings)?;
+        // compatibility mode has cleared the bit: the points were of a format that has WKT alone
+        let wkt_counts = header.wkt_counts || schema.compatible.is_some();
+        let crs = crs::read(&records, wkt_counts, &mut warnings);
         let mut planner = Planner { source: &source, header: &header, records: &records, warnings: &mut warnings };
         let plan = match &laszip {
             Some(laszip) => planner.laz(laszip)?,
@@ -83,12 +93,14 @@ impl LasScan {
         };
         let info = ScanInfo {
             path: path.to_path_buf(),
-            format: format_name(&header, &records, laszip.is_some()),
+            format: format_name(&header, &records, &schema, laszip.is_some()),
             points_declared: header.point_count,
             bounds_declared: header.bounds,
             lattice: header.lattice.is_valid().then_some(header.lattice),
             resolution: Default::default(),
             parts: Vec::new(),
+            images: Vec::new(),
+            rgb_is_16_bit: false,
             attributes: schema.attributes.clone().into(),
             crs,
             file_bytes: source.len(),
@@ -150,15 +162,23 @@ fn find_laszip(
         warnings.push(ScanWarning::LaszipIgnored);
         return Ok(None);
     }
-    let laszip = LaszipRecord::parse(record, header).map_err(|what| broken(record.data_offset, what))?;
+    let laszip = LaszipRecord::parse(record, header).map_err(|fault| match fault {
+        LaszipFault::Broken(what) => broken(record.data_offset, what),
+        LaszipFault::Unknown(what) => ReadError::unsupported(source.path(), what),
+    })?;
     Ok((laszip.arrangement != Arrangement::Plain).then_some(laszip))
 }
 
-fn format_name(header: &Header, records: &Records, compressed: bool) -> String {
+fn format_name(header: &Header, records: &Records, schema: &Schema, compressed: bool) -> String {
     let kind = match (compressed, records.find("copc", 1)) {
         (true, Some(_)) => "COPC, LAZ",
         (true, None) => "LAZ",
         (false, _) => "LAS",
     };
-    format!("{kind} {}.{}, point format {}", header.version.0, header.version.1, header.point_format)
+    let (Header { version, point_format: stored, .. }, compatible) = (header, schema.compatible);
+    let points = match compatible.map(|c| c.point_format(*stored)) {
+        Some(format) => format!("{format}, stored as {stored} in LASzip's compatibility mode"),
+        None => stored.to_string(),
+    };
+    format!("{kind} {}.{}, point format {points}", version.0, version.1)
 }

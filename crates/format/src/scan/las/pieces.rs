@@ -1,12 +1,13 @@
 //! Cutting a file into pieces that decode alone.
 
-use super::chunk_table::{Chunk, Layout};
+use super::chunk_table::{Chunk, Layout, TableFault};
 use super::decompress;
 use super::header::Header;
 use super::laszip::{Arrangement, LaszipRecord};
+use super::mend::{Mended, Mender};
 use super::records::Records;
 use crate::scan::source::Source;
-use crate::{Counted, Piece, ReadError, ScanWarning};
+use crate::{Advice, Counted, Piece, ReadError, ScanWarning};
 
 /// Records of a LAS piece: 1.7 MB of format 3, one batch.
 const LAS_PIECE_POINTS: u64 = 50_000;
@@ -97,10 +98,10 @@ impl Planner<'_> {
     }
 
     fn layered(&mut self, layout: Layout) -> Result<Plan, ReadError> {
-        let table = layout.read_table(self.source).and_then(|chunks| self.verify_layered(layout, chunks));
+        let table = layout.read_table(self.source).and_then(|chunks| Ok(self.verify_layered(layout, chunks)?));
         let chunks = match table {
             Ok(chunks) => chunks,
-            Err(why) => {
+            Err(TableFault { why, .. }) => {
                 let chunks = layout.walk(self.source, self.points_end(), self.header.point_count)?;
                 self.warnings.push(ScanWarning::ChunkTable { why, chunks: Some(chunks.len()) });
                 chunks
@@ -134,11 +135,20 @@ impl Planner<'_> {
     fn chunked(&mut self, layout: Layout, laszip: &LaszipRecord) -> Result<Plan, ReadError> {
         let mut chunks = match layout.read_table(self.source) {
             Ok(chunks) => chunks,
-            Err(why) => {
-                let advice = "decompress and compress it again with LASzip";
+            Err(fault) => {
+                let (source, points, end) = (self.source, self.header.point_count, self.points_end());
+                let mended = Mender { source, layout, laszip, points, end }.mend(&fault);
+                let TableFault { why, .. } = fault;
+                if let Some(Mended { chunks, how }) = mended {
+                    self.warnings.push(ScanWarning::ChunkTableMended { why, how });
+                    return Ok(self.plan(layout, Storage::Chunk, &chunks));
+                }
                 let Some(chunk_points) = layout.chunk_points else {
-                    let what = format!("the chunk table is unusable ({why}) and the chunks differ in size");
-                    return Err(ReadError::broken(self.source.path(), layout.points_start, what).advise(advice));
+                    let what = format!(
+                        "the chunk table is unusable ({why}), and nothing else says where chunks of differing size are"
+                    );
+                    let broken = ReadError::broken(self.source.path(), layout.points_start, what);
+                    return Err(broken.advise(Advice::ExportAgain));
                 };
                 self.warnings.push(ScanWarning::ChunkTable { why, chunks: None });
                 return Ok(self.stream(layout, layout.chunks_start(), Some(chunk_points)));

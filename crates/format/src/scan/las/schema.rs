@@ -1,8 +1,10 @@
 //! Which columns a point format has, and where their bits lie in a record (LAS 1.4 R15 §2.6).
 
+use super::compatible::{Compatible, Recovered};
 use super::extra_bytes::ExtraBytes;
 use super::header::Header;
 use super::records::Records;
+use crate::scan::quantities::{NORMALS, is_normal, normal_axis};
 use crate::{Attribute, AttributeType, ScanWarning};
 
 /// Where the values of a column lie in a record.
@@ -25,6 +27,8 @@ pub(super) enum FieldKind {
     Bits { shift: u8, mask: u8 },
     /// Little-endian values of the attribute's type, `elements` of them side by side.
     Plain,
+    /// Compatibility mode: the sum of an old field and the extra byte or bytes at [`Field::at`].
+    Recovered(Recovered),
 }
 
 /// The part of a layered LAZ chunk that a field comes from.
@@ -49,6 +53,8 @@ pub(super) enum Layer {
 pub(super) struct Schema {
     pub(super) attributes: Vec<Attribute>,
     pub(super) fields: Vec<Field>,
+    /// The points are those of a format 6–10 in LASzip's compatibility mode.
+    pub(super) compatible: Option<Compatible>,
 }
 
 /// Names that an extra-bytes attribute may not take, whatever the point format: what is joined to a cloud later may
@@ -76,17 +82,19 @@ const STANDARD_NAMES: [&str; 17] = [
 impl Schema {
     /// Standard columns first (colour before the rest), then the documented extra bytes.
     pub(super) fn new(header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) -> Self {
-        let mut schema = Self::default();
+        let mut extra = ExtraBytes::read_all(header, records, warnings);
+        let compatible = Compatible::take(header, records, &mut extra, warnings);
+        let mut schema = Self { compatible, ..Self::default() };
         schema.colours(header.point_format);
-        if header.point_format < 6 {
-            schema.legacy(header.point_format);
-        } else {
-            schema.extended();
+        match compatible {
+            Some(places) => schema.compatible(&places),
+            None if header.point_format < 6 => schema.legacy(header.point_format),
+            None => schema.extended(),
         }
         if matches!(header.point_format, 4 | 5 | 9 | 10) {
             warnings.push(ScanWarning::Waveforms { point_format: header.point_format });
         }
-        schema.extra_bytes(header, records, warnings);
+        schema.extra_bytes(extra);
         schema
     }
 
@@ -137,8 +145,29 @@ impl Schema {
         self.bits("edge of flight line", 15, 7, 1, Layer::Flags);
     }
 
-    fn extra_bytes(&mut self, header: &Header, records: &Records, warnings: &mut Vec<ScanWarning>) {
-        for ExtraBytes { mut attribute, at } in ExtraBytes::read_all(header, records, warnings) {
+    /// Formats 6–10 in records of format 1, 3, 4 or 5: the columns of [`Self::extended`].
+    fn compatible(&mut self, places: &Compatible) {
+        use AttributeType::{Float64, Int16, UInt16};
+        if let Some(nir) = places.nir {
+            self.plain("nir", UInt16, 1, nir, Layer::Base);
+        }
+        self.plain("intensity", UInt16, 1, 12, Layer::Base);
+        self.recovered("return number", AttributeType::UInt8, places.returns, Recovered::ReturnNumber);
+        self.recovered("number of returns", AttributeType::UInt8, places.returns, Recovered::NumberOfReturns);
+        self.recovered("classification flags", AttributeType::UInt8, places.flags, Recovered::ClassificationFlags);
+        self.recovered("classification", AttributeType::UInt8, places.class, Recovered::Classification);
+        self.bits("user data", 17, 0, 0xff, Layer::Base);
+        self.recovered("scan angle", Int16, places.scan_angle, Recovered::ScanAngle);
+        self.plain("point source id", UInt16, 1, 18, Layer::Base);
+        self.plain("gps-time", Float64, 1, 20, Layer::Base);
+        self.bits("scanner channel", places.flags, 1, 0b11, Layer::Base);
+        self.bits("scan direction flag", 14, 6, 1, Layer::Base);
+        self.bits("edge of flight line", 14, 7, 1, Layer::Base);
+    }
+
+    fn extra_bytes(&mut self, mut extra: Vec<ExtraBytes>) {
+        name_normals(&mut extra);
+        for ExtraBytes { mut attribute, at } in extra {
             attribute.name = self.free_name(&attribute.name);
             let (elements, kind) = (attribute.elements, FieldKind::Plain);
             self.push(attribute, Field { at, elements, kind, layer: Layer::ExtraBytes });
@@ -161,6 +190,11 @@ impl Schema {
         self.push(Attribute::new(name, AttributeType::UInt8, 1), Field { at, elements: 1, kind, layer });
     }
 
+    fn recovered(&mut self, name: &str, ty: AttributeType, at: usize, from: Recovered) {
+        let kind = FieldKind::Recovered(from);
+        self.push(Attribute::new(name, ty, 1), Field { at, elements: 1, kind, layer: Layer::Base });
+    }
+
     fn plain(&mut self, name: &str, ty: AttributeType, elements: usize, at: usize, layer: Layer) {
         self.push(Attribute::new(name, ty, elements), Field { at, elements, kind: FieldKind::Plain, layer });
     }
@@ -171,9 +205,57 @@ impl Schema {
     }
 }
 
+/// Normals get their usual names, whatever the file calls them: three scalars, or the first triple of that name, which
+/// becomes three scalars. Values, scale and offset stay.
+fn name_normals(found: &mut Vec<ExtraBytes>) {
+    let place = |axis: usize| {
+        let is_it = |e: &ExtraBytes| e.attribute.elements == 1 && normal_axis(&e.attribute.name) == Some(axis);
+        found.iter().position(is_it)
+    };
+    if let (Some(x), Some(y), Some(z)) = (place(0), place(1), place(2)) {
+        for (i, name) in [x, y, z].into_iter().zip(NORMALS) {
+            found[i].attribute.name = name.to_owned();
+        }
+        return;
+    }
+    let is_triple = |e: &ExtraBytes| e.attribute.elements == 3 && is_normal(&e.attribute.name);
+    let Some(i) = found.iter().position(is_triple) else { return };
+    let ExtraBytes { attribute: triple, at } = found.remove(i);
+    for (axis, name) in NORMALS.into_iter().enumerate().rev() {
+        let mut attribute = Attribute::new(name, triple.ty, 1);
+        attribute.description.clone_from(&triple.description);
+        attribute.scale = vec![triple.scale[axis]];
+        attribute.offset = vec![triple.offset[axis]];
+        attribute.no_data = triple.no_data.as_ref().map(|values| vec![values[axis]]);
+        found.insert(i, ExtraBytes { attribute, at: at + axis * triple.ty.size() });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn extra(name: &str, elements: usize, at: usize) -> ExtraBytes {
+        ExtraBytes { attribute: Attribute::new(name, AttributeType::Int16, elements), at }
+    }
+
+    fn places(found: &[ExtraBytes]) -> Vec<(&str, usize)> {
+        found.iter().map(|e| (e.attribute.name.as_str(), e.at)).collect()
+    }
+
+    #[test]
+    fn normals_have_one_set_of_names_and_a_part_of_one_is_none() {
+        let mut found =
+            vec![extra("confidence", 1, 36), extra("normal z", 1, 42), extra("Nx", 1, 38), extra("Ny", 1, 40)];
+        name_normals(&mut found);
+        assert_eq!(places(&found), [("confidence", 36), ("NormalZ", 42), ("NormalX", 38), ("NormalY", 40)]);
+        let mut triple = vec![extra("Normals", 3, 36)];
+        name_normals(&mut triple);
+        assert_eq!(places(&triple), [("NormalX", 36), ("NormalY", 38), ("NormalZ", 40)]);
+        let mut part = vec![extra("nx", 1, 36), extra("ny", 1, 38)];
+        name_normals(&mut part);
+        assert_eq!(places(&part), [("nx", 36), ("ny", 38)]);
+    }
 
     #[test]
     fn a_taken_or_empty_name_gets_a_number() {

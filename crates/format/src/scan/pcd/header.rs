@@ -62,17 +62,26 @@ struct Lines {
     warnings: Vec<ScanWarning>,
 }
 
-/// True if the first bytes of a file say that it is PCD: a line of its header, behind comments.
+/// True if the first bytes of a file say that it is PCD: a line of its header, behind comments. Words in lower case say so
+/// only if others follow: texts may begin with them, too.
 pub fn is_pcd(first_bytes: &[u8]) -> bool {
-    let starts = |line: &[u8], word: &[u8]| line.get(..word.len()).is_some_and(|w| w.eq_ignore_ascii_case(word));
-    if starts(first_bytes.strip_prefix(BOM).unwrap_or(first_bytes), b"# .PCD") {
+    if starts_with(first_bytes.strip_prefix(BOM).unwrap_or(first_bytes), b"# .PCD") {
         return true;
     }
-    let mut lines = header_lines(first_bytes).map(|line| line.text);
-    let first = lines.find(|l| lines::is_filled(l) && !l.starts_with(b"#")).unwrap_or_default().trim_ascii_start();
-    [b"VERSION".as_slice(), b"FIELDS", b"COLUMNS"]
-        .iter()
-        .any(|word| starts(first, word) && matches!(first.get(word.len()), Some(b' ' | b'\t')))
+    let is_of = |line: &[u8], words: &[&[u8]]| {
+        words.iter().any(|word| starts_with(line, word) && matches!(line.get(word.len()), Some(b' ' | b'\t')))
+    };
+    let lines = || header_lines(first_bytes).map(|line| line.text.trim_ascii_start());
+    let first = lines().find(|l| lines::is_filled(l) && !l.starts_with(b"#")).unwrap_or_default();
+    let in_capitals =
+        first.first().is_some_and(u8::is_ascii_uppercase) && first.get(1).is_some_and(u8::is_ascii_uppercase);
+    is_of(first, &[b"VERSION", b"FIELDS", b"COLUMNS"])
+        && (in_capitals || lines().any(|l| is_of(l, &[b"SIZE", b"TYPE", b"POINTS", b"DATA"])))
+}
+
+/// In any case.
+fn starts_with(line: &[u8], word: &[u8]) -> bool {
+    line.get(..word.len()).is_some_and(|w| w.eq_ignore_ascii_case(word))
 }
 
 impl Header {
@@ -230,4 +239,16 @@ fn field_type(size: &str, ty: &str) -> Option<AttributeType> {
         ("F", "8") => AttributeType::Float64,
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_that_begins_with_a_word_of_the_header_is_no_pcd() {
+        assert!(is_pcd(b"# .pcd v.7\n") && is_pcd(b"# made\nVERSION .7\n") && is_pcd(b"FIELDS\tx y z\n"));
+        assert!(is_pcd(b"version .7\rfields x y z\rsize 4 4 4\r"));
+        assert!(!is_pcd(b"Version 2 of this folder\nhas new scans\n") && !is_pcd(b"VERSIONS\n") && !is_pcd(b""));
+    }
 }

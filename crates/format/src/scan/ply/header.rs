@@ -60,11 +60,18 @@ pub(super) struct Header {
     pub(super) warnings: Vec<ScanWarning>,
 }
 
-/// True if the first bytes of a file say that it is PLY; a BOM may stand before.
+/// True if the first bytes of a file say that it is PLY; a BOM may stand before. In capitals the word says so only if
+/// lines of a header follow: texts may begin with it, too.
 pub fn is_ply(first_bytes: &[u8]) -> bool {
     let text = first_bytes.strip_prefix(BOM).unwrap_or(first_bytes);
     let (word, rest) = text.split_at(text.len().min(3));
-    word.eq_ignore_ascii_case(b"ply") && rest.first().is_none_or(|b| *b <= b' ')
+    let goes_on = || {
+        let next = header_lines(text).nth(1).map_or(b"".as_slice(), |line| line.text.trim_ascii());
+        [b"format ".as_slice(), b"comment"]
+            .iter()
+            .any(|w| next.get(..w.len()).is_some_and(|n| n.eq_ignore_ascii_case(w)))
+    };
+    rest.first().is_none_or(|b| *b <= b' ') && (word == b"ply" || word.eq_ignore_ascii_case(b"ply") && goes_on())
 }
 
 impl Header {
@@ -185,4 +192,16 @@ fn scalar_type(name: &str) -> Result<AttributeType, String> {
         "double" | "float64" => AttributeType::Float64,
         _ => return Err(format!("the type {name:?} is not known")),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_that_begins_with_the_word_in_capitals_is_no_ply() {
+        assert!(is_ply(b"ply\n") && is_ply(b"\xef\xbb\xbfply\rformat ascii 1.0\r") && is_ply(b"ply"));
+        assert!(is_ply(b"PLY\r\nFORMAT ascii 1.0\r\n"));
+        assert!(!is_ply(b"Ply and plywood\nin this folder\n") && !is_ply(b"plywood") && !is_ply(b"pl"));
+    }
 }

@@ -1,7 +1,7 @@
 //! Rows written as text to columns.
 
 use super::binary::{Misfit, harmonic_colour, out_of_range, unpack};
-use super::number::{Number, unit_to_u16};
+use super::number::{Number, count_change, unit_to_u16};
 use super::schema::{Field, Rule, Target};
 use crate::{AttributeType, Changes, Column, Element, PointBatch, Positions, Wanted};
 
@@ -76,7 +76,11 @@ impl RowParser<'_> {
             }
             Target::Value { column, element, rule } if self.wanted.is_wanted(column) => {
                 let index = row * self.elements[column] + element;
-                self.value(field.ty, rule, tokens, index, &mut batch.columns[column])?;
+                if let Some(v) = self.value(field.ty, rule, tokens, index, &mut batch.columns[column])? {
+                    let mut changes = Changes::default();
+                    count_change(v, rule == Rule::Unit, &mut changes);
+                    batch.count_changes(column, &changes);
+                }
             }
             Target::Packed { column, alpha } => {
                 let start = tokens.start();
@@ -114,6 +118,7 @@ impl RowParser<'_> {
         Ok(())
     }
 
+    /// Stores the next number; `Some` if its column cannot hold it as it is.
     #[inline]
     fn value(
         &self,
@@ -122,10 +127,13 @@ impl RowParser<'_> {
         tokens: &mut Tokens<'_>,
         index: usize,
         column: &mut Column,
-    ) -> Result<(), String> {
+    ) -> Result<Option<f64>, String> {
         macro_rules! integer {
             ($out:ident, $t:ty) => {{
-                let v = tokens.integer(ty)?;
+                let Some(v) = tokens.integer(ty)? else {
+                    store($out, index, 0);
+                    return Ok(Some(f64::NAN));
+                };
                 store(
                     $out,
                     index,
@@ -136,12 +144,18 @@ impl RowParser<'_> {
         match (rule, column) {
             (_, Column::Float64(out)) => store(out, index, tokens.number()?),
             (_, Column::Float32(out)) => store(out, index, tokens.number()? as f32),
-            (Rule::Unit, Column::UInt16(out)) => store_checked(out, index, tokens.number()?, rule, unit_to_u16)?,
-            (Rule::Shift, Column::UInt16(out)) => {
-                store_checked(out, index, tokens.number()?, rule, |v| (v + 2048.0).as_u16())?;
+            (Rule::Unit, Column::UInt16(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, unit_to_u16);
             }
-            (Rule::Convert, Column::UInt16(out)) => store_checked(out, index, tokens.number()?, rule, f64::as_u16)?,
-            (Rule::Convert, Column::UInt8(out)) => store_checked(out, index, tokens.number()?, rule, f64::as_u8)?,
+            (Rule::Shift, Column::UInt16(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, |v| (v + 2048.0).as_u16());
+            }
+            (Rule::Convert, Column::UInt16(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, f64::as_u16);
+            }
+            (Rule::Convert, Column::UInt8(out)) => {
+                return store_checked(out, index, tokens.number()?, rule, f64::as_u8);
+            }
             (_, Column::Int8(out)) => integer!(out, i8),
             (_, Column::UInt8(out)) => integer!(out, u8),
             (_, Column::Int16(out)) => integer!(out, i16),
@@ -151,7 +165,7 @@ impl RowParser<'_> {
             (_, Column::Int64(out)) => integer!(out, i64),
             (_, Column::UInt64(out)) => integer!(out, u64),
         }
-        Ok(())
+        Ok(None)
     }
 }
 
@@ -176,15 +190,23 @@ fn store<T>(out: &mut [T], index: usize, v: T) {
     }
 }
 
-fn store_checked<T>(
+/// Stores a converted number; `Some` if that is not the number itself.
+fn store_checked<T: Number>(
     out: &mut [T],
     index: usize,
     v: f64,
     rule: Rule,
     convert: impl Fn(f64) -> Option<T>,
-) -> Result<(), String> {
-    store(out, index, convert(v).ok_or_else(|| out_of_range(v, rule))?);
-    Ok(())
+) -> Result<Option<f64>, String> {
+    let stored = convert(v).ok_or_else(|| out_of_range(v, rule))?;
+    store(out, index, stored);
+    let is_kept = match rule {
+        Rule::Unit => (0.0..=1.0).contains(&v),
+        Rule::Harmonic => !v.is_nan(),
+        Rule::Shift => stored.as_f64() - 2048.0 == v,
+        Rule::Keep | Rule::Convert => stored.as_f64() == v,
+    };
+    Ok((!is_kept).then_some(v))
 }
 
 /// Values side by side, if the column is of their type and not omitted.
@@ -235,21 +257,24 @@ impl<'a> Tokens<'a> {
 
     /// The bytes up to the next separator, which is skipped; without quotes.
     pub(crate) fn token(&mut self) -> &'a [u8] {
+        self.ended_token().0
+    }
+
+    /// The same, and false if a strict line goes on without a separator.
+    fn ended_token(&mut self) -> (&'a [u8], bool) {
         let start = self.start();
         let rest = &self.line[start..];
         if rest.first() == Some(&b'"') {
             let len = quoted_len(&rest[1..]);
             self.at = (start + len + 2).min(self.line.len());
-            self.pass_separator();
-            return &rest[1..=len];
+            return (&rest[1..=len], self.pass_separator());
         }
         let len = match self.separator.filter(|_| self.strict) {
             Some(separator) => memchr::memchr(separator, rest).unwrap_or(rest.len()),
             None => rest.iter().position(|b| self.ends_token(*b)).unwrap_or(rest.len()),
         };
         self.at = start + len;
-        self.pass_separator();
-        rest[..len].trim_ascii_end()
+        (rest[..len].trim_ascii_end(), self.pass_separator())
     }
 
     /// False if a strict line goes on without a separator.
@@ -298,24 +323,28 @@ impl<'a> Tokens<'a> {
                 self.at = start;
             }
         }
-        parse(self.token())
+        match self.ended_token() {
+            (token, true) => parse(token),
+            (token, false) => Err(format!("\"{}\" is not followed by a separator", String::from_utf8_lossy(token))),
+        }
     }
 
-    /// The next number as an integer of up to 64 bits; "255.0" is one.
-    fn integer(&mut self, ty: AttributeType) -> Result<i128, String> {
-        if ty.size() < 8 {
-            let v = self.number()?;
-            if v.fract() != 0.0 {
-                return Err(format!("{v} is not an integer"));
+    /// The next number as an integer of up to 64 bits; "255.0" is one. `None`: not a number, or an empty field.
+    fn integer(&mut self, ty: AttributeType) -> Result<Option<i128>, String> {
+        let v = if ty.size() < 8 {
+            self.number()?
+        } else {
+            let token = self.token();
+            if let Some(v) = std::str::from_utf8(token).ok().and_then(|t| t.parse().ok()) {
+                return Ok(Some(v));
             }
-            return Ok(v as i128);
+            parse(token)?
+        };
+        match v {
+            v if v.is_nan() => Ok(None),
+            v if v.fract() != 0.0 => Err(format!("{v} is not an integer")),
+            v => Ok(Some(v as i128)),
         }
-        let token = self.token();
-        if let Some(v) = std::str::from_utf8(token).ok().and_then(|t| t.parse().ok()) {
-            return Ok(v);
-        }
-        let v = parse(token)?;
-        if v.fract() != 0.0 { Err(format!("{v} is not an integer")) } else { Ok(v as i128) }
     }
 }
 
@@ -486,7 +515,7 @@ mod tests {
     #[test]
     fn wide_integers_keep_every_bit() {
         let mut tokens = Tokens::of(b"18446744073709551615 2.0");
-        assert_eq!(tokens.integer(AttributeType::UInt64), Ok(i128::from(u64::MAX)));
-        assert_eq!(tokens.integer(AttributeType::Int64), Ok(2));
+        assert_eq!(tokens.integer(AttributeType::UInt64), Ok(Some(i128::from(u64::MAX))));
+        assert_eq!(tokens.integer(AttributeType::Int64), Ok(Some(2)));
     }
 }

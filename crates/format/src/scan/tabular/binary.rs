@@ -1,8 +1,8 @@
 //! Binary rows to columns, one tight loop for each number of a row.
 
-use super::number::{Endian, Number, unit_to_u16};
+use super::number::{Endian, Number, count_change, unit_to_u16};
 use super::schema::{Field, Rule, Target};
-use crate::{AttributeType, Column, Element, Piece, PointBatch, Positions, Wanted};
+use crate::{AttributeType, Changes, Column, Element, Piece, PointBatch, Positions, Wanted};
 
 /// Points of a piece of binary rows: one batch, some MB.
 pub(crate) const PIECE_POINTS: u64 = 50_000;
@@ -118,10 +118,23 @@ pub(crate) fn field_to_column(
         Target::Value { column, element, rule } => {
             let elements = batch.columns[column].len().checked_div(batch.len()).unwrap_or(1).max(1);
             let place = Place { at: field.at, element, elements, first };
-            let column = &mut batch.columns[column];
-            with_type!(field.ty, T => place.fill::<T, N>(rows, rule, column))
+            let values = &mut batch.columns[column];
+            with_type!(field.ty, T => place.fill::<T, N>(rows, rule, values))?;
+            if is_float(field.ty) && !is_float(values.ty()) && rule != Rule::Harmonic {
+                let mut changes = Changes::default();
+                with_type!(field.ty, T => {
+                    let numbers = rows.numbers::<N>(field.at).map(|bytes| T::read(bytes, rows.endian).as_f64());
+                    numbers.for_each(|v| count_change(v, rule == Rule::Unit, &mut changes));
+                });
+                batch.count_changes(column, &changes);
+            }
+            Ok(())
         }
     }
+}
+
+fn is_float(ty: AttributeType) -> bool {
+    matches!(ty, AttributeType::Float32 | AttributeType::Float64)
 }
 
 /// Where the values of a number go in a column.

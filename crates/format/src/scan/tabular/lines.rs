@@ -1,6 +1,6 @@
 //! Text to pieces: one pass over the newlines, so that every piece knows the number of its first point.
 
-use memchr::{memchr, memchr_iter, memrchr};
+use memchr::{memchr, memchr_iter, memchr2, memrchr};
 
 use crate::scan::source::Source;
 use crate::{Piece, ReadError};
@@ -32,7 +32,8 @@ const END_BYTES: usize = 4 << 10;
 
 /// The last byte of each line: CR where most of the first lines end with it alone (old Macintosh), else LF.
 pub(crate) fn line_end(bytes: &[u8]) -> u8 {
-    let head = &bytes[..bytes.len().min(END_BYTES)];
+    let first = memchr2(b'\r', b'\n', bytes).unwrap_or(0);
+    let head = &bytes[first..bytes.len().min(first + END_BYTES)];
     let is_alone = |at: &usize| head.get(at + 1).is_none_or(|next| *next != b'\n');
     let alone = memchr_iter(b'\r', head).filter(is_alone).count();
     if alone > memchr_iter(b'\n', head).count() { b'\r' } else { b'\n' }

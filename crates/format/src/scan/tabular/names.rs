@@ -1,6 +1,7 @@
 //! What a column is, by its name.
 
 use crate::AttributeType;
+use crate::scan::quantities::{NORMALS, normal_axis, quantity};
 
 /// The meaning of a named number of a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,21 +24,7 @@ pub(crate) enum Role {
     Other(String),
 }
 
-/// Names that have an attribute of LAS as their equal, if the type is the same (PDAL writes these).
-const LAS_NAMES: [(&str, &str, AttributeType); 10] = [
-    ("returnnumber", "return number", AttributeType::UInt8),
-    ("numberofreturns", "number of returns", AttributeType::UInt8),
-    ("scandirectionflag", "scan direction flag", AttributeType::UInt8),
-    ("edgeofflightline", "edge of flight line", AttributeType::UInt8),
-    ("userdata", "user data", AttributeType::UInt8),
-    ("pointsourceid", "point source id", AttributeType::UInt16),
-    ("gpstime", "gps-time", AttributeType::Float64),
-    ("scanchannel", "scanner channel", AttributeType::UInt8),
-    ("infrared", "nir", AttributeType::UInt16),
-    ("nir", "nir", AttributeType::UInt16),
-];
-
-/// The role of a column called `name` (case does not count). CloudCompare's `scalar_*` stay what they are called.
+/// The role of a column called `name` (case does not count).
 pub(crate) fn role(name: &str) -> Role {
     let lower = name.trim().to_ascii_lowercase();
     match lower.as_str() {
@@ -47,29 +34,33 @@ pub(crate) fn role(name: &str) -> Role {
         "red" | "r" | "diffuse_red" => Role::Colour(0),
         "green" | "g" | "diffuse_green" => Role::Colour(1),
         "blue" | "b" | "diffuse_blue" => Role::Colour(2),
-        "nx" | "normal_x" | "normalx" | "normals_x" => Role::Normal(0),
-        "ny" | "normal_y" | "normaly" | "normals_y" => Role::Normal(1),
-        "nz" | "normal_z" | "normalz" | "normals_z" => Role::Normal(2),
-        "intensity" => Role::Intensity,
-        "classification" => Role::Classification,
         "rgb" | "rgba" => Role::PackedColour,
         "f_dc_0" => Role::Harmonic(0),
         "f_dc_1" => Role::Harmonic(1),
         "f_dc_2" => Role::Harmonic(2),
-        _ => Role::Other(name.trim().to_owned()),
+        _ => match (normal_axis(name), quantity(name, AttributeType::UInt16)) {
+            (Some(axis), _) => Role::Normal(axis),
+            (None, Some("intensity")) => Role::Intensity,
+            (None, Some("classification")) => Role::Classification,
+            _ => Role::Other(name.trim().to_owned()),
+        },
     }
 }
 
-/// The name of an attribute without a role.
+/// The name of an attribute without a role: that of its quantity, or its own. A part of a normal is none.
 pub(crate) fn other_name(name: &str, ty: AttributeType) -> &str {
-    let lower = name.to_ascii_lowercase();
-    LAS_NAMES.iter().find(|(theirs, _, t)| *theirs == lower && *t == ty).map_or(name, |(_, ours, _)| ours)
+    quantity(name, ty).filter(|usual| !NORMALS.contains(usual)).unwrap_or(name)
 }
 
-/// The type of the LAS attribute that `name` is another name of.
+/// The type that LAS has for the quantity that `name` is a name of.
 pub(crate) fn las_type(name: &str) -> Option<AttributeType> {
-    let lower = name.to_ascii_lowercase();
-    LAS_NAMES.iter().find(|(theirs, ..)| *theirs == lower).map(|(.., ty)| *ty)
+    use AttributeType::{Float64, UInt8, UInt16};
+    let ty = match quantity(name, Float64)? {
+        "gps-time" | "timestamp" | "scan angle" => Float64,
+        "point source id" | "nir" => UInt16,
+        _ => UInt8,
+    };
+    Some(ty)
 }
 
 #[cfg(test)]
@@ -77,16 +68,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn usual_names_have_roles_and_scalar_fields_keep_theirs() {
+    fn usual_names_have_roles() {
         assert_eq!(role("X"), Role::Axis(0));
         assert_eq!(role("diffuse_blue"), Role::Colour(2));
         assert_eq!(role("normal_z"), Role::Normal(2));
-        assert_eq!(role("scalar_Intensity"), Role::Other("scalar_Intensity".to_owned()));
+        assert_eq!(role("scalar_Intensity"), Role::Intensity);
+        assert_eq!(role("class"), Role::Classification);
+        assert_eq!(role("scalar_Quality"), Role::Other("scalar_Quality".to_owned()));
     }
 
     #[test]
-    fn a_name_of_pdal_becomes_that_of_las_only_with_its_type() {
+    fn a_name_of_pdal_becomes_that_of_las_only_with_its_unit() {
         assert_eq!(other_name("GpsTime", AttributeType::Float64), "gps-time");
         assert_eq!(other_name("GpsTime", AttributeType::Float32), "GpsTime");
+        assert_eq!(other_name("nx", AttributeType::Float32), "nx", "a normal of one component");
+        assert_eq!((las_type("ReturnNumber"), las_type("Quality")), (Some(AttributeType::UInt8), None));
     }
 }

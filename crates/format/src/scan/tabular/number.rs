@@ -1,5 +1,7 @@
 //! Numbers as bytes.
 
+use crate::Changes;
+
 /// Which byte of a number comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Endian {
@@ -100,6 +102,20 @@ pub(crate) fn unit_to_u16(v: f64) -> Option<u16> {
     (v.is_nan() || (-0.001..=1.001).contains(&v)).then(|| (v.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)
 }
 
+/// Counts what becomes of a float that is stored as an integer. `is_unit`: by [`unit_to_u16`], where only the ends of
+/// the range change it.
+pub(crate) fn count_change(v: f64, is_unit: bool, changes: &mut Changes) {
+    if v.is_nan() {
+        changes.not_finite += 1;
+    } else if is_unit {
+        if !(0.0..=1.0).contains(&v) {
+            changes.clamp(v);
+        }
+    } else if (v as i64) as f64 != v {
+        changes.round(v);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,6 +125,17 @@ mod tests {
         assert_eq!(u16::read(&[1, 2], Endian::Little), 0x0201);
         assert_eq!(u16::read(&[1, 2], Endian::Big), 0x0102);
         assert_eq!(f32::read(&[0x3f, 0x80, 0, 0], Endian::Big), 1.0);
+    }
+
+    #[test]
+    fn what_an_integer_cannot_hold_is_counted() {
+        let count = |values: &[f64], is_unit| {
+            let mut changes = Changes::default();
+            values.iter().for_each(|v| count_change(*v, is_unit, &mut changes));
+            (changes.not_finite, changes.rounded, changes.clamped)
+        };
+        assert_eq!(count(&[0.5, 1.0, f64::NAN, 1.0005], true), (1, 0, 1));
+        assert_eq!(count(&[0.5, 1.0, f64::NAN, 255.0], false), (1, 1, 0));
     }
 
     #[test]

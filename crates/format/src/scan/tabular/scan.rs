@@ -154,6 +154,8 @@ impl RowScan {
             lattice: None,
             resolution: [Resolution::Double; 3],
             parts: Vec::new(),
+            images: Vec::new(),
+            rgb_is_16_bit: false,
             attributes: schema.attributes.clone().into(),
             crs: Default::default(),
             file_bytes: source.len(),

@@ -1,6 +1,7 @@
 //! Which number of a row goes to which column.
 
 use super::names::{self, Role, role};
+use crate::scan::quantities::{NORMALS, is_normal};
 use crate::{Attribute, AttributeType, ScanWarning};
 
 /// More numbers in a row than any scan has; a header that says more is refused.
@@ -109,10 +110,14 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// The first unassigned scalar of that role.
+    /// The first unassigned scalar of that role; a scalar field of CloudCompare only if there is no other.
     fn find(&self, role: &Role) -> Option<usize> {
-        let is_it = |(p, t): (&Property, &Vec<Target>)| p.role == *role && p.elements == 1 && !p.list && t.is_empty();
-        self.properties.iter().zip(&self.targets).position(is_it)
+        let is_it = |i: &usize| {
+            let p = &self.properties[*i];
+            p.role == *role && p.elements == 1 && !p.list && self.targets[*i].is_empty()
+        };
+        let is_scalar_field = |i: &usize| self.properties[*i].name.to_ascii_lowercase().starts_with("scalar_");
+        (0..self.properties.len()).filter(is_it).min_by_key(|i| (is_scalar_field(i), *i))
     }
 
     fn find_three(&self, role: fn(usize) -> Role) -> Option<[usize; 3]> {
@@ -169,25 +174,44 @@ impl Builder<'_> {
     }
 
     fn singles(&mut self) {
+        // a type of LAS or a float that holds every value; 64 bits have none
         if let Some(i) = self.find(&Role::Intensity) {
             let ty = match self.properties[i].ty {
                 AttributeType::UInt8 | AttributeType::UInt16 => AttributeType::UInt16,
                 AttributeType::Int8 | AttributeType::Int16 | AttributeType::Float32 => AttributeType::Float32,
+                wide @ (AttributeType::Int64 | AttributeType::UInt64) => wide,
                 _ => AttributeType::Float64,
             };
             self.single(i, "intensity", ty);
         }
         if let Some(i) = self.find(&Role::Classification) {
-            self.single(i, "classification", AttributeType::UInt8);
+            self.single(i, "classification", self.properties[i].ty);
         }
     }
 
     fn normals(&mut self) {
         if let Some(found) = self.find_three(Role::Normal) {
-            for (i, name) in found.into_iter().zip(["NormalX", "NormalY", "NormalZ"]) {
+            for (i, name) in found.into_iter().zip(NORMALS) {
                 self.single(i, name, AttributeType::Float32);
             }
+        } else if let Some(i) = self.whole_normal() {
+            let ty = self.properties[i].ty;
+            let rule = if ty == AttributeType::Float32 { Rule::Keep } else { Rule::Convert };
+            let mut component = |name| {
+                let column = self.add(name, AttributeType::Float32, 1);
+                Target::Value { column, element: 0, rule }
+            };
+            self.targets[i] = NORMALS.map(&mut component).into();
         }
+    }
+
+    /// Three numbers side by side that are called a normal.
+    fn whole_normal(&self) -> Option<usize> {
+        let is_free = |i: &usize| self.targets[*i].is_empty();
+        (0..self.properties.len()).filter(is_free).find(|i| {
+            let Property { name, elements, list, .. } = &self.properties[*i];
+            *elements == 3 && !list && is_normal(name)
+        })
     }
 
     fn rest(&mut self) {
@@ -200,7 +224,10 @@ impl Builder<'_> {
                 self.targets[i] = vec![if *list { Target::List } else { Target::Skip }; *elements];
                 continue;
             }
-            let column = self.add(names::other_name(name, *ty), *ty, *elements);
+            // a quantity that is there twice keeps the second name that the file has for it
+            let usual = Some(names::other_name(name, *ty)).filter(|_| *elements == 1);
+            let usual = usual.filter(|usual| self.schema.attributes.iter().all(|a| a.name != **usual));
+            let column = self.add(usual.unwrap_or(name), *ty, *elements);
             if let Some((colour, harmonics)) = self.harmonics
                 && let Some(element) = harmonics.iter().position(|h| *h == i)
             {
@@ -287,6 +314,25 @@ mod tests {
     fn incomplete_colours_and_taken_names_stay_attributes_of_their_own() {
         let s = schema(&[("x", Float32), ("y", Float32), ("z", Float32), ("red", UInt8), ("a", UInt8), ("a", UInt8)]);
         assert_eq!(names(&s.unwrap()), ["red uint8x1", "a uint8x1", "a 2 uint8x1"]);
+    }
+
+    #[test]
+    fn classes_and_wide_intensities_keep_their_type_and_normals_of_three_numbers_become_three() {
+        let list = [("x", Float32), ("y", Float32), ("class", Int32), ("intensity", AttributeType::UInt64)];
+        let mut properties: Vec<_> = list.iter().map(|(name, ty)| Property::new(name, *ty)).collect();
+        properties.push(Property { elements: 3, ..Property::new("normals", Float64) });
+        let s = Schema::new(&properties, &mut Vec::new()).unwrap();
+        assert_eq!(
+            names(&s).join(", "),
+            "intensity uint64x1, classification int32x1, NormalX floatx1, NormalY floatx1, NormalZ floatx1"
+        );
+        assert_eq!(s.fields[6].target, Target::Value { column: 4, element: 0, rule: Rule::Convert });
+    }
+
+    #[test]
+    fn a_quantity_that_is_there_twice_keeps_its_second_name() {
+        let list = [("x", Float32), ("y", Float32), ("z", Float32), ("ReturnNumber", UInt8), ("return_number", UInt8)];
+        assert_eq!(names(&schema(&list).unwrap()), ["return number uint8x1", "return_number uint8x1"]);
     }
 
     #[test]

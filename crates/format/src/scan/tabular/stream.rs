@@ -211,8 +211,8 @@ mod tests {
         let text = b"9 2 5\r5\n1 2\r\n3 4 5\n\n6 3 0 1 2";
         let (before, points, after) = ([rows(&[false, true], 1)], rows(&[false; 3], 2), [rows(&[true], 1)]);
         let found = index(&source(text), 0, &before, &points, &after).unwrap().unwrap();
-        assert_eq!((found.rows, found.is_whole, found.end), (2, true, 22));
-        assert_eq!(found.pieces, [Piece { first_point: 0, points: 2, byte_offset: 8, byte_len: 14 }]);
+        assert_eq!((found.rows, found.is_whole, found.end), (2, true, 21));
+        assert_eq!(found.pieces, [Piece { first_point: 0, points: 2, byte_offset: 8, byte_len: 13 }]);
         let more = rows(&[false; 3], 3);
         let found = index(&source(text), 0, &before, &more, &after).unwrap().unwrap();
         assert_eq!((found.rows, found.is_whole), (3, false));

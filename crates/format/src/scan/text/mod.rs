@@ -19,7 +19,7 @@
 //! **Values**: positions are doubles. Colours are "rgb" of `uint16`, as they are (rounded) or, where no sample is
 //! above 1 and one is no whole number, 0–1 as 0–65535. Intensity is `uint16` if all samples are whole numbers of
 //! 0–65535, else `float`. In PTS whole numbers of −2048…2047 become 0–4095 if one is negative. Classification is
-//! `uint8`, everything else `double`, or what the name says after a colon (`quality:uint8`, Potree's type names). A
+//! `uint8`, or the least of `int16` and `int32` that holds all samples, everything else `double`, or what the name says after a colon (`quality:uint8`, Potree's type names). A
 //! later row that does not fit is an error, never a guess.
 //!
 //! **PTS**: lines with one whole number are counts (a file may have several). **PTX**: the matrix of each scan is applied

@@ -106,9 +106,7 @@ fn doubt(columns: &mut [Column], ranges: &[ColumnRange], warnings: &mut Vec<Scan
     let is_none = |i: usize| ranges[i] == ColumnRange::EMPTY;
     let colours = of_role(columns, |role| matches!(role, Role::Colour(_)));
     let no_colours = colours.iter().any(|i| !is_none(*i) && !ranges[*i].is_in(0.0, 65535.0));
-    let classes = of_role(columns, |role| *role == Role::Classification);
-    let no_class = |i: &usize| !is_none(*i) && !ranges[*i].is_integer_in(0.0, 255.0);
-    let doubtful = colours.into_iter().filter(|_| no_colours).chain(classes.into_iter().filter(no_class));
+    let doubtful = colours.into_iter().filter(|_| no_colours);
     for i in doubtful.filter(|i| columns[*i].ty.is_none()).collect::<Vec<_>>() {
         let column = &mut columns[i];
         warnings.push(ScanWarning::ColumnUnusual { number: i + 1, name: column.name.clone() });
@@ -132,7 +130,7 @@ fn value_type(column: &Column, range: &ColumnRange, unit_colours: bool) -> Attri
         Role::Colour(_) | Role::Normal(_) => AttributeType::Float32,
         Role::Intensity if range.is_integer_in(0.0, 65535.0) => AttributeType::UInt16,
         Role::Intensity => AttributeType::Float32,
-        Role::Classification => AttributeType::UInt8,
+        Role::Classification => class_type(range),
         Role::Other(name) => {
             let fits = |ty: &AttributeType| match ty {
                 AttributeType::UInt8 => range.is_integer_in(0.0, 255.0),
@@ -142,6 +140,16 @@ fn value_type(column: &Column, range: &ColumnRange, unit_colours: bool) -> Attri
             las_type(name).filter(fits).unwrap_or(AttributeType::Float64)
         }
         Role::Axis(_) | Role::Harmonic(_) | Role::PackedColour | Role::Padding => AttributeType::Float64,
+    }
+}
+
+/// The least type of LAS or else of whole numbers that holds the sampled classes.
+fn class_type(range: &ColumnRange) -> AttributeType {
+    match range {
+        r if r.is_integer_in(0.0, 255.0) => AttributeType::UInt8,
+        r if r.is_integer_in(-32_768.0, 32_767.0) => AttributeType::Int16,
+        r if r.is_integer_in(-2_147_483_648.0, 2_147_483_647.0) => AttributeType::Int32,
+        _ => AttributeType::Float64,
     }
 }
 

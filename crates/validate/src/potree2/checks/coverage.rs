@@ -8,12 +8,18 @@ use serde_json::json;
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
+use crate::potree2::checks::spacing::Sampling;
 use crate::potree2::expect::Geometry;
 use crate::potree2::grid::{Grid, square};
 use crate::potree2::quality::Tally;
 
-/// How far a point may be from the nearest one drawn, in spacings of the level; one lattice step is allowed on top.
-pub(crate) const LIMIT: f64 = 2.0;
+/// How far a point may be from the nearest one drawn at any level above it, in spacings of that level; one lattice step is
+/// allowed on top where nothing more precise is promised.
+const LIMIT: f64 = 2.0;
+
+/// How far a point may be from the sample of the node above it where the dataset promises a maximal Poisson-disk sample,
+/// in spacings.
+const SAMPLED: f64 = 1.00004;
 
 /// Holes are measured up to this many spacings; wider ones count as this.
 pub(crate) const REACH: f64 = 4.0;
@@ -23,28 +29,50 @@ pub(crate) fn cell_side(geometry: &Geometry, level: u8) -> f64 {
     LIMIT * geometry.spacing_at(level) + geometry.step()
 }
 
-/// Checks the points of node `key` against what is drawn at `level` (coarser than the node): `drawn` holds the points
-/// of levels up to it, within [`REACH`] spacings around the node's ancestor.
+/// How far a point of a node of level `of` may be from the nearest one drawn at `level`, which is coarser, world units.
+///
+/// A point that a sample omitted is near one that it took; of that one's place in the sample above the same is true. So
+/// the distances of a point to ever coarser levels are sums of spacings, each twice the one before.
+pub(crate) fn limit(geometry: &Geometry, sampling: Sampling, level: u8, of: u8) -> f64 {
+    let most = cell_side(geometry, level);
+    if sampling != Sampling::Poisson {
+        return most;
+    }
+    let steps = f64::from(of.saturating_sub(level));
+    let spacings = 2.0 - (1.0 - steps).exp2();
+    (SAMPLED * spacings * geometry.spacing_at(level) + steps * geometry.sampling_slack()).min(most)
+}
+
+/// What is drawn at a level.
+pub(crate) struct Drawn<'a> {
+    pub(crate) level: u8,
+    /// See [`limit`], world units.
+    pub(crate) limit: f64,
+    /// The points of levels up to it, within [`REACH`] spacings around an ancestor of the node that is checked.
+    pub(crate) grid: &'a Grid,
+}
+
+/// Checks the points of node `key` against what is drawn at a level coarser than the node.
 pub(crate) fn check(
     key: NodeKey,
     positions: &[[i32; 3]],
-    level: u8,
-    drawn: &Grid,
+    drawn: &Drawn<'_>,
     geometry: &Geometry,
     tally: &Tally,
     findings: &Findings,
 ) {
+    let Drawn { level, limit, grid } = *drawn;
     findings.checked(Check::Coverage, positions.len() as u64);
     let spacing = geometry.spacing_at(level);
-    let limit_squared = square(cell_side(geometry, level));
+    let limit_squared = square(limit);
     let mut widest = tally.hole_squared();
     let (mut uncovered, mut worst) = (0, 0.0);
     for &position in positions {
         // Points nearer than the widest hole so far change nothing; most are settled by the first site looked at.
-        if drawn.any_within(position, widest.min(limit_squared)) {
+        if grid.any_within(position, widest.min(limit_squared)) {
             continue;
         }
-        let distance = drawn.nearest_squared(position, 2).min(square(REACH * spacing));
+        let distance = grid.nearest_squared(position, 2).min(square(REACH * spacing));
         widest = widest.max(distance);
         if distance > limit_squared {
             uncovered += 1;
@@ -54,7 +82,7 @@ pub(crate) fn check(
     tally.widen_hole(widest);
     if uncovered > 0 {
         let subject = format!("distance to the nearest point drawn at levels up to {level}");
-        let expected = json!(LIMIT * spacing);
+        let expected = json!(limit);
         let finding = Finding::new(Check::Coverage, subject, expected, json!(worst.sqrt()));
         findings.push(finding.at(key).points(uncovered));
     }

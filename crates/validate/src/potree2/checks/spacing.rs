@@ -12,7 +12,7 @@ use crate::potree2::quality::Tally;
 /// How inner nodes are sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sampling {
-    /// No two points of a node closer than the spacing of its level, less one lattice step.
+    /// No two points of a node closer than the spacing of its level.
     Poisson,
     /// At most one point in each cell of the node's 128³ grid (grid and random sampling).
     Cells,
@@ -34,11 +34,28 @@ impl Sampling {
 /// How far the nearest neighbour inside the node is looked for, in cells of two spacings.
 const RINGS: i32 = 4;
 
+impl Sampling {
+    /// The square of the least distance that two points of an inner node may have. A dataset that does not state its rule
+    /// may have compared rounded positions: a lattice step less.
+    fn allowed_squared(self, spacing: f64, geometry: &Geometry) -> f64 {
+        let slack = if self == Self::Unknown { geometry.step() } else { geometry.sampling_slack() };
+        // squares of doubles are off by a few of their last bits
+        square((spacing - slack).max(0.0)) * (1.0 - 1e-12)
+    }
+}
+
 /// Measures the nearest neighbour of each point of an inner node, within the node and across its borders, and reports
 /// pairs closer than the spacing.
-pub(crate) fn pairs(key: NodeKey, grid: &Grid, geometry: &Geometry, tally: &Tally, findings: &Findings) {
+pub(crate) fn pairs(
+    key: NodeKey,
+    grid: &Grid,
+    sampling: Sampling,
+    geometry: &Geometry,
+    tally: &Tally,
+    findings: &Findings,
+) {
     let spacing = geometry.spacing_at(key.level);
-    let allowed_squared = square((spacing - geometry.step()).max(0.0));
+    let allowed_squared = sampling.allowed_squared(spacing, geometry);
     let (mut close, mut closest, mut looked_at) = (0, f64::INFINITY, 0);
     let mut node = crate::potree2::quality::NodeFigures::default();
     for (i, _) in grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own) {

@@ -1,0 +1,77 @@
+//! A scan that is decoded by another one and moved.
+
+use std::ops::ControlFlow;
+
+use super::directions::Directions;
+use super::info;
+use super::map::{ScanMap, ScanMaps};
+use super::positions::PositionMap;
+use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
+
+/// The scan with its points where `maps` takes them.
+pub(in crate::scan) fn mapped(inner: Box<dyn Scan>, maps: &dyn ScanMaps) -> Result<Box<dyn Scan>, ReadError> {
+    let map = maps.of(&*inner)?;
+    Ok(Box::new(MappedScan::new(inner, map)))
+}
+
+/// A scan that is decoded by another one and moved.
+struct MappedScan {
+    inner: Box<dyn Scan>,
+    info: ScanInfo,
+    positions: PositionMap,
+    /// Columns that turn with the points.
+    directions: Directions,
+}
+
+impl MappedScan {
+    fn new(inner: Box<dyn Scan>, map: ScanMap) -> Self {
+        let directions = Directions::new(inner.info(), &map);
+        let positions = PositionMap::new(inner.info(), &map);
+        let info = info::mapped(&*inner, &map, &positions);
+        Self { inner, info, positions, directions }
+    }
+}
+
+impl Scan for MappedScan {
+    fn info(&self) -> &ScanInfo {
+        &self.info
+    }
+
+    fn pieces(&self) -> &[Piece] {
+        self.inner.pieces()
+    }
+
+    fn decode(
+        &self,
+        piece: usize,
+        wanted: &Wanted,
+        scratch: &mut Scratch,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ReadError> {
+        let needed = self.directions.needed_for(wanted);
+        let mut refused = None;
+        let result = self.inner.decode(piece, &needed, scratch, &mut |batch| {
+            let mut moved: PointBatch = batch.clone();
+            if let Err(point) = self.positions.apply(&mut moved.positions) {
+                refused = Some(batch.first_point + point as u64);
+                return ControlFlow::Break(());
+            }
+            self.directions.apply(&mut moved, wanted);
+            sink(&moved)
+        });
+        match refused {
+            Some(point) => Err(self.no_negative(point)),
+            None => result,
+        }
+    }
+}
+
+impl MappedScan {
+    /// The least integer has no negative one on the same lattice.
+    fn no_negative(&self, point: u64) -> ReadError {
+        let what =
+            format!("point {point} has the coordinate {} on the file's lattice, which cannot be negated", i32::MIN);
+        ReadError::unsupported(&self.info.path, what)
+            .advise("leave the point out, or export the scan with another offset")
+    }
+}

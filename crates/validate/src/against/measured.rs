@@ -1,0 +1,92 @@
+//! What lattice and format do to the positions of the sources, measured while they are compared.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use super::block::Block;
+use super::rules::Rules;
+use crate::accuracy::{Ordered, Side};
+
+/// What was measured.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Measured {
+    /// The lattice against the sources.
+    pub(crate) lattice: Side,
+    /// What is decoded against the lattice, where only the sources tell the integers.
+    pub(crate) format: Option<Side>,
+}
+
+/// A place in the dataset, what a reader decodes there (bits), and the integers that it stands for.
+type Row = (i64, [u64; 3], [i64; 3]);
+
+/// What is measured of the blocks of all files, in any order.
+pub(super) struct Parts<'a> {
+    rules: &'a Rules,
+    by_block: Ordered<(usize, u64), [Side; 2]>,
+    /// Points are gathered to find those that fall together; if they fit into memory.
+    rows: Mutex<Vec<Row>>,
+    counts_merged: bool,
+    moves: AtomicBool,
+}
+
+impl<'a> Parts<'a> {
+    pub(super) fn new(rules: &'a Rules, points: u64, memory_bytes: u64) -> Self {
+        let counts_merged = rules.stored.is_some() && points.saturating_mul(size_of::<Row>() as u64) <= memory_bytes;
+        Self {
+            rules,
+            by_block: Ordered::default(),
+            rows: Mutex::default(),
+            counts_merged,
+            moves: AtomicBool::new(false),
+        }
+    }
+
+    /// Takes in a block of the file `at`.
+    pub(super) fn add(&self, block: &Block, at: usize) {
+        let (mut lattice, mut format) = (Side::default(), Side::default());
+        let mut rows = Vec::new();
+        let moved = &block.moved;
+        for i in (0..block.len()).filter(|i| block.keep[*i]) {
+            let at = |columns: &[Vec<f64>; 3]| columns.each_ref().map(|c| c[i]);
+            lattice.deviation.add(at(&moved.lattice), at(&moved.world));
+            lattice.lost += u64::from(moved.lost[i]);
+            if let (Some(stored), Some(step)) = (&self.rules.stored, moved.steps.get(i)) {
+                let (words, meant) = (block.position(i), self.rules.meant(*step));
+                let decoded = stored.world(words);
+                format.deviation.add([0, 1, 2].map(|a| decoded[a] - meant[a]), meant);
+                let back = [0, 1, 2].map(|a| self.rules.steps(a, decoded[a]));
+                format.lost += u64::from(back != *step);
+                if self.counts_merged {
+                    rows.push((words[0] >> 32, decoded.map(|v| (v + 0.0).to_bits()), *step));
+                }
+            }
+        }
+        if lattice.deviation.max != [0.0; 3] {
+            self.moves.store(true, Relaxed);
+        }
+        self.by_block.put((at, moved.first), [lattice, format]);
+        if let Ok(mut all) = self.rows.lock() {
+            all.append(&mut rows);
+        }
+    }
+
+    pub(super) fn finish(self) -> Measured {
+        let [mut lattice, mut format] = [Side::default(); 2];
+        self.by_block.finish().for_each(|[l, f]| {
+            lattice.merge(&l);
+            format.merge(&f);
+        });
+        // what does not move does not fall together
+        lattice.merged = (!self.moves.into_inner()).then_some(0);
+        let rows = self.rows.into_inner().unwrap_or_default();
+        format.merged = self.counts_merged.then(|| merged(rows));
+        Measured { lattice, format: self.rules.stored.is_some().then_some(format) }
+    }
+}
+
+/// Points that are decoded to the position of another point of the lattice.
+fn merged(mut rows: Vec<Row>) -> u64 {
+    rows.sort_unstable();
+    let places = rows.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+    places.filter(|p| p.first().map(|r| r.2) != p.last().map(|r| r.2)).map(|p| p.len() as u64).sum()
+}
