@@ -100,7 +100,7 @@ impl Search {
     /// A file that was named must be a scan.
     fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
         let kind = kind(path).map_err(|e| Failure::io(path, "reading the input", &e))?;
-        if kind == Kind::NoScan || is_other(path).unwrap_or(false) {
+        if kind == Kind::NoScan || is_other(path, self.options.columns.is_some()).unwrap_or(false) {
             // the readers report why, unless the named columns make it a text scan
             pointmill_format::open_scan(path, &self.options)?;
         }
