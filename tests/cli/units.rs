@@ -79,11 +79,18 @@ fn records_at_odds_are_both_named() {
 fn heights_have_units_of_their_own() {
     let dir = Dir::new();
     dir.write("heights.las", &with_keys(&[[3072, 26914], [4096, 5703], [4099, 9003]], &[]));
+<<<<<<< HEAD
+    let info: Value = serde_json::from_str(&dir.succeed(["info", "heights.las", "--json"]).stdout()).unwrap();
+    assert_eq!(info[0]["crs"]["unit"]["name"], "metre");
+    assert_eq!(info[0]["crs"]["vertical_unit"]["metres"], 1200.0 / 3937.0);
+    assert_eq!(info[0]["crs"]["is_geographic"], false);
+=======
     let all: Value = serde_json::from_str(&dir.succeed(["info", "heights.las", "--json"]).stdout()).unwrap();
     let info = &all[0];
     assert_eq!(info["crs"]["unit"]["name"], "metre");
     assert_eq!(info["crs"]["vertical_unit"]["metres"], 1200.0 / 3937.0);
     assert_eq!(info["crs"]["is_geographic"], false);
+>>>>>>> attrs
 }
 
 #[test]
