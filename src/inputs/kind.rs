@@ -36,12 +36,12 @@ pub(crate) fn kind_in_folder(path: &Path) -> io::Result<Kind> {
 }
 
 /// True for a file that is called like a scan, or has rows of numbers, and is something else: a raster, a well log, a
-/// table, prose under the extension of a text scan.
-pub(crate) fn is_other(path: &Path) -> io::Result<bool> {
+/// table (unless its columns are named), prose under the extension of a text scan.
+pub(crate) fn is_other(path: &Path, columns_named: bool) -> io::Result<bool> {
     let mut first = Vec::new();
     fs::File::open(path)?.take(OTHER_BYTES).read_to_end(&mut first)?;
     let is_text = matches!(ScanKind::of(&first), None | Some(ScanKind::Text(_))) && !ends_with(path, &BINARY_ENDINGS);
-    Ok(OtherKind::of(&first).is_some() || is_text && is_other_text(&first))
+    Ok(OtherKind::of(&first).is_some() || is_text && !columns_named && is_other_text(&first))
 }
 
 fn content(path: &Path) -> io::Result<Option<ScanKind>> {

@@ -59,6 +59,8 @@ fn other_files_of_a_folder_are_skipped_listed_and_counted() {
     dir.validate("out", &["in"]);
     assert!(dir.succeed(["info", "in"]).stderr().contains("3 other files skipped"));
     dir.run(["convert", "in/dem.asc", "-o", "out2"]).failed_with(4, &["dem.asc", "Arc/Info ASCII grid", "a raster"]);
+    dir.write("well.las", b"~Version Information\n VERS. 2.0\n");
+    dir.run(["convert", "well.las", "-o", "out2"]).failed_with(4, &["well.las", "a well log"]);
     dir.run(["convert", "in/weather.csv", "-o", "out2"]).failed_with(3, &["weather.csv", "there is no x"]);
     dir.run(["convert", "in/*.csv", "-o", "out2"]).failed_with(3, &["no scan found", "weather.csv"]);
 }
