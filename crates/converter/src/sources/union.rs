@@ -305,7 +305,7 @@ mod tests {
         let times = vec![Attribute::new("timestamp", T::Float64, 1), Attribute::new("time", T::Float32, 1)];
         assert_eq!(shown(&union(&[times.clone()])), "timestamp doublex1, time floatx1");
         let other = vec![Attribute::new("time", T::Float64, 1)];
-        assert_eq!(shown(&union(&[times, other])), "timestamp doublex1, time floatx1");
+        assert_eq!(shown(&union(&[times, other])), "timestamp doublex1, time doublex1");
         let single = vec![Attribute::new("time", T::Float32, 1)];
         assert_eq!(shown(&union(&[single.clone(), single])), "time floatx1");
     }
