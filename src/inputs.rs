@@ -129,7 +129,7 @@ impl Search {
                         self.add_met_file(path, kind_in_folder);
                     }
                     (Some(path), Some(error)) if is_of_the_system(path, error) => {
-                        self.no_scans.push(path.to_path_buf())
+                        self.no_scans.push(path.to_path_buf());
                     }
                     (Some(path), Some(error)) => return Err(Failure::io(path, "searching the folder", error)),
                     // A link that leads back to a folder above it: what is there is found anyway.

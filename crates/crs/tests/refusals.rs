@@ -17,6 +17,7 @@ fn from_to(from: &str, to: &str) -> Placing {
 }
 
 /// The line of a refusal.
+#[allow(clippy::needless_pass_by_value)] // built in place by callers
 fn refused(points: &str, placing: Placing) -> String {
     let error = match opened(points, placing.clone()) {
         Err(error) => error,

@@ -33,7 +33,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<(), Failure> {
     }
     let mut options = OpenOptions::default();
     options.scans = (!args.scans.is_empty()).then(|| args.scans.clone());
-    scan_choice::check(&[args.file.clone()], &options)?;
+    scan_choice::check(std::slice::from_ref(&args.file), &options)?;
     let scan = open_scan(file, &options)?;
     let info = scan.info();
     if info.parts.is_empty() && ScanKind::of_file(file)? != Some(ScanKind::E57) {

@@ -239,11 +239,11 @@ impl<'a> Worker<'a> {
         let map = &self.pass.maps[source];
         let mut bounds = JobBounds::EMPTY;
         let mut moved = [Moved::By(0.0); 3];
-        for a in 0..3 {
+        for (a, moved) in moved.iter_mut().enumerate() {
             let (q, change) = (&mut self.q.0[a], &mut self.change[a]);
             q.clear();
             change.clear();
-            moved[a] = quantize_axis(map, a, &batch.positions, rows, q, change);
+            *moved = quantize_axis(map, a, &batch.positions, rows, q, change);
             bounds.min[a] = q.iter().copied().min().unwrap_or(i64::MAX);
             bounds.max[a] = q.iter().copied().max().unwrap_or(i64::MIN);
         }

@@ -49,7 +49,7 @@ impl Divisors {
         // the coordinate nearest to the offset of the file
         let steps = ((offset - grid.offset) / (grid.step * tens as f64)).round();
         let step = decimal_multiple(grid.step, tens);
-        (tens > 1).then(|| AxisGrid { step, offset: offset - steps * step })
+        (tens > 1).then_some(AxisGrid { step, offset: offset - steps * step })
     }
 }
 

@@ -123,7 +123,7 @@ fn what_cannot_be_proven_is_refused_with_a_true_sentence() {
     let mut shifted = right.clone();
     shifted[0].1 += 5;
     shifted[1].1 += 5;
-    let mut counts = right.clone();
+    let mut counts = right;
     (counts[1].0, counts[1].1) = (counts[1].0 - 3, counts[1].1 + 40);
     for (table, why) in [(vec![], "it has no entries for"), (shifted, "its chunks have"), (counts, "its chunks have")] {
         let error = read_bytes(&with_table(VARIABLE, &table)).unwrap_err();

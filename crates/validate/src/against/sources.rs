@@ -339,7 +339,7 @@ fn count_deviating(
     is_rgb: bool,
 ) -> u64 {
     let elements = value.len().max(1);
-    let differs = |e: usize, v: f64, constant: f64| !meaning.is(v, e, constant) && !(is_rgb && v * 257.0 == constant);
+    let differs = |e: usize, v: f64, constant: f64| !(meaning.is(v, e, constant) || is_rgb && v * 257.0 == constant);
     with_column!(column, values => {
         let points = values.chunks_exact(elements).skip(start).zip(keep);
         points.filter(|(v, keep)| **keep && v.iter().zip(value).enumerate().any(|(e, (v, c))| differs(e, *v as f64, *c))).count() as u64

@@ -32,8 +32,8 @@ impl Knowledge {
         let mut certain = [Reach::default(); 3];
         for (source, bounds) in sources.all.iter().zip(&bounds) {
             if let Some(lattice) = source.scan.info().lattice {
-                for a in 0..3 {
-                    certain[a].farthest = certain[a].farthest.max(lattice.offset[a].abs());
+                for (reach, offset) in certain.iter_mut().zip(lattice.offset) {
+                    reach.farthest = reach.farthest.max(offset.abs());
                 }
             }
             if bounds.is_empty() {

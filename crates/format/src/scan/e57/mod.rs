@@ -83,6 +83,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
 ///
 /// # Errors
 /// Those of [`open`].
+#[allow(clippy::needless_pass_by_value)] // built in place by callers
 pub fn open_with(path: impl AsRef<Path>, options: E57Options) -> Result<Box<dyn Scan>, ReadError> {
     Ok(Box::new(open::open(path.as_ref(), &options)?))
 }

@@ -11,7 +11,7 @@ use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted}
 /// The scan with its points where `maps` takes them.
 pub(in crate::scan) fn mapped(inner: Box<dyn Scan>, maps: &dyn ScanMaps) -> Result<Box<dyn Scan>, ReadError> {
     let map = maps.of(&*inner)?;
-    Ok(Box::new(MappedScan::new(inner, map)))
+    Ok(Box::new(MappedScan::new(inner, &map)))
 }
 
 /// A scan that is decoded by another one and moved.
@@ -24,10 +24,10 @@ struct MappedScan {
 }
 
 impl MappedScan {
-    fn new(inner: Box<dyn Scan>, map: ScanMap) -> Self {
-        let directions = Directions::new(inner.info(), &map);
-        let positions = PositionMap::new(inner.info(), &map);
-        let info = info::mapped(&*inner, &map, &positions);
+    fn new(inner: Box<dyn Scan>, map: &ScanMap) -> Self {
+        let directions = Directions::new(inner.info(), map);
+        let positions = PositionMap::new(inner.info(), map);
+        let info = info::mapped(&*inner, map, &positions);
         Self { inner, info, positions, directions }
     }
 }

@@ -190,7 +190,7 @@ fn is_titles(line: &[u8], options: &TextOptions) -> bool {
         numbers += usize::from(parse(&field).is_ok());
     });
     let separator = given.or_else(|| usual_separator(line));
-    numbers < 2 && all > numbers || numbers < all && Titles::of_line(line, all, separator).name_x_and_y()
+    numbers < all && (numbers < 2 || Titles::of_line(line, all, separator).name_x_and_y())
 }
 
 /// Titles in these lines above a row: whether they name x and y. `None`: there are none.

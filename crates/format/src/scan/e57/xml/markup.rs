@@ -117,8 +117,8 @@ impl<'a> Markup<'a> {
             return Ok((!self.open.is_empty()).then_some(Event::Text(Cow::Borrowed(&data[..len]))));
         }
         for (start, end) in [("<!--", "-->"), ("<?", "?>")] {
-            if rest.starts_with(start) {
-                let len = rest[start.len()..].find(end).ok_or_else(|| format!("it ends within {start}"))?;
+            if let Some(inside) = rest.strip_prefix(start) {
+                let len = inside.find(end).ok_or_else(|| format!("it ends within {start}"))?;
                 self.at += start.len() + len + end.len();
                 return Ok(None);
             }
