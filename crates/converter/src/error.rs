@@ -328,7 +328,8 @@ impl fmt::Display for InputFault {
             Self::CostlyOutliers { points, step, without, .. } => {
                 let lie = if *points == 1 { "point lies" } else { "or more points lie" };
                 let a = (0..3).fold(0, |a, b| if step[b] / without[b] > step[a] / without[a] { b } else { a });
-                let (axis, step, without) = (["x", "y", "z"][a], step[a], without[a]);
+                let short = |v: f64| if v < 1e-4 { format!("{v:e}") } else { v.to_string() };
+                let (axis, step, without) = (["x", "y", "z"][a], short(step[a]), short(without[a]));
                 write!(
                     f,
                     "{points} {lie} so far from all others that the step of {axis} would be {step}, not {without}, and \

@@ -369,8 +369,9 @@ fn other_files(files: &[PathBuf]) -> String {
 
 /// One number where all axes have the same.
 fn steps(scale: [f64; 3]) -> String {
-    let [x, y, z] = scale;
-    if x == y && y == z { x.to_string() } else { format!("{x}, {y}, {z}") }
+    let short = |v: f64| if v < 1e-4 { format!("{v:e}") } else { v.to_string() };
+    let [x, y, z] = scale.map(short);
+    if x == y && y == z { x } else { format!("{x}, {y}, {z}") }
 }
 
 /// The line of an error of something that was skipped: without the advice to skip it.

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{Aabb, Advice, Lattice, Scratch};
+use pointmill_format::{Aabb, Advice, AxisGrid, Lattice, Scratch};
 
 use super::axis::SourceMap;
 use super::batch::Worker;
@@ -15,7 +15,7 @@ use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFr
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
 use crate::runtime::Runtime;
-use crate::sources::{Source, Sources};
+use crate::sources::{Fineness, Source, Sources};
 use crate::warning::{Warning, reason_of};
 
 /// How a pass over the inputs ended.
@@ -57,7 +57,7 @@ impl<'a> Pass<'a> {
             sources,
             intake,
             maps: sources.all.iter().map(map).collect(),
-            claims: sources.all.iter().map(|s| s.survey.fineness.map(|f| f.is_claim())).collect(),
+            claims: sources.all.iter().map(|s| claims(s, &lattice.lattice)).collect(),
             lattice: lattice.lattice,
             far_cuts: cuts(far_cut),
             cuts: cuts(plan.filter.bounds),
@@ -178,6 +178,15 @@ impl<'a> Pass<'a> {
             Err(error) => Err(error.into()),
         }
     }
+}
+
+/// The axes on which the points of a source have to prove a claim: a lattice that does not hold the claimed grid moves
+/// them anyway.
+fn claims(source: &Source, lattice: &Lattice) -> [bool; 3] {
+    std::array::from_fn(|a| {
+        let job = AxisGrid { step: lattice.scale[a], offset: lattice.offset[a] };
+        matches!(source.survey.fineness[a], Fineness::Grid { grid, is_claim: true } if job.holds(&grid))
+    })
 }
 
 /// True if no coordinate moved by more than the rounding of doubles.

@@ -2,12 +2,18 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{AxisGrid, PointBatch, Positions, Scan, Scratch, Wanted};
+use pointmill_format::{Aabb, AxisGrid, PointBatch, Positions, Scan, ScanInfo, Scratch, Wanted};
 
 use super::decimals::PARTS_OF_EXTENT;
 
 /// Scans that are looked at, evenly spread.
 const SCANS: usize = 16;
+
+/// Scans with more steps than this from end to end may well have finer ones than they need: others are not looked at.
+const MANY_STEPS: f64 = (1 << 22) as f64;
+
+/// Scans with at most this many points are looked at whatever their extent: that costs nothing.
+const FEW_POINTS: u64 = 10_000;
 
 /// Integers of the sample of one scan, on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +34,7 @@ pub(super) struct Divisors(Vec<[Integers; 3]>);
 impl Divisors {
     /// Looks at the first points of some of the scans.
     pub(super) fn of(scans: &[Box<dyn Scan>]) -> Self {
-        let with_lattice: Vec<_> = scans.iter().filter(|s| s.info().lattice.is_some()).collect();
+        let with_lattice: Vec<_> = scans.iter().filter(|s| is_worth_a_look(s.info())).collect();
         let step = with_lattice.len().div_ceil(SCANS).max(1);
         Self(with_lattice.into_iter().step_by(step).filter_map(|s| sample(&**s)).collect())
     }
@@ -51,6 +57,12 @@ impl Divisors {
         let step = decimal_multiple(grid.step, tens);
         (tens > 1).then_some(AxisGrid { step, offset: offset - steps * step })
     }
+}
+
+fn is_worth_a_look(info: &ScanInfo) -> bool {
+    let Some(lattice) = info.lattice else { return false };
+    let many = |b: Aabb| (0..3).any(|a| (b.max[a] - b.min[a]) / lattice.scale[a] > MANY_STEPS);
+    info.points_declared <= FEW_POINTS || info.bounds_declared.is_none_or(many)
 }
 
 /// `step · tens`, without the rounding of the product where a decimal is meant.

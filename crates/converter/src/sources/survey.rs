@@ -45,13 +45,6 @@ pub(crate) enum Fineness {
     Double,
 }
 
-impl Fineness {
-    /// True for a grid that every point has to prove.
-    pub(crate) fn is_claim(self) -> bool {
-        matches!(self, Self::Grid { is_claim: true, .. })
-    }
-}
-
 /// What is known of a source before it is read.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Survey {
@@ -61,7 +54,7 @@ pub(crate) struct Survey {
 }
 
 /// Single precision that divides the longest side of a scan into fewer steps than this is worth a warning.
-const FEW_STEPS: f64 = 65_536.0;
+const FEW_STEPS: f64 = 16_384.0;
 
 impl Survey {
     /// How finely the file stores the coordinates of points within `bounds`, by axis; `None`: as doubles.

@@ -5,8 +5,8 @@ use crate::sources::Schema;
 /// Settings of quantised batches (`docs/formats/batches.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchesSettings {
-    /// Cell of the coarsest level of detail, world units; `None`: the power of two whose occupied cells hold about 64
-    /// points each.
+    /// Cell of the coarsest level of detail, world units; `None`: the power of two that gives about one
+    /// occupied cell for every 64 points.
     pub lod_cell: Option<f64>,
     /// Position planes of ten bits to write, 1 to 3; `None`: those that the scene needs.
     pub planes: Option<u8>,
