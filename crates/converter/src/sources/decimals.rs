@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(step(&[1.0, 20.0]), Some(1.0));
         assert_eq!(step(&[13.404_954_12]), Some(1e-8));
         assert_eq!(step(&[0.1 + 0.2, 1001.0 * 0.001]), Some(0.001), "0.30000000000000004 is a decimal, computed");
-        assert_eq!(step(&[5_432_109.456_789_012_3]), None, "the last digits of a double are none");
+        assert_eq!(step(&[5_432_109.456_789_012]), None, "the last digits of a double are none");
         assert_eq!(step(&[std::f64::consts::PI, 1.0]), None);
         assert_eq!(step(&[f64::from(0.1f32)]), None);
         assert_eq!(step(&[1e18, 0.25]), Some(0.01), "no double of that size has decimals to go by");
