@@ -44,8 +44,12 @@ const MAX_PASSES: usize = 5;
 /// Outliers make the extent at least this many times longer.
 const FAR_OUTSIDE: f64 = 10.0;
 
-/// Fewer steps than this over the extent of a scene are a loss whatever the sources resolve.
+/// Fewer steps than this over the extent of a scene are a loss whatever the sources resolve; with more it has none that
+/// a scene needs.
 const FEWEST_STEPS: f64 = (1 << 20) as f64;
+
+/// The same where the sources are known to resolve more.
+const FEWEST_KNOWN_STEPS: f64 = (1 << 22) as f64;
 
 /// Reads every point once; again only if the headers were wrong about the bounds.
 pub(crate) fn gather<'a>(
@@ -218,8 +222,8 @@ impl Read<'_> {
         let costs = |a: usize| {
             let (step, finer) = (next.lattice.scale[a], without.lattice.scale[a]);
             let is_far = extent[a] * FAR_OUTSIDE <= max[a] - min[a];
-            // an unknown resolution counts as lost where the others keep fewer than 20 bits
-            is_far && step > finer && (losses[a] != Loss::Unknown || step * FEWEST_STEPS > longest)
+            let fewest = if losses[a] == Loss::Unknown { FEWEST_STEPS } else { FEWEST_KNOWN_STEPS };
+            is_far && step > finer && step * fewest > longest
         };
         Ok((self.is_far_out() || (0..3).any(costs)).then_some((far, without)))
     }
