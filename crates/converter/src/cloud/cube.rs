@@ -295,7 +295,7 @@ mod tests {
         let cube = Cube::around(&bounds, &lattice(scale)).unwrap();
         assert_eq!(cube.aligned_shift(0), Some([cube.bits + 3, cube.bits, cube.bits + 4]));
         let side = 2f64.powi(cube.bits as i32) * 2.0;
-        assert!(cube.side == side && side >= 39_800.0 && side <= 4.0 * 39_800.0);
+        assert!(cube.side == side && (39_800.0..=4.0 * 39_800.0).contains(&side));
         let t = cube.tree(bounds.max).0.map(|t| f64::from(t) / 2f64.powi(31) * cube.side);
         for a in 0..3 {
             assert_eq!(t[a], (bounds.max[a] - cube.min[a]) as f64 * scale[a]);

@@ -55,7 +55,7 @@ impl Context<'_> {
         }
         let world = |q: i64| (q as f64 * self.lattice.scale[axis] + self.lattice.offset[axis]).abs();
         let far = world(bounds.min[axis]).max(world(bounds.max[axis])).max(self.lattice.offset[axis].abs());
-        4.0 * ulp(far)
+        8.0 * ulp(far)
     }
 }
 

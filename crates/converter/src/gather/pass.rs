@@ -194,6 +194,6 @@ fn is_rounding(stats: &Stats, lattice: &Lattice) -> bool {
     let (min, max) = (lattice.world(stats.bounds.min.0), lattice.world(stats.bounds.max.0));
     (0..3).all(|a| {
         let far = min[a].abs().max(max[a].abs()).max(lattice.offset[a].abs());
-        stats.change.max[a] <= (4.0 * ulp(far)).max(1e-6 * lattice.scale[a])
+        stats.change.max[a] <= (8.0 * ulp(far)).max(1e-6 * lattice.scale[a])
     })
 }

@@ -24,10 +24,19 @@ const POWERS: [f64; MOST as usize + 1] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7
 impl Decimals {
     /// Takes a finite value into account.
     pub(super) fn see(&mut self, value: f64) {
-        while let Some(decimals) = self.0
-            && !has_at_most(value, decimals)
-        {
-            self.0 = (decimals < MOST).then_some(decimals + 1);
+        let mut has_more = false;
+        while let Some(decimals) = self.0 {
+            match has_at_most(value, decimals) {
+                Some(true) => break,
+                Some(false) => {
+                    has_more = true;
+                    self.0 = (decimals < MOST).then_some(decimals + 1);
+                }
+                // no decimal down to the last digits of the double: noise
+                None if has_more => self.0 = None,
+                // doubles of that size cannot tell
+                None => break,
+            }
         }
     }
 
@@ -41,13 +50,27 @@ impl Decimals {
     }
 }
 
-/// True if `value` is the double nearest to a number with so many decimals (the quotient of two exact numbers is
-/// correctly rounded), or so large that doubles have no more.
-fn has_at_most(value: f64, decimals: u32) -> bool {
+/// Whether `value` is a number with so many decimals, but for what a multiplication and an addition are rounded to (files
+/// whose coordinates were computed from integers); `None` if doubles of that size cannot tell.
+fn has_at_most(value: f64, decimals: u32) -> Option<bool> {
     let power = POWERS[decimals as usize];
     let units = (value * power).round();
-    units.abs() >= 2f64.powi(53) || units / power == value
+    let rounding = 2.0 * f64::EPSILON * value.abs();
+    let roundings = 1.0 / (rounding * power);
+    let error = (units / power - value).abs();
+    match () {
+        () if value.fract() == 0.0 => Some(true),
+        () if roundings > MANY => Some(error <= rounding),
+        () if roundings > SOME => Some(error == 0.0),
+        () => None,
+    }
 }
+
+/// A decimal is more than this many roundings of doubles, or every double would have it.
+const SOME: f64 = 4.0;
+
+/// The same where it may be off by one, or noise would pass for it.
+const MANY: f64 = 1000.0;
 
 #[cfg(test)]
 mod tests {
@@ -64,7 +87,8 @@ mod tests {
         assert_eq!(step(&[345_678.123, -0.5, 5_432_109.456]), Some(0.001));
         assert_eq!(step(&[1.0, 20.0]), Some(1.0));
         assert_eq!(step(&[13.404_954_12]), Some(1e-8));
-        assert_eq!(step(&[0.1 + 0.2]), None, "0.30000000000000004");
+        assert_eq!(step(&[0.1 + 0.2, 1001.0 * 0.001]), Some(0.001), "0.30000000000000004 is a decimal, computed");
+        assert_eq!(step(&[5_432_109.456_789_012]), None, "the last digits of a double are none");
         assert_eq!(step(&[std::f64::consts::PI, 1.0]), None);
         assert_eq!(step(&[f64::from(0.1f32)]), None);
         assert_eq!(step(&[1e18, 0.25]), Some(0.01), "no double of that size has decimals to go by");

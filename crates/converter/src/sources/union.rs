@@ -303,7 +303,7 @@ mod tests {
     #[test]
     fn two_columns_of_a_scan_never_become_one() {
         let times = vec![Attribute::new("timestamp", T::Float64, 1), Attribute::new("time", T::Float32, 1)];
-        assert_eq!(shown(&union(&[times.clone()])), "timestamp doublex1, time floatx1");
+        assert_eq!(shown(&union(std::slice::from_ref(&times))), "timestamp doublex1, time floatx1");
         let other = vec![Attribute::new("time", T::Float64, 1)];
         assert_eq!(shown(&union(&[times, other])), "timestamp doublex1, time doublex1");
         let single = vec![Attribute::new("time", T::Float32, 1)];
