@@ -120,10 +120,12 @@ pub enum InputFault {
         points: u64,
         /// The box of all others, world units.
         others: Aabb,
-        /// The step with them, per axis, world units.
-        step: [f64; 3],
-        /// The step without them.
-        without: [f64; 3],
+        /// The axis that loses most: 0, 1 or 2.
+        axis: usize,
+        /// Its step with them, world units.
+        step: f64,
+        /// Its step without them.
+        without: f64,
     },
     /// A point without a finite position, and the run was asked to fail at it.
     InvalidPosition {
@@ -325,11 +327,11 @@ impl fmt::Display for InputFault {
                 let corner = |c: &[f64; 3]| format!("{:e}, {:e}, {:e}", c[0], c[1], c[2]);
                 write!(f, "there are points from ({}) to ({}), which cannot be coordinates", corner(min), corner(max))
             }
-            Self::CostlyOutliers { points, step, without, .. } => {
+            Self::CostlyOutliers { points, axis, step, without, .. } => {
                 let lie = if *points == 1 { "point lies" } else { "or more points lie" };
-                let a = (0..3).fold(0, |a, b| if step[b] / without[b] > step[a] / without[a] { b } else { a });
                 let short = |v: f64| if v < 1e-4 { format!("{v:e}") } else { v.to_string() };
-                let (axis, step, without) = (["x", "y", "z"][a], short(step[a]), short(without[a]));
+                let axis = ["x", "y", "z"].get(*axis).unwrap_or(&"z");
+                let (step, without) = (short(*step), short(*without));
                 write!(
                     f,
                     "{points} {lie} so far from all others that the step of {axis} would be {step}, not {without}, and \

@@ -305,8 +305,8 @@ impl Warning {
             Self::OtherFiles { files } => other_files(files),
             Self::InputSkipped { error, .. } => format!("input skipped: {error}"),
             Self::PointsSkipped { points, error, .. } => format!("{points} points skipped: {error}"),
-            Self::ReadAgain => "the points lie outside the declared bounds, or their extent does not fit the chosen \
-                                step; reading again with the measured bounds"
+            Self::ReadAgain => "the points lie outside the bounds that were declared or sampled, or their extent does \
+                                not fit the chosen step; reading again with the measured bounds"
                 .to_owned(),
             Self::FinerStep { scale, reason } => format!(
                 "the coordinates are finer than bounds or a sample showed; reading again with the step {}: {reason}",

@@ -29,7 +29,7 @@ pub(crate) use lattice::from_headers;
 
 use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
-use crate::plan::{OriginPoints, Outliers, Plan};
+use crate::plan::{OriginPoints, Outliers, Plan, ScaleChoice};
 use crate::runtime::{Clock, Phase, Runtime};
 use crate::sources::{Fineness, Sources, far_out, intersection};
 use crate::warning::Warning;
@@ -67,6 +67,7 @@ pub(crate) fn gather<'a>(
     let mut far_cut = None;
     for pass in 1..=MAX_PASSES {
         clock.begin(Phase::Read, sources.points_declared);
+        let is_said = warnings.iter().any(|w| matches!(w, Warning::CoarserStep { .. } | Warning::FinerStep { .. }));
         let mut warn = |warning: Warning| {
             rt.warn(&warning);
             warnings.push(warning);
@@ -75,7 +76,10 @@ pub(crate) fn gather<'a>(
             PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
             PassEnd::Misled(stats) => (stats, None),
             PassEnd::Complete(mut gathered) => {
-                gathered.shared_places = places::find(&mut gathered)?;
+                // a step that was requested may put points together that the sources have apart
+                if gathered.is_lossless || !matches!(plan.scale, ScaleChoice::Fixed(_)) {
+                    gathered.shared_places = places::find(&mut gathered)?;
+                }
                 (Box::new(gathered.stats.clone()), Some(gathered))
             }
         };
@@ -106,6 +110,10 @@ pub(crate) fn gather<'a>(
                 hint = Some(stats.bounds);
             }
             (_, Some(gathered)) => {
+                if gathered.lattice.reason.axes.iter().any(|axis| axis.coarser.is_some()) && !is_said {
+                    let (scale, reason) = (gathered.lattice.lattice.scale, gathered.lattice.reason);
+                    warn(Warning::CoarserStep { scale, reason });
+                }
                 finishing_warnings(plan, sources, &gathered).into_iter().for_each(&mut warn);
                 let known = warnings.len() + gathered.stats.warnings.len();
                 let cloud = Cloud::new(plan, sources, intake, *gathered, far_cut, warnings)?;
@@ -176,11 +184,11 @@ impl Read<'_> {
         if plan.outliers == Outliers::Keep {
             return Ok(None);
         }
-        if let Some((far, without)) = self.costly_outliers(plan, sources, rt)? {
+        if let Some((far, without, axis)) = self.costly_outliers(plan, sources, rt)? {
             let (FarPoints { points, others }, step) = (far, self.settled.unwrap_or(self.lattice).lattice.scale);
             if plan.outliers == Outliers::Fail {
-                let without = without.lattice.scale;
-                return Err(InputFault::CostlyOutliers { points, others, step, without }.into());
+                let (step, without) = (step[axis], without.lattice.scale[axis]);
+                return Err(InputFault::CostlyOutliers { points, others, axis, step, without }.into());
             }
             return Ok(Some((others, points, without)));
         }
@@ -192,13 +200,13 @@ impl Read<'_> {
         }))
     }
 
-    /// Points so far from all others that these lose precision, and the lattice without them.
+    /// Points so far from all others that these lose precision, the lattice without them, and the axis that loses most.
     fn costly_outliers(
         &self,
         plan: &Plan,
         sources: &Sources,
         rt: &Runtime<'_>,
-    ) -> Result<Option<(FarPoints, JobLattice)>, ConvertError> {
+    ) -> Result<Option<(FarPoints, JobLattice, usize)>, ConvertError> {
         let next = self.settled.unwrap_or(self.lattice);
         let losses = lattice::losses(plan, sources, self.lattice, next, self.stats);
         let is_crowded = || self.complete.is_some_and(|g| g.cells.iter().any(|c| 2 * c.points > g.stats.points));
@@ -218,14 +226,16 @@ impl Read<'_> {
         let Some(far) = far::find(sources, plan.filter.bounds.as_ref(), enough, rt)? else { return Ok(None) };
         let without = lattice::inside(plan, sources, self.lattice, self.stats, &far.others);
         let (extent, (min, max)) = (far.others.extent(), self.corners());
-        let longest = extent.into_iter().fold(0.0, f64::max);
         let costs = |a: usize| {
             let (step, finer) = (next.lattice.scale[a], without.lattice.scale[a]);
             let is_far = extent[a] * FAR_OUTSIDE <= max[a] - min[a];
             let fewest = if losses[a] == Loss::Unknown { FEWEST_STEPS } else { FEWEST_KNOWN_STEPS };
-            is_far && step > finer && step * fewest > longest
+            is_far && step > finer && step * fewest > extent[a]
         };
-        Ok((self.is_far_out() || (0..3).any(costs)).then_some((far, without)))
+        let gain = |a: &usize| next.lattice.scale[*a] / without.lattice.scale[*a];
+        let axis = (0..3).filter(|a| costs(*a)).max_by(|a, b| gain(a).total_cmp(&gain(b)));
+        let axis = axis.or_else(|| self.is_far_out().then(|| (0..3).max_by(|a, b| gain(a).total_cmp(&gain(b))))?);
+        Ok(axis.map(|axis| (far, without, axis)))
     }
 
     /// The least and the greatest coordinates.

@@ -36,13 +36,18 @@ pub(super) fn find(
     let pieces: Vec<(usize, usize)> = pieces.collect();
     let parts = rt.in_parallel(
         pieces.len(),
-        || (Default::default(), Scratch::default()),
-        |(spreads, scratch), unit| {
+        || (Default::default(), Recent::default(), Scratch::default()),
+        |(spreads, recent, scratch), unit| {
             let (source, piece) = pieces[unit];
-            add_piece(sources, source, piece, cut, scratch, spreads);
+            add_piece(sources, source, piece, cut, scratch, |p| {
+                if recent.is_new(p) {
+                    let spreads: &mut [Spread; 3] = spreads;
+                    spreads.iter_mut().zip(p).for_each(|(spread, v)| spread.add(v));
+                }
+            });
             Ok(())
         },
-        |(spreads, _): ([Spread; 3], Scratch)| spreads,
+        |(spreads, _, _): ([Spread; 3], Recent, Scratch)| spreads,
     )?;
     let mut all: [Spread; 3] = Default::default();
     for part in parts {
@@ -59,6 +64,27 @@ pub(super) fn find(
     Ok((points > 0 && !is_one_place).then(|| FarPoints { points, others: rounded_outwards(&others) }))
 }
 
+/// Places that were seen lately, one for each hash: a mass of points in one place counts about once.
+struct Recent(Vec<[u64; 3]>);
+
+/// Places that are remembered.
+const RECENT: usize = 4096;
+
+impl Default for Recent {
+    fn default() -> Self {
+        Self(vec![[u64::MAX; 3]; RECENT])
+    }
+}
+
+impl Recent {
+    fn is_new(&mut self, p: [f64; 3]) -> bool {
+        let bits = p.map(f64::to_bits);
+        let hash = bits.iter().fold(0u64, |h, b| (h ^ b).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
+        let place = &mut self.0[hash as usize % RECENT];
+        std::mem::replace(place, bits) != bits
+    }
+}
+
 /// Pieces that cannot be decoded were reported when the points were read.
 fn add_piece(
     sources: &Sources,
@@ -66,7 +92,7 @@ fn add_piece(
     piece: usize,
     cut: Option<&Aabb>,
     scratch: &mut Scratch,
-    spreads: &mut [Spread; 3],
+    mut take: impl FnMut([f64; 3]),
 ) {
     let scan = &sources.all[source].scan;
     let wanted = Wanted::positions(scan.info());
@@ -79,7 +105,7 @@ fn add_piece(
                 (Positions::World(w), _) => w[a][i],
             });
             if p.iter().all(|v| v.is_finite()) && cut.is_none_or(|cut| cut.contains(p)) {
-                spreads.iter_mut().zip(p).for_each(|(spread, v)| spread.add(v));
+                take(p);
             }
         }
         ControlFlow::Continue(())

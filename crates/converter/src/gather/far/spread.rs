@@ -43,27 +43,26 @@ impl Spread {
         }
     }
 
-    /// Takes points away from the ends, those beyond the wider gap first, as long as the rest is longer than `enough` and
+    /// Takes away the smaller part beyond the widest gap, again and again, as long as the rest is longer than `enough` and
     /// the gap is a good part of it. More than half of the points always stay.
     pub(super) fn trimmed(&self, enough: f64) -> Option<Trimmed> {
-        let bins: Vec<Bin> = self.0.values().copied().collect();
-        let total: u64 = bins.iter().map(|b| b.points).sum();
-        let (mut first, mut end, mut away) = (0, bins.len(), 0);
-        while end - first > 1 {
-            let extent = bins[end - 1].max - bins[first].min;
-            let gaps = [bins[first + 1].min - bins[first].max, bins[end - 1].min - bins[end - 2].max];
-            let points = [bins[first].points, bins[end - 1].points];
-            // of two bins, parted by one gap, the smaller one
-            let side = usize::from(gaps[1] > gaps[0] || (gaps[1] == gaps[0] && points[1] < points[0]));
-            let points = points[side];
-            if extent <= enough || gaps[side] * GOOD_PART < extent || 2 * (away + points) >= total {
+        let all: Vec<Bin> = self.0.values().copied().collect();
+        let points = |bins: &[Bin]| bins.iter().map(|b| b.points).sum::<u64>();
+        let (mut bins, mut away) = (&all[..], 0);
+        while let [first, .., last] = bins {
+            let extent = last.max - first.min;
+            let gap = |pair: &[Bin]| pair[1].min - pair[0].max;
+            let widest = bins.windows(2).enumerate().max_by(|(_, a), (_, b)| gap(a).total_cmp(&gap(b)));
+            let Some((at, pair)) = widest else { break };
+            let (low, high) = bins.split_at(at + 1);
+            let (few, rest) = if points(low) <= points(high) { (low, high) } else { (high, low) };
+            if extent <= enough || gap(pair) * GOOD_PART < extent || 2 * (away + points(few)) >= points(&all) {
                 break;
             }
-            away += points;
-            if side == 0 { first += 1 } else { end -= 1 }
+            away += points(few);
+            bins = rest;
         }
-        let (min, max) = (bins.get(first)?.min, bins.get(end.checked_sub(1)?)?.max);
-        Some(Trimmed { min, max, points: away })
+        Some(Trimmed { min: bins.first()?.min, max: bins.last()?.max, points: away })
     }
 }
 
@@ -95,6 +94,9 @@ mod tests {
         assert_eq!(trimmed(&[0.0, 1.0, 1e9, 1e9 + 1.0], 1e3), (0.0, 1e9 + 1.0, 0));
         assert_eq!(trimmed(&[-3.0, -2.0, -1e9], 1.0), (-3.0, -2.0, 1));
         assert_eq!(trimmed(&[5.0, 5.0, 5.0, 1e9], 1.0), (5.0, 5.0, 1));
+        let mut near: Vec<f64> = (0..20).map(|i| f64::from(i) / 2.0).collect();
+        near.extend((0..310).map(|i| 1e8 + f64::from(i)));
+        assert_eq!(trimmed(&near, 2e6), (1e8, 1e8 + 309.0, 20), "the smaller part goes, on whichever side");
     }
 
     #[test]
