@@ -158,9 +158,7 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         RgbDepthArg::Eight => RgbDepth::Eight,
         RgbDepthArg::Sixteen => RgbDepth::Sixteen,
     };
-    let placing = &args.inputs.reading.placing;
-    // the datasets are in the system that the points end in
-    plan.crs.clone_from(if placing.reproject.is_some() { &placing.reproject } else { &placing.crs });
+    plan.crs.clone_from(&args.inputs.reading.placing.crs);
     plan.overwrite = args.overwrite;
     if let Some(bytes) = args.memory {
         plan.memory_bytes = bytes;

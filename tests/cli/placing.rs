@@ -203,6 +203,9 @@ fn a_scan_is_reprojected_from_the_system_that_it_declares() {
     assert!((0.001..=0.003_05).contains(&step), "{step}");
     let warnings = report["warnings"].to_string();
     assert!(warnings.contains("nothing says the unit of its heights"), "{warnings}");
+    // the unit of the scan is not that of the dataset, and nobody said that it was
+    assert!(!warnings.contains("declare coordinates in units"), "{warnings}");
+    assert!(metadata["projection"].as_str().unwrap().starts_with("+proj=utm +zone=10"), "{metadata}");
     dir.succeed(["validate", "out", "-q", "--against", path].iter().chain(&args));
 }
 

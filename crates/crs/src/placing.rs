@@ -131,6 +131,10 @@ impl ScanMaps for Placing {
         Ok(map)
     }
 
+    fn target(&self) -> Option<&str> {
+        self.target.as_ref().map(|target| target.definition.as_str())
+    }
+
     fn settings(&self) -> Vec<(&'static str, String)> {
         let mut settings = Vec::new();
         settings.extend(self.units.map(|units| ("units", units.name().to_owned())));

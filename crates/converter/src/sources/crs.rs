@@ -25,7 +25,8 @@ use resolved::{from_code, unzip};
 pub use records::resolve_crs;
 pub use resolved::ResolvedCrs;
 
-/// The coordinate reference system of all inputs together: what the plan says, else what the scans agree on.
+/// The coordinate reference system of all points together: the one that they are reprojected to, else what the plan
+/// says, else what the scans agree on.
 ///
 /// # Errors
 /// A text in the plan that is not a proj4 definition, `EPSG:n` or WKT.
@@ -34,6 +35,11 @@ pub(crate) fn resolve_all(
     sources: &[Source],
     warnings: &mut Vec<Warning>,
 ) -> Result<ResolvedCrs, PlanError> {
+    if let Some(target) = plan.open.maps.as_ref().and_then(|maps| maps.target()) {
+        let target = from_text(target)?;
+        warnings.extend(target.notes.iter().cloned().map(Warning::Crs));
+        return Ok(target);
+    }
     let mut found: Vec<&Crs> = Vec::new();
     for source in sources {
         let crs = &source.scan.info().crs;

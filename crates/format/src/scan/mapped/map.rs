@@ -40,6 +40,12 @@ pub trait ScanMaps: fmt::Debug + Send + Sync {
 
     /// What is requested, for reports: names and values, in the order in which they apply.
     fn settings(&self) -> Vec<(&'static str, String)>;
+
+    /// The coordinate reference system that all points end in (`EPSG:n`, a proj4 definition or WKT), if it is not that of
+    /// their scans.
+    fn target(&self) -> Option<&str> {
+        None
+    }
 }
 
 /// The same map for every scan.
