@@ -329,7 +329,7 @@ impl fmt::Display for InputFault {
             }
             Self::CostlyOutliers { points, axis, step, without, .. } => {
                 let lie = if *points == 1 { "point lies" } else { "or more points lie" };
-                let short = |v: f64| if v < 1e-4 { format!("{v:e}") } else { v.to_string() };
+                let short = |v: f64| if (1e-4..1e9).contains(&v) { v.to_string() } else { format!("{v:e}") };
                 let axis = ["x", "y", "z"].get(*axis).unwrap_or(&"z");
                 let (step, without) = (short(*step), short(*without));
                 write!(

@@ -369,7 +369,7 @@ fn other_files(files: &[PathBuf]) -> String {
 
 /// One number where all axes have the same.
 fn steps(scale: [f64; 3]) -> String {
-    let short = |v: f64| if v < 1e-4 { format!("{v:e}") } else { v.to_string() };
+    let short = |v: f64| if (1e-4..1e9).contains(&v) { v.to_string() } else { format!("{v:e}") };
     let [x, y, z] = scale.map(short);
     if x == y && y == z { x } else { format!("{x}, {y}, {z}") }
 }

@@ -44,7 +44,7 @@ impl Spread {
     }
 
     /// Takes away the smaller part beyond the widest gap, again and again, as long as the rest is longer than `enough` and
-    /// the gap is a good part of it. More than half of the points always stay.
+    /// the gap is a good part of it. Two thirds of the points always stay.
     pub(super) fn trimmed(&self, enough: f64) -> Option<Trimmed> {
         let all: Vec<Bin> = self.0.values().copied().collect();
         let points = |bins: &[Bin]| bins.iter().map(|b| b.points).sum::<u64>();
@@ -56,7 +56,7 @@ impl Spread {
             let Some((at, pair)) = widest else { break };
             let (low, high) = bins.split_at(at + 1);
             let (few, rest) = if points(low) <= points(high) { (low, high) } else { (high, low) };
-            if extent <= enough || gap(pair) * GOOD_PART < extent || 2 * (away + points(few)) >= points(&all) {
+            if extent <= enough || gap(pair) * GOOD_PART < extent || 3 * (away + points(few)) >= points(&all) {
                 break;
             }
             away += points(few);
@@ -92,7 +92,8 @@ mod tests {
     fn what_fits_stays_and_so_does_the_larger_half() {
         assert_eq!(trimmed(&[0.0, 10.0, 500.0, 900.0], 1e3), (0.0, 900.0, 0));
         assert_eq!(trimmed(&[0.0, 1.0, 1e9, 1e9 + 1.0], 1e3), (0.0, 1e9 + 1.0, 0));
-        assert_eq!(trimmed(&[-3.0, -2.0, -1e9], 1.0), (-3.0, -2.0, 1));
+        assert_eq!(trimmed(&[-3.0, -2.0, -1e9], 1.0), (-1e9, -2.0, 0), "a third is no handful");
+        assert_eq!(trimmed(&[-3.0, -2.0, -2.5, -1e9], 1.0), (-3.0, -2.0, 1));
         assert_eq!(trimmed(&[5.0, 5.0, 5.0, 1e9], 1.0), (5.0, 5.0, 1));
         let mut near: Vec<f64> = (0..20).map(|i| f64::from(i) / 2.0).collect();
         near.extend((0..310).map(|i| 1e8 + f64::from(i)));
