@@ -9,6 +9,8 @@ pub(crate) struct Exact {
     times: i128,
     plus: i128,
     parts: i128,
+    /// World units of one.
+    unit: f64,
 }
 
 impl Exact {
@@ -17,7 +19,7 @@ impl Exact {
         let unit = AxisGrid::common(&[source, job])?.step;
         let whole = |length: f64| Some((length / unit).round()).filter(|n| n.abs() < 2f64.powi(62)).map(|n| n as i128);
         let (times, parts) = (whole(source.step)?, whole(job.step)?);
-        (parts > 0).then_some(Self { times, plus: whole(source.offset - job.offset)?, parts })
+        (parts > 0).then_some(Self { times, plus: whole(source.offset - job.offset)?, parts, unit })
     }
 
     /// The nearest integer on the job's lattice.
@@ -31,6 +33,15 @@ impl Exact {
         let is_up = twice > self.parts || (twice == self.parts && below % 2 != 0);
         (below + i128::from(is_up)) as i64
     }
+
+    /// By how much [`Self::nearest`] moves an integer, world units. Doubles far from 0 could not tell.
+    pub(crate) fn change(&self, source: i32) -> f64 {
+        if self.parts == 1 {
+            return 0.0;
+        }
+        let units = i128::from(source) * self.times + self.plus;
+        (i128::from(self.nearest(source)) * self.parts - units) as f64 * self.unit
+    }
 }
 
 #[cfg(test)]
@@ -42,6 +53,7 @@ mod tests {
         let grid = |step, offset| AxisGrid { step, offset };
         let exact = Exact::new(grid(0.001, 0.0), grid(0.002, 0.0)).unwrap();
         assert_eq!([-3, -1, 1, 2, 3, 5].map(|q| exact.nearest(q)), [-2, 0, 0, 1, 2, 2]);
+        assert_eq!([-3, 1, 2].map(|q| exact.change(q)), [-0.001, -0.001, 0.0]);
         let far = Exact::new(grid(0.001, 500_000.0), grid(0.005, 0.0)).unwrap();
         assert_eq!([2, 3, 7].map(|q| far.nearest(q)), [100_000_000, 100_000_001, 100_000_001]);
         assert_eq!(Exact::new(grid(1.0 / 3.0, 0.0), grid(0.1, 0.0)), None);

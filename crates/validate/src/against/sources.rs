@@ -250,11 +250,12 @@ impl Source {
         block: &mut Block,
     ) {
         let lattice = self.scan.info().lattice;
-        let mut take = |i: usize, world: f64, exact: Option<i64>| {
+        let mut take = |i: usize, world: f64, exact: Option<(i64, f64)>| {
             let steps = rules.job_steps(axis, world);
-            let job = exact.unwrap_or(steps.round_ties_even() as i64);
+            let job = exact.map_or(steps.round_ties_even() as i64, |(job, _)| job);
             let moved = &mut block.moved;
-            let change = rules.job_world(axis, job as f64) - world;
+            let in_doubles = rules.job_world(axis, job as f64) - world;
+            let change = exact.map_or(in_doubles, |(_, change)| change);
             moved.world[axis].push(world);
             moved.lattice[axis].push(change);
             moved.lost[i] |= lattice.is_some_and(|own| change.abs() >= HALF * own.scale[axis]);
@@ -270,7 +271,7 @@ impl Source {
                 let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
                 let values = values[axis][start..start + points].iter().enumerate();
                 let exact = self.exact[axis];
-                let on_job = |v| exact.map(|e| e.nearest(v));
+                let on_job = |v| exact.map(|e| (e.nearest(v), e.change(v)));
                 values.for_each(|(i, v)| take(i, f64::from(*v) * scale + offset, on_job(*v)));
             }
             (Positions::World(values), _) => {
