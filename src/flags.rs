@@ -86,6 +86,9 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
             "choose a system for --reproject on the same datum and with the same heights, or reproject the scan elsewhere"
                 .to_owned()
         }
+        Some(ReadAdvice::WidenColumn) => "the rows that were sampled hold none like it; name the columns, this one with a \
+                                          wider type, as in --columns x,y,z,c:int32"
+            .to_owned(),
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
         }

@@ -18,6 +18,8 @@ pub enum Advice {
     WrongFile,
     /// A number does not fit its column.
     CheckColumns,
+    /// A value is beyond what the sampled rows of a column showed: its type can be named with the columns.
+    WidenColumn,
     /// Rows of two numbers: cut short, or x and y alone, which [`crate::OpenOptions::columns`] can say.
     NameColumns,
     /// An archive: the scans are in it.
@@ -51,6 +53,9 @@ impl fmt::Display for Advice {
             Self::ExportPositions => f.write_str("export it with x, y and z"),
             Self::CheckColumns => f.write_str(
                 "the file is damaged, or its columns are not what they are called; correct it or export it again",
+            ),
+            Self::WidenColumn => f.write_str(
+                "the rows that were sampled hold none like it; name the columns, this one with a wider type",
             ),
             Self::NameColumns => {
                 f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")

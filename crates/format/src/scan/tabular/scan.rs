@@ -121,8 +121,12 @@ impl LineRule {
     }
 
     /// What to do about a row that does not fit. A comma in it may be meant otherwise than the sample of rows said.
-    fn advice(&self, line: &[u8]) -> Advice {
-        if self.sampled && line.contains(&b',') { Advice::DecimalMark } else { Advice::CheckColumns }
+    fn advice(&self, line: &[u8], what: &str) -> Advice {
+        match () {
+            () if !what.ends_with("is not a number") && is_beyond_the_sample(what) => Advice::WidenColumn,
+            () if self.sampled && line.contains(&b',') => Advice::DecimalMark,
+            () => Advice::CheckColumns,
+        }
     }
 }
 
@@ -359,7 +363,8 @@ impl Decoder<'_> {
                 let points = rule.decimal.to_points(line, &mut points_line);
                 parser.row(points, row, batch).map_err(|m| {
                     let place = piece.byte_offset + (at + m.at) as u64;
-                    self.misfit(place, Misfit { what: rule.in_its_marks(m.what), ..m }).advise(rule.advice(line))
+                    let advice = rule.advice(line, &m.what);
+                    self.misfit(place, Misfit { what: rule.in_its_marks(m.what), ..m }).advise(advice)
                 })?;
             }
             self.pose(rule, batch);
@@ -429,6 +434,11 @@ impl Decoder<'_> {
     fn misfit(&self, at: u64, misfit: Misfit) -> ReadError {
         ReadError::broken(self.source.path(), at, Fault::Row(misfit.what)).advise(Advice::CheckColumns)
     }
+}
+
+/// True for a number that is sound and does not fit the type that a sample chose for its column.
+fn is_beyond_the_sample(what: &str) -> bool {
+    ["does not fit", "is not an integer", "is outside"].iter().any(|words| what.contains(words))
 }
 
 /// Runs of at most a batch: first point and number of points.
