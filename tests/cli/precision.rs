@@ -131,6 +131,39 @@ fn integers_that_share_a_divisor_take_no_finer_step_and_odd_ones_do() {
 }
 
 #[test]
+fn points_that_fall_together_are_counted_where_the_step_is_coarser_than_the_scan() {
+    let dir = Dir::new();
+    // 0, 1, 2, … mm; steps of 5 mm take 0–2, 3–7, …; one place is there twice
+    let mut las = Las::terrain(1, 1);
+    (las.scale, las.offset) = ([0.001; 3], [0.0; 3]);
+    las.points = [0, 1, 2, 10, 10, 15, 16].map(|x| Point::at([x, 0, 0])).to_vec();
+    dir.write("a.las", &las.bytes());
+    dir.write("a.xyz", b"0 0 0\n0.001 0 0\n0.002 0 0\n0.01 0 0\n0.01 0 0\n0.015 0 0\n0.016 0 0\n");
+    for input in ["a.las", "a.xyz"] {
+        for to in ["potree2", "bintree", "batches"] {
+            let report = report(&dir, "out", &[input, "--scale", "0.005", "--to", to, "--overwrite"]);
+            assert_eq!(report["outputs"][0]["accuracy"]["merged"]["lattice"], 5, "{input} {to}: 0–2 and 15–16");
+            dir.validate("out", &[input]);
+        }
+        let own = report(&dir, "own", &[input, "--overwrite"]);
+        assert_eq!(own["outputs"][0]["accuracy"]["merged"]["lattice"], 0);
+    }
+    // held back by the extent
+    dir.write("wide.xyz", b"0.001 0 0\n0.002 0 0\n0.003 0 0\n5000000.001 0 0\n5000000.002 0 0\n5000000.003 0 0\n");
+    let wide = report(&dir, "wide", &["wide.xyz"]);
+    assert_eq!(wide["grid"]["scale"][0], 0.005);
+    assert!(wide["outputs"][0]["accuracy"]["merged"]["lattice"].as_u64().unwrap() >= 4, "{wide}");
+    dir.validate("wide", &["wide.xyz"]);
+    // a report that hides it
+    let path = dir.path("wide/report.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut lie: Value = serde_json::from_str(&text).unwrap();
+    lie["outputs"][0]["accuracy"]["merged"]["lattice"] = json!(0);
+    std::fs::write(&path, lie.to_string()).unwrap();
+    assert_eq!(dir.run(["validate", "wide", "-q", "--against", "wide.xyz"]).code(), 7);
+}
+
+#[test]
 fn ties_of_a_doubled_step_have_no_bias() {
     let dir = Dir::new();
     let mut las = Las::terrain(1000, 1);

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::cloud::Intake;
 use crate::error::ConvertError;
-use crate::gather::{Demand, gather};
+use crate::gather::{Demand, gather, is_coarse};
 use crate::outputs::{self, StagedFolder, Target};
 use crate::plan::Plan;
 use crate::report::{self, Account, OtherFilesReport, Report};
@@ -37,7 +37,7 @@ pub fn convert_on(
     let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk))?;
     let sources = Sources::open(plan, events)?;
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
-    let intake = Intake::new(plan, &sources, &wants.attributes);
+    let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let budget = Budget::new(plan, intake.schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
     resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());

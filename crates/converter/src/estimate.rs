@@ -2,7 +2,7 @@
 
 use crate::cloud::{Cube, Intake, Range, tidy_world};
 use crate::error::ConvertError;
-use crate::gather::{from_headers, is_lossless, quantized};
+use crate::gather::{from_headers, is_coarse, is_lossless, quantized};
 use crate::outputs::{self, DiskSize, Target, choose_attributes};
 use crate::plan::Plan;
 use crate::report::{Estimate, grid_report, input_reports};
@@ -20,7 +20,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
     outputs::check(plan, targets)?;
     let sources = Sources::open(plan, &Silent)?;
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
-    let intake = Intake::new(plan, &sources, &wants.attributes);
+    let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let schema = &intake.schema;
     let budget = Budget::new(plan, schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
     let mut warnings = sources.warnings.clone();

@@ -37,10 +37,11 @@ impl SourceIntake {
 
 impl Intake {
     /// `needed`: for each attribute of the sources, whether some output needs it.
-    pub(crate) fn new(plan: &Plan, sources: &Sources, needed: &[bool]) -> Self {
+    /// `wants_marks`: positions that the lattice alone makes equal are to be told apart.
+    pub(crate) fn new(plan: &Plan, sources: &Sources, needed: &[bool], wants_marks: bool) -> Self {
         let all = &sources.attributes;
         let (mut schema, places) = all.reduce(needed);
-        let mark = (plan.duplicates == Duplicates::Drop).then(|| schema.add_mark());
+        let mark = (wants_marks || plan.duplicates == Duplicates::Drop).then(|| schema.add_mark());
         let unread = all.attributes.iter().zip(needed).filter(|(_, needed)| !**needed);
         let unread = unread.map(|(a, _)| a.name.clone()).collect();
         let of_source = |source: &crate::sources::Source| {

@@ -36,6 +36,8 @@ pub(crate) struct Stats {
     pub(crate) unreadable: u64,
     /// Points whose integers in their scan do not come back from the job lattice.
     pub(crate) integers_lost: u64,
+    /// Points that share their point of the job lattice with another position of the sources; `None`: not counted.
+    pub(crate) fallen_together: Option<u64>,
     /// Some point moved to the job lattice by more than doubles of its coordinates are rounded.
     pub(crate) moves: bool,
     pub(crate) warnings: Vec<Warning>,
@@ -281,6 +283,7 @@ impl Stats {
             unreadable: 0,
             integers_lost: 0,
             moves: false,
+            fallen_together: None,
             warnings: Vec::new(),
         }
     }

@@ -11,6 +11,7 @@ mod columns;
 mod context;
 mod cut;
 mod exact;
+mod fallen;
 mod far;
 mod lattice;
 mod moved;
@@ -25,7 +26,7 @@ mod select;
 use pointmill_format::{Aabb, AxisGrid, Lattice, ReadError};
 
 pub(crate) use context::Demand;
-pub(crate) use lattice::from_headers;
+pub(crate) use lattice::{from_headers, is_coarse};
 
 use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
@@ -109,7 +110,10 @@ pub(crate) fn gather<'a>(
                 warn(Warning::ReadAgain);
                 hint = Some(stats.bounds);
             }
-            (_, Some(gathered)) => {
+            (_, Some(mut gathered)) => {
+                if let Some(mark) = intake.mark {
+                    gathered.stats.fallen_together = fallen::count(&gathered, mark)?;
+                }
                 if gathered.lattice.reason.axes.iter().any(|axis| axis.coarser.is_some()) && !is_said {
                     let (scale, reason) = (gathered.lattice.lattice.scale, gathered.lattice.reason);
                     warn(Warning::CoarserStep { scale, reason });

@@ -43,7 +43,10 @@ pub(crate) fn accuracy(cloud: &Cloud<'_>, points: u64, format: FormatErrors) -> 
         format: format.errors,
         total,
         integers: Integers { points, same: points.saturating_sub(lost) },
-        merged: Merged { lattice: lattice.is_rounding().then_some(0), format: format.merged },
+        merged: Merged {
+            lattice: if lattice.is_rounding() { Some(0) } else { stats.fallen_together },
+            format: format.merged,
+        },
         metres,
     }
 }

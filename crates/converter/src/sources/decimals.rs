@@ -72,6 +72,12 @@ const SOME: f64 = 4.0;
 /// The same where it may be off by one, or noise would pass for it.
 const MANY: f64 = 1000.0;
 
+/// `step · factor`, without the rounding of the product where a decimal is meant.
+pub(crate) fn tidy_product(step: f64, factor: f64) -> f64 {
+    let product = step * factor;
+    format!("{product:.12e}").parse().ok().filter(|t: &f64| ((t - product) / product).abs() < 1e-13).unwrap_or(product)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,6 +98,11 @@ mod tests {
         assert_eq!(step(&[std::f64::consts::PI, 1.0]), None);
         assert_eq!(step(&[f64::from(0.1f32)]), None);
         assert_eq!(step(&[1e18, 0.25]), Some(0.01), "no double of that size has decimals to go by");
+    }
+
+    #[test]
+    fn products_of_decimals_are_decimals() {
+        assert_eq!((tidy_product(0.001, 5.0), tidy_product(1e-7, 10_000.0)), (0.005, 0.001));
     }
 
     #[test]

@@ -4,7 +4,10 @@ use std::ops::ControlFlow;
 
 use pointmill_format::{Aabb, AxisGrid, PointBatch, Positions, Scan, ScanInfo, Scratch, Wanted};
 
-use super::decimals::PARTS_OF_EXTENT;
+use super::decimals::{PARTS_OF_EXTENT, tidy_product};
+
+/// Integers of 32 bits have no larger power of ten in common.
+const MOST_TENS: u64 = 1_000_000_000;
 
 /// Scans that are looked at, evenly spread.
 const SCANS: usize = 16;
@@ -23,8 +26,8 @@ struct Integers {
     first: i32,
     min: i32,
     max: i32,
-    /// The greatest common divisor of all differences; 0 if there are none.
-    divisor: u64,
+    /// The largest power of ten that divides all differences; [`MOST_TENS`] if there are none.
+    tens: u64,
 }
 
 /// The coarsest decimal steps that hold all integers of a sample, by step of the file.
@@ -44,17 +47,16 @@ impl Divisors {
         let same = || self.0.iter().filter(|s| s.iter().any(|i| i.scale == grid.step));
         // one step for all axes that have one in the file, or the cube would be skewed
         let all = || same().flatten().filter(|i| i.scale == grid.step);
-        let divisor = all().map(|i| i.divisor).filter(|d| *d > 0).reduce(gcd)?;
+        let mut tens = all().map(|i| i.tens).min()?;
         let widest = all().map(|i| f64::from(i.max) - f64::from(i.min)).fold(0.0, f64::max);
-        let mut tens = 1u64;
-        while divisor.is_multiple_of(tens * 10) && widest / (tens * 10) as f64 >= PARTS_OF_EXTENT {
-            tens *= 10;
+        while tens > 1 && widest / (tens as f64) < PARTS_OF_EXTENT {
+            tens /= 10;
         }
         let on_axis = same().map(|s| s[axis]).next()?;
         let offset = f64::from(on_axis.first) * on_axis.scale + on_axis.offset;
         // the coordinate nearest to the offset of the file
         let steps = ((offset - grid.offset) / (grid.step * tens as f64)).round();
-        let step = decimal_multiple(grid.step, tens);
+        let step = tidy_product(grid.step, tens as f64);
         (tens > 1).then_some(AxisGrid { step, offset: offset - steps * step })
     }
 }
@@ -63,19 +65,6 @@ fn is_worth_a_look(info: &ScanInfo) -> bool {
     let Some(lattice) = info.lattice else { return false };
     let many = |b: Aabb| (0..3).any(|a| (b.max[a] - b.min[a]) / lattice.scale[a] > MANY_STEPS);
     info.points_declared <= FEW_POINTS || info.bounds_declared.is_none_or(many)
-}
-
-/// `step · tens`, without the rounding of the product where a decimal is meant.
-fn decimal_multiple(step: f64, tens: u64) -> f64 {
-    let product = step * tens as f64;
-    format!("{product:.12e}").parse().ok().filter(|t: &f64| ((t - product) / product).abs() < 1e-13).unwrap_or(product)
-}
-
-fn gcd(mut a: u64, mut b: u64) -> u64 {
-    while b != 0 {
-        (a, b) = (b, a % b);
-    }
-    a
 }
 
 /// The first batch of a scan.
@@ -96,15 +85,15 @@ fn sample(scan: &dyn Scan) -> Option<[Integers; 3]> {
 
 fn integers(values: &[i32], scale: f64, offset: f64) -> Option<Integers> {
     let first = *values.first()?;
-    let mut divisor = 0;
+    let mut tens = MOST_TENS;
     for v in values {
         let difference = u64::from(v.abs_diff(first));
-        if divisor == 0 || !difference.is_multiple_of(divisor) {
-            divisor = gcd(divisor, difference);
+        while !difference.is_multiple_of(tens) {
+            tens /= 10;
         }
     }
     let (min, max) = values.iter().fold((first, first), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-    Some(Integers { scale, offset, first, min, max, divisor })
+    Some(Integers { scale, offset, first, min, max, tens })
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
 
 pub(crate) use crs::resolve_all as resolve_crs_of_all;
 pub use crs::{ResolvedCrs, resolve_crs};
+pub(crate) use decimals::tidy_product;
 pub(crate) use recast::{Recast, doubled};
 pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema};
 #[cfg(test)]

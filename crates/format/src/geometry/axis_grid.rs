@@ -85,7 +85,7 @@ fn decimal(units: u64, decimals: u32) -> Option<f64> {
 }
 
 /// The greatest common divisor; that of 0 and n is n.
-pub(crate) fn greatest_common_divisor(mut a: u64, mut b: u64) -> u64 {
+fn greatest_common_divisor(mut a: u64, mut b: u64) -> u64 {
     while b != 0 {
         (a, b) = (b, a % b);
     }

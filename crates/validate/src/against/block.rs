@@ -35,6 +35,8 @@ pub(crate) struct Moved {
     pub(crate) lattice: [Vec<f64>; 3],
     /// The integers that the file has do not come back from the job lattice.
     pub(crate) lost: Vec<bool>,
+    /// What the job lattice takes away of a position, if points that fall together are counted; else empty.
+    pub(crate) marks: Vec<u64>,
     /// Where the dataset's integers are not certain, those of the sources on its lattice; else empty.
     pub(crate) steps: Vec<[i64; 3]>,
 }
@@ -43,6 +45,7 @@ impl Moved {
     fn clear(&mut self) {
         self.world.iter_mut().chain(&mut self.lattice).for_each(Vec::clear);
         self.lost.clear();
+        self.marks.clear();
         self.steps.clear();
     }
 }

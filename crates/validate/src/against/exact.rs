@@ -34,6 +34,11 @@ impl Exact {
         (below + i128::from(is_up)) as i64
     }
 
+    /// True if every integer is one of the job's.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.parts == 1
+    }
+
     /// By how much [`Self::nearest`] moves an integer, world units. Doubles far from 0 could not tell.
     pub(crate) fn change(&self, source: i32) -> f64 {
         if self.parts == 1 {

@@ -26,6 +26,9 @@ pub(super) struct Parts<'a> {
     /// Points are gathered to find those that fall together; if they fit into memory.
     rows: Mutex<Vec<Row>>,
     counts_merged: bool,
+    /// The job's point and the mark of every position, to find those that fall together.
+    places: Mutex<Vec<([i64; 3], u64)>>,
+    counts_fallen: bool,
     moves: AtomicBool,
 }
 
@@ -37,6 +40,8 @@ impl<'a> Parts<'a> {
             by_block: Ordered::default(),
             rows: Mutex::default(),
             counts_merged,
+            places: Mutex::default(),
+            counts_fallen: points.saturating_mul(size_of::<([i64; 3], u64)>() as u64) <= memory_bytes,
             moves: AtomicBool::new(false),
         }
     }
@@ -44,12 +49,15 @@ impl<'a> Parts<'a> {
     /// Takes in a block of the file `at`.
     pub(super) fn add(&self, block: &Block, at: usize) {
         let (mut lattice, mut format) = (Side::default(), Side::default());
-        let mut rows = Vec::new();
+        let (mut rows, mut places) = (Vec::new(), Vec::new());
         let moved = &block.moved;
         for i in (0..block.len()).filter(|i| block.keep[*i]) {
             let at = |columns: &[Vec<f64>; 3]| columns.each_ref().map(|c| c[i]);
             lattice.deviation.add(at(&moved.lattice), at(&moved.world));
             lattice.lost += u64::from(moved.lost[i]);
+            if let Some(mark) = moved.marks.get(i).filter(|_| self.counts_fallen) {
+                places.push((moved.steps.get(i).copied().unwrap_or_else(|| block.position(i)), *mark));
+            }
             if let (Some(stored), Some(step)) = (&self.rules.stored, moved.steps.get(i)) {
                 let (words, meant) = (block.position(i), self.rules.meant(*step));
                 let decoded = stored.world(words);
@@ -68,6 +76,9 @@ impl<'a> Parts<'a> {
         if let Ok(mut all) = self.rows.lock() {
             all.append(&mut rows);
         }
+        if let Ok(mut all) = self.places.lock() {
+            all.append(&mut places);
+        }
     }
 
     pub(super) fn finish(self) -> Measured {
@@ -76,12 +87,22 @@ impl<'a> Parts<'a> {
             lattice.merge(&l);
             format.merge(&f);
         });
-        // what does not move does not fall together
-        lattice.merged = (!self.moves.into_inner()).then_some(0);
+        let places = self.places.into_inner().unwrap_or_default();
+        lattice.merged = match self.moves.into_inner() {
+            false => Some(0), // what does not move does not fall together
+            true => self.counts_fallen.then(|| fallen(places)),
+        };
         let rows = self.rows.into_inner().unwrap_or_default();
         format.merged = self.counts_merged.then(|| merged(rows));
         Measured { lattice, format: self.rules.stored.is_some().then_some(format) }
     }
+}
+
+/// Points that share their point of the lattice with another position of the sources.
+fn fallen(mut places: Vec<([i64; 3], u64)>) -> u64 {
+    places.sort_unstable();
+    let shared = places.chunk_by(|a, b| a.0 == b.0).filter(|p| p.first().map(|r| r.1) != p.last().map(|r| r.1));
+    shared.map(|p| p.len() as u64).sum()
 }
 
 /// Points that are decoded to the position of another point of the lattice.

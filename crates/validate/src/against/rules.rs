@@ -124,7 +124,7 @@ impl Rules {
     /// World coordinate of a dataset's coordinate, as the job's lattice has it, and the offset in it.
     pub(super) fn job_point(&self, axis: usize, stored: i64) -> (f64, f64) {
         let offset = self.lattice_offset[axis];
-        ((stored + self.shift[axis]) as f64 * self.lattice.scale[axis] + offset, offset)
+        (stored.saturating_add(self.shift[axis]) as f64 * self.lattice.scale[axis] + offset, offset)
     }
 
     /// The job lattice's coordinates on an axis.

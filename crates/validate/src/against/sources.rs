@@ -26,6 +26,8 @@ const HALF: f64 = 0.499_999;
 /// A scan, and where its columns go.
 pub(crate) struct Source {
     scan: Box<dyn Scan>,
+    /// Positions that the lattice makes equal are told apart: some scan has positions that may move.
+    is_marked: bool,
     /// From its integers to the dataset's lattice, by axis.
     exact: [Option<Exact>; 3],
     /// For each attribute of the dataset: what fills it.
@@ -53,6 +55,9 @@ impl Sources {
         let open = |p: &PathBuf| Ok(Source::new(open_scan(p, options)?, rules));
         let mut list = paths.iter().map(open).collect::<Result<Vec<_>, _>>()?;
         allow_doubles(&mut list, rules);
+        if list.iter().any(Source::may_move) {
+            list.iter_mut().for_each(|s| s.is_marked = true);
+        }
         let pieces = list.iter().enumerate();
         let pieces = pieces.flat_map(|(i, s)| (0..s.scan.pieces().len()).map(move |piece| (i, piece))).collect();
         let points = list.iter().flat_map(|s| s.scan.pieces()).map(|p| p.points).sum();
@@ -153,7 +158,7 @@ impl Source {
             own.and_then(|own| Exact::new(own, rules.job_grid(a)))
         });
         let selection = Selection::new(info, rules);
-        Self { exact, columns, classification, selection, constants, deviating, scan }
+        Self { is_marked: false, exact, columns, classification, selection, constants, deviating, scan }
     }
 
     fn wanted(&self) -> Wanted {
@@ -176,7 +181,10 @@ impl Source {
             self.fill_axis(batch, start, points, axis, rules, block);
         }
         if rules.drop_duplicates {
-            self.fill_residues(batch, start, points, rules, block);
+            block.residues.extend(self.residues(batch, start, points, rules, &block.positions));
+        }
+        if self.is_marked {
+            block.moved.marks.extend(self.residues(batch, start, points, rules, &block.positions));
         }
         self.selection.apply(batch, start, &mut block.keep);
         if let Some(stored) = &rules.stored {
@@ -223,21 +231,33 @@ impl Source {
         }
     }
 
-    fn fill_residues(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
+    /// What the lattice takes away of positions, as a word each.
+    fn residues<'a>(
+        &'a self,
+        batch: &'a PointBatch,
+        start: usize,
+        points: usize,
+        rules: &'a Rules,
+        positions: &'a [Vec<i64>; 3],
+    ) -> impl Iterator<Item = u64> + 'a {
         let own = self.scan.info().lattice;
-        let world = |axis: usize, i: usize| match (&batch.positions, &own) {
+        let world = move |axis: usize, i: usize| match (&batch.positions, &own) {
             (Positions::Quantized(p), Some(l)) => f64::from(p[axis][i]) * l.scale[axis] + l.offset[axis],
             (Positions::Quantized(p), None) => f64::from(p[axis][i]),
             (Positions::World(p), _) => p[axis][i],
         };
-        block.residues.extend((0..points).map(|i| {
+        (0..points).map(move |i| {
             let mut residue = Residue::default();
             for axis in 0..3 {
-                let stored = block.positions[axis][i];
-                residue.add(rules, own.as_ref(), axis, world(axis, start + i), stored);
+                residue.add(rules, own.as_ref(), axis, world(axis, start + i), positions[axis][i]);
             }
             residue.word()
-        }));
+        })
+    }
+
+    /// True if its positions may move to the lattice of the job.
+    pub(crate) fn may_move(&self) -> bool {
+        !self.exact.iter().all(|e| e.is_some_and(|e| e.is_whole()))
     }
 
     fn fill_axis(

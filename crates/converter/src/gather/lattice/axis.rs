@@ -2,9 +2,10 @@
 
 use pointmill_format::{Aabb, AxisGrid};
 
-use super::steps::{least, one_two_five, power_of_two, tidy_product, times_coarser};
+use super::steps::{least, one_two_five, power_of_two, times_coarser};
 use crate::cloud::MOST_STEPS;
 use crate::reason::{AxisReason, Coarser, CoarserCause, LatticeBasis};
+use crate::sources::tidy_product;
 
 /// The step where nothing at all is known of the coordinates, world units.
 const USUAL_STEP: f64 = 0.001;

@@ -14,7 +14,7 @@ use crate::cloud::{JobLattice, Stats};
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{Plan, ScaleChoice};
 use crate::reason::{AxisReason, Coarser, CoarserCause, LatticeBasis, LatticeReason};
-use crate::sources::Sources;
+use crate::sources::{Sources, tidy_product};
 
 pub(super) use self::steps::ulp;
 
@@ -42,6 +42,19 @@ pub(crate) fn from_headers(plan: &Plan, sources: &Sources) -> Result<JobLattice,
         return Err(InputFault::FarPoints { min, max }.into());
     }
     Ok(chosen)
+}
+
+/// True if headers already say that the step is coarser than the sources resolve, because the plan or the extent asks
+/// for it: points that are apart may then fall together.
+pub(crate) fn is_coarse(plan: &Plan, sources: &Sources) -> Result<bool, ConvertError> {
+    let chosen = from_headers(plan, sources)?;
+    let resolved = finest_of_sources(sources, &Knowledge::of_headers(plan, sources));
+    let is_requested = matches!(plan.scale, ScaleChoice::Fixed(_));
+    let is_coarse = |a: usize| match resolved[a] {
+        Some(step) => chosen.lattice.scale[a] > step,
+        None => is_requested,
+    };
+    Ok((0..3).any(is_coarse))
 }
 
 /// The lattice that the points ask for, now that they were read with `present`; `None` if `present` serves.
@@ -127,7 +140,7 @@ fn requested(step: f64, sources: &Sources, rooms: [Room; 3]) -> JobLattice {
         let by_doubles = rooms.iter().any(|r| r.doubles >= certain);
         let cause = if by_doubles { CoarserCause::Doubles } else { CoarserCause::Extent };
         let reason = AxisReason { basis: LatticeBasis::Requested, coarser: Some(Coarser { factor, cause }) };
-        made.lattice.scale = [steps::tidy_product(step, factor); 3];
+        made.lattice.scale = [tidy_product(step, factor); 3];
         made.reason.axes = [reason; 3];
     }
     made

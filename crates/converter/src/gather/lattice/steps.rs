@@ -24,12 +24,6 @@ pub(super) fn times_coarser(factor: f64) -> f64 {
     if factor <= 1.0 { 1.0 } else { one_two_five(factor) }
 }
 
-/// `step · factor`, without the rounding of the product where a decimal is meant.
-pub(super) fn tidy_product(step: f64, factor: f64) -> f64 {
-    let product = step * factor;
-    format!("{product:.12e}").parse().ok().filter(|t: &f64| ((t - product) / product).abs() < 1e-13).unwrap_or(product)
-}
-
 /// The least step for coordinates as large as `far`: two distances of doubles.
 pub(super) fn least(far: f64) -> f64 {
     if far > 0.0 { (2.0 * ulp(far)).max(LEAST_STEP) } else { 0.0 }
@@ -53,7 +47,6 @@ mod tests {
         assert_eq!([3e-7, 0.001, 0.0011, 4.0, 6.0].map(one_two_five), [5e-7, 0.001, 0.002, 5.0, 10.0]);
         assert_eq!([1.0, 1.5, 4.0, 11.0].map(times_coarser), [1.0, 2.0, 5.0, 20.0]);
         assert_eq!([0.3, 0.5, 3.0].map(power_of_two), [0.5, 0.5, 4.0]);
-        assert_eq!(tidy_product(0.001, 5.0), 0.005);
     }
 
     #[test]
