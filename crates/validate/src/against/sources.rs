@@ -248,8 +248,8 @@ impl Source {
         };
         (0..points).map(move |i| {
             let mut residue = Residue::default();
-            for axis in 0..3 {
-                residue.add(rules, own.as_ref(), axis, world(axis, start + i), positions[axis][i]);
+            for (axis, stored) in positions.iter().enumerate() {
+                residue.add(rules, own.as_ref(), axis, world(axis, start + i), stored[i]);
             }
             residue.word()
         })
