@@ -20,7 +20,7 @@ mod shortfall;
 mod stats;
 mod store;
 
-pub(crate) use cell::{Cell, SharedPlace};
+pub(crate) use cell::{Cell, CensusCell, SharedPlace, xyz};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
@@ -56,8 +56,10 @@ pub(crate) struct Cloud<'a> {
     /// How stored records are read; the root cube.
     pub(crate) frame: RecordFrame,
     pub(crate) store: Store,
-    /// Every occupied cell of the partition's octree level, in Morton order.
+    /// Where the records are: cells of the octree that do not overlap, in Morton order.
     pub(crate) cells: Vec<Cell>,
+    /// Every occupied cell of one level of the octree, in Morton order.
+    pub(crate) census: Vec<CensusCell>,
     pub(crate) stats: Stats,
     pub(crate) facts: Facts,
     /// Points outside were dropped as outliers.
@@ -75,6 +77,7 @@ pub(crate) struct Gathered {
     pub(crate) frame: RecordFrame,
     pub(crate) store: Store,
     pub(crate) cells: Vec<Cell>,
+    pub(crate) census: Vec<CensusCell>,
     pub(crate) stats: Stats,
     pub(crate) shared_places: Vec<SharedPlace>,
 }
@@ -92,7 +95,7 @@ impl<'a> Cloud<'a> {
         far_cut: Option<Aabb>,
         mut warnings: Vec<Warning>,
     ) -> Result<Self, ConvertError> {
-        let Gathered { lattice, is_lossless, frame, store, cells, stats, shared_places } = gathered;
+        let Gathered { lattice, is_lossless, frame, store, cells, census, stats, shared_places } = gathered;
         warnings.extend_from_slice(&stats.warnings);
         let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
         Ok(Self {
@@ -104,6 +107,7 @@ impl<'a> Cloud<'a> {
             frame,
             store,
             cells,
+            census,
             stats,
             facts,
             far_cut,

@@ -13,6 +13,8 @@ const POINTS: usize = 65_536;
 pub(crate) struct Regrouper<'a> {
     store: &'a Store,
     stride: usize,
+    /// For all outputs, not for one.
+    is_for_all: bool,
     grouping: Grouping,
     records: Vec<u8>,
     codes: Vec<u64>,
@@ -20,9 +22,15 @@ pub(crate) struct Regrouper<'a> {
 }
 
 impl<'a> Regrouper<'a> {
+    /// For an output, which takes each record once.
     pub(crate) fn new(store: &'a Store, stride: usize) -> Self {
         let (records, codes, sorted) = (Vec::new(), Vec::new(), Vec::new());
-        Self { store, stride, grouping: Grouping::default(), records, codes, sorted }
+        Self { store, stride, is_for_all: false, grouping: Grouping::default(), records, codes, sorted }
+    }
+
+    /// For all outputs, before the first of them takes a record.
+    pub(crate) fn for_all(store: &'a Store, stride: usize) -> Self {
+        Self { is_for_all: true, ..Self::new(store, stride) }
     }
 
     /// Takes the records of `segments` and puts them back grouped by `code` (a Morton code: groups that are near in space
@@ -42,7 +50,10 @@ impl<'a> Regrouper<'a> {
                 let count = (segment.count - start).min(room as u32);
                 let part = Segment { block: segment.block, start: segment.start + start, count };
                 start += count;
-                let from = self.store.take(part, &mut self.records)?;
+                let from = match self.is_for_all {
+                    true => self.store.take_for_all(part, &mut self.records)?,
+                    false => self.store.take(part, &mut self.records)?,
+                };
                 if let Some(source) = source.filter(|s| *s != from) {
                     // A block holds records of one source.
                     let rest = self.records.split_off(before);
@@ -84,6 +95,9 @@ impl<'a> Regrouper<'a> {
             start += count;
         }
         self.records.clear();
-        self.store.refill(block, &mut self.sorted)
+        match self.is_for_all {
+            true => self.store.fill(block, &mut self.sorted),
+            false => self.store.refill(block, &mut self.sorted),
+        }
     }
 }

@@ -104,16 +104,25 @@ impl Store {
 
     /// Appends the records of a segment to `out` and returns its source. Each output may take each record once.
     pub(crate) fn take(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        self.take_uses(segment, 1, out)
+    }
+
+    fn take_uses(&self, segment: Segment, uses: u32, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
         let source = self.read(segment, out)?;
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let block = &mut blocks[segment.block as usize];
-        block.remaining = block.remaining.saturating_sub(u64::from(segment.count));
+        block.remaining = block.remaining.saturating_sub(u64::from(segment.count) * u64::from(uses));
         if block.remaining == 0
             && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
         {
             self.in_memory.fetch_sub(bytes.capacity() as u64, Ordering::Relaxed);
         }
         Ok(source)
+    }
+
+    /// [`Self::take`] for all outputs at once: the records must be put back by [`Self::fill`].
+    pub(crate) fn take_for_all(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        self.take_uses(segment, self.uses, out)
     }
 
     /// [`Self::take`], but the records can be taken still.

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use pointmill_format::Lattice;
 
 use super::axis::SourceMap;
+use super::census::Census;
 use super::cut::Cut;
 use super::lattice::ulp;
 use super::origins::Origins;
@@ -67,4 +68,30 @@ pub(super) type CellParts = HashMap<u64, CellPart, CellHash>;
 pub(super) struct CellPart {
     pub(super) segments: Segments,
     pub(super) moments: Moments,
+}
+
+impl CellPart {
+    /// Adds what another thread has of the cell.
+    pub(super) fn merge(&mut self, other: Self) {
+        self.segments.append(other.segments);
+        self.moments.merge(&other.moments);
+    }
+}
+
+/// Where the records of a pass are.
+#[derive(Debug, Default)]
+pub(super) struct Collected {
+    pub(super) cells: CellParts,
+    /// Records in no order of space, to be grouped once all are in.
+    pub(super) loose: Segments,
+    pub(super) census: Census,
+}
+
+impl Collected {
+    /// Adds what another thread has collected.
+    pub(super) fn merge(&mut self, other: Self) {
+        other.cells.into_iter().for_each(|(cell, part)| self.cells.entry(cell).or_default().merge(part));
+        self.loose.append(other.loose);
+        self.census.merge(other.census);
+    }
 }

@@ -72,8 +72,8 @@ fn start_of(bucket: [u32; 3], level: u32) -> u64 {
 }
 
 fn merge(buckets: &mut Buckets, more: Vec<Buckets>) {
-    for (bucket, mut segments) in more.into_iter().flatten() {
-        buckets.entry(bucket).or_default().append(&mut segments);
+    for (bucket, segments) in more.into_iter().flatten() {
+        buckets.entry(bucket).or_default().append(segments);
     }
 }
 
@@ -92,12 +92,12 @@ fn join(buckets: Buckets, max_points: u64) -> Vec<Task> {
     buckets.sort_unstable_by_key(|((start, _), _)| *start);
     let mut tasks: Vec<Task> = Vec::new();
     let mut first_point = 0;
-    for ((start, _), mut segments) in buckets {
+    for ((start, _), segments) in buckets {
         let points = segments.points();
         match tasks.last_mut().filter(|t| t.points + points <= max_points) {
             Some(task) => {
                 task.points += points;
-                task.segments.append(&mut segments);
+                task.segments.append(segments);
             }
             None => tasks.push(Task { first_point, points, start, segments }),
         }
