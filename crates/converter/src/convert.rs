@@ -65,6 +65,7 @@ pub fn convert_on(
         settings: settings(plan, targets),
         other_files: OtherFilesReport::new(&plan.other_files),
         outputs,
+        temp_bytes: rt.temp.written_bytes(),
         phases: clock.finish(),
         seconds: clock.seconds(),
     };

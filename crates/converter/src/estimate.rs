@@ -49,7 +49,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
         attributes: std::iter::once("position".to_owned()).chain(names).collect(),
         bytes_per_point,
         memory_bytes: budget.estimate_peak(points, schema.stride),
-        temp_bytes: (points * stride).saturating_sub(budget.store_bytes),
+        temp_bytes: (points * stride).saturating_sub(budget.pool_bytes),
         output_bytes: points * bytes_per_point + of_nodes + JSON_BYTES,
         warnings,
     })

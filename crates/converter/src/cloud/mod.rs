@@ -38,10 +38,13 @@ pub(crate) use shortfall::Shortfall;
 pub(crate) use stats::{Change, Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 
+use std::sync::Arc;
+
 use pointmill_format::Aabb;
 
 use crate::error::ConvertError;
 use crate::plan::{Filter, Plan};
+use crate::runtime::Reservation;
 use crate::sources::{Fineness, Schema, Sources, intersection};
 use crate::warning::Warning;
 
@@ -55,11 +58,13 @@ pub(crate) struct Cloud<'a> {
     pub(crate) is_lossless: bool,
     /// How stored records are read; the root cube.
     pub(crate) frame: RecordFrame,
-    pub(crate) store: Store,
+    pub(crate) store: Arc<Store>,
     /// Where the records are: cells of the octree that do not overlap, in Morton order.
     pub(crate) cells: Vec<Cell>,
     /// Every occupied cell of one level of the octree, in Morton order.
     pub(crate) census: Vec<CensusCell>,
+    /// What the cells take of the run's memory.
+    _room: Reservation,
     pub(crate) stats: Stats,
     pub(crate) facts: Facts,
     /// Points outside were dropped as outliers.
@@ -75,9 +80,11 @@ pub(crate) struct Gathered {
     pub(crate) lattice: JobLattice,
     pub(crate) is_lossless: bool,
     pub(crate) frame: RecordFrame,
-    pub(crate) store: Store,
+    pub(crate) store: Arc<Store>,
     pub(crate) cells: Vec<Cell>,
     pub(crate) census: Vec<CensusCell>,
+    /// What the cells take.
+    pub(crate) room: Reservation,
     pub(crate) stats: Stats,
     pub(crate) shared_places: Vec<SharedPlace>,
 }
@@ -95,7 +102,7 @@ impl<'a> Cloud<'a> {
         far_cut: Option<Aabb>,
         mut warnings: Vec<Warning>,
     ) -> Result<Self, ConvertError> {
-        let Gathered { lattice, is_lossless, frame, store, cells, census, stats, shared_places } = gathered;
+        let Gathered { lattice, is_lossless, frame, store, cells, census, room, stats, shared_places } = gathered;
         warnings.extend_from_slice(&stats.warnings);
         let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
         Ok(Self {
@@ -108,6 +115,7 @@ impl<'a> Cloud<'a> {
             store,
             cells,
             census,
+            _room: room,
             stats,
             facts,
             far_cut,

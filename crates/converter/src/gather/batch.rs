@@ -11,7 +11,7 @@ use super::context::{Collected, Context};
 use super::{exact, moved, partition, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
-use crate::runtime::os_hints;
+use crate::runtime::{Consumer, Reservation, os_hints};
 use crate::sources::{MARK_BYTES, POSITION_BYTES, Recast};
 
 /// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
@@ -36,6 +36,7 @@ pub(super) struct Worker<'a> {
     pass: &'a Context<'a>,
     pub(super) stats: Stats,
     collected: Collected,
+    room: Reservation,
     q: JobColumns,
     /// See [`exact::marks`]; empty if they are not needed.
     marks: Vec<u64>,
@@ -59,6 +60,7 @@ impl<'a> Worker<'a> {
             pass,
             stats: Stats::new(&pass.intake.schema, pass.sources.all.len()),
             collected: Collected::default(),
+            room: Reservation::new(pass.memory, Consumer::Cells),
             q: JobColumns::default(),
             marks: Vec::new(),
             change: Default::default(),
@@ -71,9 +73,9 @@ impl<'a> Worker<'a> {
     }
 
     /// Hands over the last block and everything that was measured.
-    pub(super) fn finish(mut self) -> Result<(Stats, Collected), ConvertError> {
+    pub(super) fn finish(mut self) -> Result<(Stats, Collected, Reservation), ConvertError> {
         self.close_block()?;
-        Ok((self.stats, self.collected))
+        Ok((self.stats, self.collected, self.room))
     }
 
     /// Takes one batch of `source`: filter, lattice, ranges, cells, records.
@@ -207,6 +209,7 @@ impl<'a> Worker<'a> {
     }
 
     fn close_block(&mut self) -> Result<(), ConvertError> {
+        self.room.resize(self.collected.bytes())?;
         match self.open.take() {
             Some(block) => self.pass.store.fill(block.index, &mut self.records),
             None => Ok(()),
@@ -289,7 +292,8 @@ impl<'a> Worker<'a> {
 
     fn note_segments(&mut self, block: u32, mut start: u32) {
         let mut first = 0;
-        let Collected { cells, loose, census } = &mut self.collected;
+        let Collected { cells, loose, census, segments } = &mut self.collected;
+        *segments += self.grouping.groups.len() as u64;
         for &(cell, count) in &self.grouping.groups {
             let segment = Segment { block, start, count };
             census.add(cell, u64::from(count));

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use pointmill_format::{Aabb, Advice, AxisGrid, Lattice, NodeKey, Scratch};
 
@@ -13,10 +14,10 @@ use super::lattice::ulp;
 use super::loose::Grouper;
 use super::origins::Origins;
 use super::partition::Partition;
-use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz};
+use crate::cloud::{Cell, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz};
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
-use crate::runtime::Runtime;
+use crate::runtime::{Consumer, Evict, Reservation, Runtime};
 use crate::sources::{Fineness, Source, Sources};
 use crate::warning::{Warning, reason_of};
 
@@ -60,6 +61,9 @@ impl<'a> Pass<'a> {
         let cuts = |bounds: Option<Aabb>| -> Vec<Option<Cut>> {
             sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect()
         };
+        let store = Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
+        let evict: Arc<dyn Evict> = Arc::clone(&store) as _;
+        rt.memory.evict_from(Arc::downgrade(&evict));
         let context = Context {
             plan,
             sources,
@@ -71,7 +75,8 @@ impl<'a> Pass<'a> {
             cuts: cuts(plan.filter.bounds),
             origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
-            store: Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, rt.budget.store_bytes),
+            store,
+            memory: &rt.memory,
             wants_moments: demand.moments,
             misled: false.into(),
         };
@@ -80,7 +85,7 @@ impl<'a> Pass<'a> {
 
     /// Reads every point.
     pub(super) fn run(self) -> Result<PassEnd, ConvertError> {
-        let (stats, collected) = self.read()?;
+        let (stats, collected, mut room) = self.read()?;
         let bounds = stats.bounds;
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
@@ -91,7 +96,7 @@ impl<'a> Pass<'a> {
             _ => return Ok(PassEnd::Misled(Box::new(stats))),
         };
         let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
-        let Collected { cells, loose, census } = collected;
+        let Collected { cells, loose, census, .. } = collected;
         let census = census.finish(&partition, &cube);
         let mut nodes: Vec<(NodeKey, CellPart)> =
             cells.into_iter().map(|(packed, part)| (partition.node(packed, 0, &cube), part)).collect();
@@ -101,19 +106,23 @@ impl<'a> Pass<'a> {
             let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
             nodes.extend(grouper.group(&loose, u32::from(level))?);
         }
+        let cells = finished(nodes);
+        let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
+        room.resize(of_cells + (census.capacity() * size_of::<CensusCell>()) as u64)?;
         Ok(PassEnd::Complete(Box::new(Gathered {
             lattice: lattice.clone(),
             is_lossless: is_rounding(&stats, &lattice.lattice),
             frame,
             store,
-            cells: finished(nodes),
+            cells,
             census,
+            room,
             stats,
             shared_places: Vec::new(),
         })))
     }
 
-    fn read(&self) -> Result<(Stats, Collected), ConvertError> {
+    fn read(&self) -> Result<(Stats, Collected, Reservation), ConvertError> {
         let pieces = |(s, source): (usize, &Source)| (0..source.scan.pieces().len()).map(move |p| (s, p));
         let pieces: Vec<(usize, usize)> = self.context.sources.all.iter().enumerate().flat_map(pieces).collect();
         let parts = self.rt.in_parallel(
@@ -127,12 +136,14 @@ impl<'a> Pass<'a> {
         )?;
         let mut stats = Stats::new(&self.context.intake.schema, self.context.sources.all.len());
         let mut collected = Collected::default();
+        let mut room = Reservation::new(&self.rt.memory, Consumer::Cells);
         for part in parts {
-            let (part, more) = part?;
+            let (part, more, taken) = part?;
             stats.merge(&part);
             collected.merge(more);
+            room.merge(taken);
         }
-        Ok((stats, collected))
+        Ok((stats, collected, room))
     }
 
     /// Decodes one piece; what a broken piece held is counted or is an error, by policy.

@@ -33,8 +33,8 @@ impl Least {
 /// What each part of a run may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Budget {
-    /// Records that wait in memory; more go to disk.
-    pub(crate) store_bytes: u64,
+    /// For what grows with the points: records first of all, which go to the disk when others need it.
+    pub(crate) pool_bytes: u64,
     /// Points of a chunk.
     pub(crate) chunk_points: u64,
     /// Chunks in flight.
@@ -69,9 +69,9 @@ impl Budget {
         let free = usable - fixed_bytes;
         let chunk_points =
             (free / 2 / threads / bytes_per_chunk_point).clamp(least_chunk, MAX_CHUNK_POINTS.max(least_chunk));
-        let store_bytes = free - threads * chunk_points * bytes_per_chunk_point;
+        let pool_bytes = free - threads * chunk_points * bytes_per_chunk_point;
         Ok(Self {
-            store_bytes,
+            pool_bytes,
             chunk_points,
             window,
             fixed_bytes,
@@ -81,37 +81,17 @@ impl Budget {
         })
     }
 
-    /// Refuses a chunk that cannot be divided and does not fit.
-    pub(crate) fn check_chunk(&self, points: u64) -> Result<(), ConvertError> {
-        let needed = self.fixed_bytes + points.saturating_mul(self.bytes_per_chunk_point);
-        if points > self.chunk_points && needed > self.ceiling {
-            let why = MemoryNeed::OnePlace { points };
-            return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why });
-        }
-        Ok(())
-    }
-
     /// Points of a unit of work that takes `bytes_per_point`: what a chunk may use, at most `at_most`.
     pub(crate) fn task_points(&self, bytes_per_point: u64, at_most: u64) -> u64 {
         let at_most = self.asked_task_points.unwrap_or(at_most).max(1);
         (self.chunk_points * self.bytes_per_chunk_point / bytes_per_point).min(at_most)
     }
 
-    /// Refuses a task that is larger than others because it cannot be divided, and does not fit.
-    pub(crate) fn check_task(&self, points: u64, usual_points: u64, bytes_per_point: u64) -> Result<(), ConvertError> {
-        let needed = self.fixed_bytes + points.saturating_mul(bytes_per_point);
-        if points > usual_points && needed > self.ceiling {
-            let why = MemoryNeed::OneCell { points };
-            return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why });
-        }
-        Ok(())
-    }
-
     /// Highest resident set of a run over `points` points of `stride` bytes, estimated.
     pub(crate) fn estimate_peak(&self, points: u64, stride: usize) -> u64 {
         let data = points.saturating_mul(stride as u64);
-        let chunks = (self.ceiling - self.fixed_bytes - self.store_bytes).min(points * self.bytes_per_chunk_point);
-        self.fixed_bytes + data.min(self.store_bytes) + chunks
+        let chunks = (self.ceiling - self.fixed_bytes - self.pool_bytes).min(points * self.bytes_per_chunk_point);
+        self.fixed_bytes + data.min(self.pool_bytes) + chunks
     }
 }
 
@@ -133,7 +113,7 @@ mod tests {
                 plan.memory_bytes = mib << 20;
                 plan.threads = threads;
                 let b = Budget::new(&plan, 38, Least::of([])).unwrap();
-                let used = b.fixed_bytes + b.store_bytes + threads as u64 * b.chunk_points * b.bytes_per_chunk_point;
+                let used = b.fixed_bytes + b.pool_bytes + threads as u64 * b.chunk_points * b.bytes_per_chunk_point;
                 assert!(used <= plan.memory_bytes && b.chunk_points >= 10_000);
             }
         }

@@ -21,6 +21,10 @@ use crate::cloud::{TREE_BITS, TreePoint};
 
 /// A cell is `2^CELL_BITS` spacings wide; a tile is two cells wide.
 const CELL_BITS: u32 = 1;
+
+/// A tile is `2^TILE_BITS` spacings wide.
+pub(super) const TILE_BITS: u32 = CELL_BITS + 1;
+
 const GRID_BITS: u32 = SPACING_BITS - CELL_BITS;
 const GRID_SIZE: u32 = 1 << GRID_BITS;
 const CELL_SPACINGS: f32 = (1 << CELL_BITS) as f32;
@@ -128,6 +132,13 @@ impl Default for Poisson {
 }
 
 impl Poisson {
+    /// Forgets what was taken for the last node.
+    pub(super) fn begin(&mut self) {
+        self.occupied.fill(0);
+        self.taken.clear();
+    }
+
+    /// Chooses among the next candidates of a node; a part ends where a tile ends.
     pub(super) fn choose(&mut self, level: u8, candidates: &[TreePoint], accepted: &mut [bool]) {
         let Some(first) = candidates.first() else { return };
         if u32::from(level) > TREE_BITS - SPACING_BITS {
@@ -139,13 +150,11 @@ impl Poisson {
         }
         let shift = cell_shift(level);
         let cell_shift = shift + CELL_BITS;
-        let tile_shift = cell_shift + 1;
+        let tile_shift = shift + TILE_BITS;
         let node_bits = TREE_BITS - u32::from(level).min(TREE_BITS);
         let corner = first.cell(node_bits).map(|c| c << node_bits);
         // A power of two, so nothing is lost by it.
         let unit = 1.0 / (1u32 << shift) as f32;
-        self.occupied.fill(0);
-        self.taken.clear();
         let mut at = 0;
         while let Some(&first) = candidates.get(at) {
             self.collect_near(first.cell(tile_shift).map(|c| c << 1 & (GRID_SIZE - 1)));
@@ -253,6 +262,7 @@ mod tests {
         let mut count = 0;
         for _ in 0..2 {
             let mut accepted = vec![false; candidates.len()];
+            poisson.begin();
             poisson.choose(level, &points, &mut accepted);
             let taken: Vec<_> = candidates.iter().zip(&accepted).filter(|(_, a)| **a).map(|(t, _)| *t).collect();
             for (i, a) in taken.iter().enumerate() {

@@ -107,13 +107,10 @@ impl Output for BatchesSettings {
         let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();
         let layout = Layout::new(points, &attributes, planes_at_most(&frame, self.planes)).map_err(refused)?;
         let tasks = buckets::tasks(cloud, rt, &frame, task_points)?;
-        for task in &tasks {
-            rt.budget.check_task(task.points, task_points, per_point)?;
-        }
         let file = to.create(self.kind().marker_file())?;
         // what is compressed is written raw first, elsewhere
         let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
-        let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, cloud.store.unused_bytes());
+        let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, &rt.memory);
         let output =
             BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals, Recovery::new(cloud), frame.grid.origin);
         let shop = Workshop {

@@ -109,9 +109,6 @@ impl Output for BintreeSettings {
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
         let upper = upper::split(cloud, rt, self, task_points)?;
-        for task in &upper.tasks {
-            rt.budget.check_task(task.points(), task_points, bytes_per_point)?;
-        }
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
         let built = build(cloud, rt, self, &columns, &upper, &leaves)?;
         let leaf_bytes = leaves.finish(rt)?;
