@@ -12,6 +12,9 @@ use crate::report::{self, Account, OtherFilesReport, Report};
 use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemDisk, TempFiles};
 use crate::sources::{Sources, resolve_crs_of_all};
 
+/// Bytes that decoding takes on a thread.
+pub(crate) const DECODE_BYTES: u64 = 12 << 20;
+
 /// Converts the inputs of `plan` to one dataset for each target. One goes into the output folder itself, several into
 /// folders of their names below it.
 ///
@@ -38,19 +41,23 @@ pub fn convert_on(
     let sources = Sources::open(plan, events)?;
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
-    let budget = Budget::new(plan, intake.schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
+    let least = Least::of(targets.iter().map(|t| t.output().least_points()), DECODE_BYTES, 0);
+    let budget = Budget::new(plan, intake.schema.stride, least)?;
     resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, disk), events)?;
 
     let demand = Demand { moments: wants.moments, uses: targets.len() as u32 };
+    let reading = rt.budget.reading(&rt.memory)?;
     let cloud = gather(plan, &sources, &intake, demand, &rt, &mut clock)?;
+    drop(reading);
 
     let mut outputs = Vec::new();
     for target in targets {
         clock.begin(Phase::Build, cloud.points());
         let start = Instant::now();
         let dataset = staged.dataset(target.kind(), targets.len() == 1)?;
+        let _building = rt.budget.building(&rt.memory, cloud.points())?;
         let mut output = target.output().write(&cloud, &rt, &dataset)?;
         dataset.sync()?;
         output.warnings.iter().for_each(|w| events.warning(w));

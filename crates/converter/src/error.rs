@@ -169,6 +169,11 @@ pub enum MemoryNeed {
         /// Points that each of them must have in memory.
         points: u64,
     },
+    /// What is known of the inputs.
+    Inputs {
+        /// Bytes for all of them.
+        bytes: u64,
+    },
     /// A part of the run whose size only the points tell, such as "the lists of nodes".
     Part(&'static str),
 }
@@ -373,6 +378,7 @@ impl fmt::Display for MemoryNeed {
             Self::Threads { threads, points } => {
                 write!(f, "{threads} worker threads need {points} points each in memory")
             }
+            Self::Inputs { bytes } => write!(f, "what is known of the inputs takes {} MiB", bytes.div_ceil(1 << 20)),
             Self::Part(what) => write!(f, "{what} need more"),
         }
     }

@@ -9,10 +9,15 @@ use crate::error::ConvertError;
 /// Records looked at together: many, so that the groups come in long segments.
 const POINTS: usize = 65_536;
 
+/// Bytes of wide records that are looked at together.
+const BYTES: usize = 4 << 20;
+
 /// Regroups records; keeps its memory from one use to the next.
 pub(crate) struct Regrouper<'a> {
     store: &'a Store,
     stride: usize,
+    /// Records that are looked at together.
+    points: usize,
     /// For all outputs, not for one.
     is_for_all: bool,
     grouping: Grouping,
@@ -25,7 +30,8 @@ impl<'a> Regrouper<'a> {
     /// For an output, which takes each record once.
     pub(crate) fn new(store: &'a Store, stride: usize) -> Self {
         let (records, codes, sorted) = (Vec::new(), Vec::new(), Vec::new());
-        Self { store, stride, is_for_all: false, grouping: Grouping::default(), records, codes, sorted }
+        let points = (BYTES / stride).clamp(1, POINTS);
+        Self { store, stride, points, is_for_all: false, grouping: Grouping::default(), records, codes, sorted }
     }
 
     /// For all outputs, before the first of them takes a record.
@@ -46,7 +52,7 @@ impl<'a> Regrouper<'a> {
             let mut start = 0;
             while start < segment.count {
                 let before = self.records.len();
-                let room = POINTS - before / self.stride;
+                let room = self.points - before / self.stride;
                 let count = (segment.count - start).min(room as u32);
                 let part = Segment { block: segment.block, start: segment.start + start, count };
                 start += count;
@@ -61,7 +67,7 @@ impl<'a> Regrouper<'a> {
                     self.records = rest;
                 }
                 source = Some(from);
-                if self.records.len() >= POINTS * self.stride {
+                if self.records.len() >= self.points * self.stride {
                     self.put_back(from, &mut code, &mut found)?;
                 }
             }

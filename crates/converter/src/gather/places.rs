@@ -12,7 +12,7 @@ use crate::error::ConvertError;
 const LEAST: u64 = 16;
 
 /// Records that are looked at together.
-const PIECE_POINTS: u32 = 1 << 16;
+const PIECE_POINTS: u32 = 1 << 14;
 
 /// Very many is at least one point in that many of the cloud.
 const SHARE: u64 = 100;

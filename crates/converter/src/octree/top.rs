@@ -12,18 +12,14 @@ use crate::cloud::{Checksum, Cloud, RecordFrame, TreePoint};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Pool, Reservation, Runtime};
 
-/// Candidates that are looked at together.
-const PART_POINTS: usize = 65_536;
+/// Bytes of candidates that are looked at together.
+const PART_BYTES: usize = 2 << 20;
 
 /// Records of a node that are encoded in memory; those of larger ones pass by.
 const LARGE_BYTES: u64 = 4 << 20;
 
 /// Bytes of finished nodes that are written together.
 const WRITE_BYTES: usize = 8 << 20;
-
-/// Points that a sampler keeps at most of a node, and bytes of each.
-const SAMPLED_POINTS: u64 = 2 << 20;
-const SAMPLED_BYTES: u64 = 16;
 
 /// The nodes above the chunks while they are made, and the place of all nodes among the bytes of the tree.
 pub(super) struct TopNodes<'a, S: NodeSink> {
@@ -175,7 +171,7 @@ impl<S: NodeSink> TopNodes<'_, S> {
             at += (piece.len() / self.lists.stride) as u64;
             part.records.extend_from_slice(piece);
             part.trees.extend(piece.chunks_exact(self.lists.stride).map(|record| self.frame.tree(record)));
-            if part.trees.len() >= PART_POINTS {
+            if part.records.len() >= PART_BYTES {
                 let cut = part.trees.windows(2).rposition(|w| Sampler::may_be_cut(level, w[0], w[1]));
                 self.choose(&mut part, cut.map_or(0, |i| i + 1), &mut rest)?;
             }
@@ -193,6 +189,7 @@ impl<S: NodeSink> TopNodes<'_, S> {
             let writer = if *is_taken { &mut *part.taken } else { &mut *rest };
             writer.push(record, &mut self.lists)?;
         }
+        self.sampled.grow_to(self.sampler.bytes())?; // memory that was touched stays
         part.records.drain(..count * stride);
         part.trees.drain(..count);
         Ok(())
@@ -203,7 +200,7 @@ impl<S: NodeSink> Nodes<List> for TopNodes<'_, S> {
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<List>]) -> Result<List, ConvertError> {
         self.sampler.begin(key);
         let candidates = children.iter().map(|c| c.points.count()).sum();
-        self.sampled.resize(self.sampled.bytes().max(SAMPLED_BYTES * SAMPLED_POINTS.min(candidates)))?;
+        self.sampler.expect(candidates);
         let mut taken = Writer::new(candidates);
         for child in children {
             let list = std::mem::replace(&mut child.points, List::empty());

@@ -10,6 +10,8 @@ use crate::error::{ConvertError, MemoryNeed};
 pub(crate) enum Consumer {
     /// Records that wait in the store.
     Records,
+    /// What threads have while they read or build.
+    Threads,
     /// Lists of records by cell, and counts of cells.
     Cells,
     /// Records of nodes that wait for the nodes above them.
@@ -20,13 +22,14 @@ pub(crate) enum Consumer {
     Work,
 }
 
-const CONSUMERS: usize = 5;
+const CONSUMERS: usize = 6;
 
 impl Consumer {
     /// For errors: "… need more memory".
     const fn name(self) -> &'static str {
         match self {
             Self::Records => "records that wait",
+            Self::Threads => "worker threads",
             Self::Cells => "the lists of where points are",
             Self::Waiting => "nodes that wait for those above them",
             Self::Nodes => "the lists of nodes",
@@ -87,6 +90,11 @@ impl Pool {
         is_taken
     }
 
+    /// [`Self::try_take`] for one of several consumers that must leave room for others: at most half of all is for it.
+    pub(crate) fn try_take_half(&self, who: Consumer, bytes: u64) -> bool {
+        self.taken_by(who) + bytes <= self.capacity / 2 && self.try_take(who, bytes)
+    }
+
     /// Takes `bytes`; records go to the disk to make room.
     ///
     /// # Errors
@@ -132,15 +140,10 @@ impl Reservation {
         Self { pool: Arc::clone(pool), who, bytes }
     }
 
-    /// What the owner has.
-    pub(crate) fn bytes(&self) -> u64 {
-        self.bytes
-    }
-
-    /// [`Self::resize`] if there is room without anything making way.
+    /// [`Self::resize`] if there is room without anything making way, and the consumer has no more than half of all then.
     pub(crate) fn try_resize(&mut self, bytes: u64) -> bool {
         let fits = match bytes.checked_sub(self.bytes) {
-            Some(more) => self.pool.try_take(self.who, more),
+            Some(more) => self.pool.try_take_half(self.who, more),
             None => {
                 self.pool.give(self.who, self.bytes - bytes);
                 true
@@ -163,6 +166,14 @@ impl Reservation {
         }
         self.bytes = bytes;
         Ok(())
+    }
+
+    /// [`Self::resize`], but nothing is given back.
+    ///
+    /// # Errors
+    /// There is no room.
+    pub(crate) fn grow_to(&mut self, bytes: u64) -> Result<(), ConvertError> {
+        self.resize(bytes.max(self.bytes))
     }
 
     /// Adds what another owner has taken.

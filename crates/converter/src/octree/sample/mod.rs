@@ -46,6 +46,21 @@ impl Sampler {
         self.node = node;
     }
 
+    /// Says how many candidates of the node there will be.
+    pub(crate) fn expect(&mut self, candidates: u64) {
+        if let Method::Poisson(p) = &mut self.method {
+            p.expect(candidates);
+        }
+    }
+
+    /// Memory that the points taken so far need, bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        match &self.method {
+            Method::Poisson(p) => p.bytes(),
+            Method::Cells(_) => 0,
+        }
+    }
+
     /// Adds the points of the next child, or a part of them, in Morton order.
     pub(crate) fn offer(&mut self, points: impl Iterator<Item = TreePoint>) {
         self.candidates.extend(points);

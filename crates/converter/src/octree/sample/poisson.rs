@@ -35,6 +35,9 @@ const CONFLICT_BELOW: f32 = 1.0 + 4e-5;
 
 const LANES: usize = 8;
 
+/// More points of a node cannot be that far apart: spheres as dense as they can be packed, and some over the border.
+const MOST_TAKEN: u64 = 3_200_000;
+
 /// The grid, kept from node to node; all empty in between.
 pub(super) struct Poisson {
     /// One bit for each cell from which a point was taken, a word for each column of cells: bit z of word (x, y).
@@ -136,6 +139,17 @@ impl Poisson {
     pub(super) fn begin(&mut self) {
         self.occupied.fill(0);
         self.taken.clear();
+    }
+
+    /// Makes room for what a node may take of so many candidates, so that the list never moves: what is not touched costs
+    /// no memory.
+    pub(super) fn expect(&mut self, candidates: u64) {
+        self.taken.reserve_exact(candidates.min(MOST_TAKEN) as usize);
+    }
+
+    /// Memory of the points taken so far, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        (self.taken.len() * size_of::<[f32; 3]>()) as u64
     }
 
     /// Chooses among the next candidates of a node; a part ends where a tile ends.
