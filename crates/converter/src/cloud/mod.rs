@@ -1,6 +1,7 @@
 //! All points, once they are read: records grouped by cell in the store, and everything that an output may ask about
 //! them. Made by `gather`; afterwards facts do not change, and each output takes every record out of the store once.
 
+mod big_sort;
 mod cell;
 mod checksum;
 mod cube;
@@ -20,6 +21,7 @@ mod shortfall;
 mod stats;
 mod store;
 
+pub(crate) use big_sort::BigSort;
 pub(crate) use cell::{Cell, CensusCell, SharedPlace, xyz};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};

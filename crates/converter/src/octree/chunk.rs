@@ -50,6 +50,11 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
         Self { plan, sampler, encoder, records, points, scratch }
     }
 
+    /// Gives back the memory of the chunks so far.
+    pub(super) fn release(&mut self) {
+        (self.records, self.points, self.scratch) = (Vec::new(), Vec::new(), OrderScratch::default());
+    }
+
     /// Builds a chunk; `payloads` is a buffer to use again.
     pub(super) fn build(&mut self, chunk: &Chunk, payloads: Vec<u8>) -> Result<BuiltChunk, ConvertError> {
         let frame = &self.plan.cloud.frame;

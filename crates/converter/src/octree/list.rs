@@ -22,6 +22,8 @@ enum Place {
     Memory(Vec<u8>, Option<Reservation>),
     /// From a byte of the file on.
     Disk(u64),
+    /// From a byte of a file of its own on.
+    Own(DiskFile, u64),
 }
 
 impl Points for List {
@@ -34,6 +36,11 @@ impl List {
     /// Records in memory that nobody has accounted for yet.
     pub(super) fn of_chunk(records: Vec<u8>, stride: usize) -> Self {
         Self { count: (records.len() / stride) as u64, place: Place::Memory(records, None), is_one_place: false }
+    }
+
+    /// Records of points that share one place, in a file of their own.
+    pub(super) fn of_place(file: DiskFile, count: u64) -> Self {
+        Self { count, place: Place::Own(file, 0), is_one_place: true }
     }
 
     /// Of nothing.
@@ -133,7 +140,7 @@ impl Lists {
         let (start, len) = (at * self.stride as u64, count as usize * self.stride);
         match (&list.place, &self.file) {
             (Place::Memory(records, _), _) => Ok(&records[start as usize..][..len]),
-            (Place::Disk(offset), Some(file)) => {
+            (Place::Disk(offset), Some(file)) | (Place::Own(file, offset), _) => {
                 buffer.resize(len, 0);
                 file.read_at(buffer, offset + start, "reading nodes that wait")?;
                 Ok(buffer)
@@ -152,7 +159,7 @@ impl Lists {
         list.count -= 1;
         match &mut list.place {
             Place::Memory(records, _) => drop(records.drain(..self.stride)),
-            Place::Disk(offset) => *offset += self.stride as u64,
+            Place::Disk(offset) | Place::Own(_, offset) => *offset += self.stride as u64,
         }
     }
 

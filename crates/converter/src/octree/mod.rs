@@ -14,6 +14,7 @@ mod commit;
 mod divide;
 mod list;
 mod order;
+mod place;
 mod raise;
 mod sample;
 mod sink;
@@ -63,7 +64,13 @@ pub(crate) fn build<S: NodeSink>(
         |builder, index| {
             let Some(buffer) = committer.admit(index) else { return Ok(()) };
             rt.check_stop()?; // it may have waited long
-            let built = builder.build(&chunks[index], buffer)?;
+            let chunk = &chunks[index];
+            let built = if chunk.points > rt.budget.chunk_points {
+                builder.release();
+                place::build(&plan, chunk, rt, rt.budget.chunk_bytes())?
+            } else {
+                builder.build(chunk, buffer)?
+            };
             committer.submit(index, built)?;
             rt.advance(chunks[index].points);
             Ok(())

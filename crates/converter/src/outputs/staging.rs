@@ -119,6 +119,11 @@ impl StagedDataset {
         DiskFile::create(&self.folder.join(name), &self.disk)
     }
 
+    /// Opens a file that was made before, to write more.
+    pub(crate) fn open(&self, name: &str) -> Result<DiskFile, ConvertError> {
+        DiskFile::open(&self.folder.join(name), &self.disk)
+    }
+
     /// Writes and syncs a small file.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ConvertError> {
         let file = self.create(name)?;

@@ -120,6 +120,11 @@ impl Budget {
         self.threads * BUILD_BYTES + chunks * self.bytes_per_chunk_point
     }
 
+    /// Bytes of a thread for the unit of work that it builds.
+    pub(crate) fn chunk_bytes(&self) -> u64 {
+        self.chunk_points * self.bytes_per_chunk_point
+    }
+
     /// Points of a unit of work that takes `bytes_per_point`: what a chunk may use, at most `at_most`.
     pub(crate) fn task_points(&self, bytes_per_point: u64, at_most: u64) -> u64 {
         let at_most = self.asked_task_points.unwrap_or(at_most).max(1);

@@ -67,6 +67,13 @@ impl DiskFile {
         Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk), written: None })
     }
 
+    /// Opens the file `path`, which is there.
+    pub(crate) fn open(path: &Path, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+        let file = File::options().read(true).write(true).open(path);
+        let file = file.map_err(|e| ConvertError::io(path, "opening the file again", e))?;
+        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk), written: None })
+    }
+
     /// Writes all of `bytes` at `offset`; `doing` is for the error ("writing a leaf").
     pub(crate) fn write_at(&self, bytes: &[u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
         self.try_write_at(bytes, offset).map_err(|e| ConvertError::io(&self.path, doing, e))

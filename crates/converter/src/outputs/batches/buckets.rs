@@ -29,6 +29,8 @@ pub(super) struct Task {
     /// The bucket code at which it begins.
     pub(super) start: u64,
     pub(super) segments: Segments,
+    /// Its records were put in order already, and are not in the store of the cloud ([`super::large`]).
+    pub(super) is_sorted: bool,
 }
 
 /// An aligned cube of the grid, by the Morton code of its first corner (21 bits per axis) and its level (0: all).
@@ -99,7 +101,7 @@ fn join(buckets: Buckets, max_points: u64) -> Vec<Task> {
                 task.points += points;
                 task.segments.append(segments);
             }
-            None => tasks.push(Task { first_point, points, start, segments }),
+            None => tasks.push(Task { first_point, points, start, segments, is_sorted: false }),
         }
         first_point += points;
     }

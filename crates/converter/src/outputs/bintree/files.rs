@@ -45,6 +45,21 @@ impl<'a> Leaves<'a> {
         Ok(None)
     }
 
+    /// The byte where a leaf with `start` points before it starts in a packed file.
+    pub(super) fn start_of(&self, start: u64) -> Option<u64> {
+        self.packed.as_ref().map(|_| start * self.stride)
+    }
+
+    /// [`Self::put`] for a part of the records of a leaf: those after the first `from`. The first part comes first.
+    pub(super) fn put_part(&self, path: &[bool], start: u64, from: u64, records: &[u8]) -> Result<(), ConvertError> {
+        if self.packed.is_some() || from == 0 {
+            return self.put(path, start + from, records).map(drop);
+        }
+        self.bytes.fetch_add(records.len() as u64, Ordering::Relaxed);
+        let file = self.staged.open(&leaf_file_name(path.iter().copied()))?;
+        file.write_at(records, from * self.stride, "writing a leaf")
+    }
+
     /// Syncs what was written; returns its bytes.
     pub(super) fn finish(self, rt: &Runtime<'_>) -> Result<u64, ConvertError> {
         if let Some(file) = &self.packed {
