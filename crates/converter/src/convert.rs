@@ -6,11 +6,13 @@ use std::time::Instant;
 use crate::cloud::Intake;
 use crate::error::ConvertError;
 use crate::gather::{Demand, gather, is_coarse};
+use crate::memory::peak_resident_bytes;
 use crate::outputs::{self, StagedFolder, Target};
 use crate::plan::Plan;
 use crate::report::{self, Account, OtherFilesReport, Report};
 use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemDisk, TempFiles};
 use crate::sources::{Sources, resolve_crs_of_all};
+use crate::warning::Warning;
 
 /// Bytes that decoding takes on a thread.
 pub(crate) const DECODE_BYTES: u64 = 12 << 20;
@@ -35,6 +37,7 @@ pub fn convert_on(
     events: &dyn Events,
 ) -> Result<Report, ConvertError> {
     let mut clock = Clock::start(events);
+    let peak_before = peak_resident_bytes();
     clock.begin(Phase::Probe, 0);
     outputs::check(plan, targets)?;
     let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk))?;
@@ -76,12 +79,23 @@ pub fn convert_on(
         phases: clock.finish(),
         seconds: clock.seconds(),
     };
-    let report = report::report(&cloud, account)?;
+    let mut report = report::report(&cloud, account)?;
+    if let Some(warning) = above_ceiling(plan, peak_before) {
+        events.warning(&warning);
+        report.warnings.push(warning);
+    }
     let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
     staged.write_report(&text)?;
     rt.check_stop()?;
     staged.finish()?;
     Ok(report)
+}
+
+/// What there is to say if the process grew beyond the ceiling during this run.
+fn above_ceiling(plan: &Plan, peak_before: Option<u64>) -> Option<Warning> {
+    let (peak, ceiling) = (peak_resident_bytes()?, plan.memory_bytes);
+    (peak > ceiling && peak_before.is_some_and(|before| before < ceiling))
+        .then_some(Warning::AboveCeiling { peak, ceiling })
 }
 
 fn settings(plan: &Plan, targets: &[Target]) -> serde_json::Map<String, serde_json::Value> {

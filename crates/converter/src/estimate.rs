@@ -1,7 +1,7 @@
 //! What a run would do, from the headers alone.
 
-use crate::convert::DECODE_BYTES;
 use crate::cloud::{Cube, Intake, Range, tidy_world};
+use crate::convert::DECODE_BYTES;
 use crate::error::ConvertError;
 use crate::gather::{from_headers, is_coarse, is_lossless, quantized};
 use crate::outputs::{self, DiskSize, Target, choose_attributes};

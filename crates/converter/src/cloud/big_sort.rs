@@ -107,7 +107,10 @@ impl<'a, C: Fn(&[u8], &[u8]) -> Ordering> BigSort<'a, C> {
     }
 
     /// Hands out all records in order.
-    pub(crate) fn finish(mut self, mut take: impl FnMut(&[u8]) -> Result<(), ConvertError>) -> Result<(), ConvertError> {
+    pub(crate) fn finish(
+        mut self,
+        mut take: impl FnMut(&[u8]) -> Result<(), ConvertError>,
+    ) -> Result<(), ConvertError> {
         if self.runs.is_empty() {
             let order = order(&self.records, self.stride, &self.compare);
             return order.into_iter().try_for_each(|i| take(&self.records[i as usize * self.stride..][..self.stride]));
@@ -125,11 +128,7 @@ impl<'a, C: Fn(&[u8], &[u8]) -> Ordering> BigSort<'a, C> {
         self.merge(&self.runs, take)
     }
 
-    fn merge(
-        &self,
-        runs: &[Run],
-        mut take: impl FnMut(&[u8]) -> Result<(), ConvertError>,
-    ) -> Result<(), ConvertError> {
+    fn merge(&self, runs: &[Run], mut take: impl FnMut(&[u8]) -> Result<(), ConvertError>) -> Result<(), ConvertError> {
         let Some(file) = &self.file else { return Ok(()) };
         let cursor = |run: &Run| Cursor { run: *run, stride: self.stride, piece: Vec::new(), at: 0 };
         let mut cursors: Vec<Cursor> = runs.iter().map(cursor).collect();

@@ -171,7 +171,9 @@ impl Evict for Store {
                 let blocks = self.blocks.lock().map_err(|_| poisoned())?;
                 let in_memory = |block: &Block| matches!(block.place, Place::Memory(_));
                 let last = blocks.iter().take(next).rposition(in_memory);
-                last.and_then(|i| if let Place::Memory(bytes) = &blocks[i].place { Some((i, Arc::clone(bytes))) } else { None })
+                last.and_then(|i| {
+                    if let Place::Memory(bytes) = &blocks[i].place { Some((i, Arc::clone(bytes))) } else { None }
+                })
             };
             let Some((index, records)) = found else { break };
             next = index;

@@ -58,12 +58,8 @@ impl Census {
     /// The cells, in Morton order.
     pub(super) fn finish(self, partition: &Partition, cube: &Cube) -> Vec<CensusCell> {
         let Self { counts, wider } = self;
-        let cell = |(cell, points)| CensusCell {
-            key: partition.node(cell, wider, cube),
-            points,
-            repeats: 0,
-            bounds: None,
-        };
+        let cell =
+            |(cell, points)| CensusCell { key: partition.node(cell, wider, cube), points, repeats: 0, bounds: None };
         let mut cells: Vec<CensusCell> = counts.into_iter().map(cell).collect();
         cells.sort_unstable_by(|a, b| morton::compare(xyz(a.key), xyz(b.key)));
         cells

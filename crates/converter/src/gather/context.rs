@@ -13,8 +13,8 @@ use super::lattice::ulp;
 use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segment, Segments, Store};
-use crate::runtime::Pool;
 use crate::plan::Plan;
+use crate::runtime::Pool;
 use crate::sources::Sources;
 
 /// Bytes of a list of segments beside the segments themselves.

@@ -117,8 +117,7 @@ mod tests {
     #[test]
     fn a_mass_of_points_in_one_place_counts_as_one() {
         let find = |cells: &[CensusCell]| {
-            let (kept, left_out) =
-                trim(cells.iter().collect(), handful(cells.iter().map(CensusCell::distinct).sum()));
+            let (kept, left_out) = trim(cells.iter().collect(), handful(cells.iter().map(CensusCell::distinct).sum()));
             (kept.len(), left_out)
         };
         assert_eq!(find(&[shared(0, 99_999), cell(255, 1)]), (2, 0), "the only other point stays");

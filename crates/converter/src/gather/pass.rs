@@ -14,7 +14,9 @@ use super::lattice::ulp;
 use super::loose::Grouper;
 use super::origins::Origins;
 use super::partition::Partition;
-use crate::cloud::{Cell, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz};
+use crate::cloud::{
+    Cell, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz,
+};
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
 use crate::runtime::{Consumer, Evict, Reservation, Runtime};

@@ -5,8 +5,8 @@ use std::ops::Range;
 use pointmill_format::NodeKey;
 
 use super::divide::Chunk;
-use super::order::{OrderScratch, Point, order};
 use super::list::List;
+use super::order::{OrderScratch, Point, order};
 use super::raise::{Nodes, Pairs, Pending, Points};
 use super::sample::Sampler;
 use super::sink::{FinishedNode, NodeEncoder, finish_node};

@@ -88,7 +88,9 @@ impl Lists {
     /// Room in memory for that many bytes.
     fn reserve(&self, bytes: usize) -> Option<Reservation> {
         let bytes = bytes as u64;
-        self.memory.try_take_half(Consumer::Waiting, bytes).then(|| Reservation::of(&self.memory, Consumer::Waiting, bytes))
+        self.memory
+            .try_take_half(Consumer::Waiting, bytes)
+            .then(|| Reservation::of(&self.memory, Consumer::Waiting, bytes))
     }
 
     /// A region of the file; what of it is never written takes no room on the disk.

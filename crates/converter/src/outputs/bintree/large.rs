@@ -4,8 +4,8 @@
 use std::cmp::Ordering;
 use std::mem::take;
 
-use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, leaf_center};
 use pointmill_format::Aabb;
+use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, leaf_center};
 
 use super::subtree::{Builder, Built, record_offset, unite};
 use super::upper::Task;
@@ -47,14 +47,13 @@ impl Builder<'_> {
         };
         let mut ledger = Ledger::default();
         let mut sort = BigSort::new(rt, stride, memory_bytes / 2, compare);
-        sort.fill(task.segments(), |segment, records| {
-            ledger.load(store, segment, stride, &facts.widen_rgb, records)
-        })?;
+        sort.fill(task.segments(), |segment, records| ledger.load(store, segment, stride, &facts.widen_rgb, records))?;
         let capacity = u64::from(self.settings.capacity);
         let (mut nodes, mut leaves) = (Vec::new(), Vec::new());
         cut(task.points(), task.points().div_ceil(capacity), task.path.clone(), &mut nodes, &mut leaves);
         let center = leaf_center(self.world(min), self.world(max));
-        let mut lost = (!self.is_certain_within(center, max)).then(|| LostSort::new(rt, memory_bytes / 2, self.recovery));
+        let mut lost =
+            (!self.is_certain_within(center, max)).then(|| LostSort::new(rt, memory_bytes / 2, self.recovery));
         let (mut leaves, mut start) = (leaves.into_iter(), task.start);
         let (mut open, mut piece) = (leaves.next(), Vec::new());
         sort.finish(|record| {

@@ -140,7 +140,9 @@ impl Cut<'_> {
                 sides[1].parts.push(part);
             } else {
                 sides.iter_mut().for_each(Side::start_part);
-                for segment in part.segments.iter().flat_map(|s| s.split((CUT_BYTES / self.stride).clamp(1, CUT_POINTS) as u32)) {
+                for segment in
+                    part.segments.iter().flat_map(|s| s.split((CUT_BYTES / self.stride).clamp(1, CUT_POINTS) as u32))
+                {
                     records.clear();
                     let source = self.store.take(segment, &mut records)?;
                     for side in &mut sides {
@@ -226,7 +228,8 @@ impl Cut<'_> {
 
     /// The values of a part's points, which stay where they are.
     fn each(&self, part: &Part, records: &mut Vec<u8>, mut see: impl FnMut(i64)) -> Result<(), ConvertError> {
-        for segment in part.segments.iter().flat_map(|s| s.split((CUT_BYTES / self.stride).clamp(1, CUT_POINTS) as u32)) {
+        for segment in part.segments.iter().flat_map(|s| s.split((CUT_BYTES / self.stride).clamp(1, CUT_POINTS) as u32))
+        {
             records.clear();
             self.store.read(segment, records)?;
             records.chunks_exact(self.stride).for_each(|r| see(self.job(r)[self.axis]));
