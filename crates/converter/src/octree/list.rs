@@ -89,7 +89,7 @@ impl Lists {
     fn reserve(&self, bytes: usize) -> Option<Reservation> {
         let bytes = bytes as u64;
         self.memory
-            .try_take_half(Consumer::Waiting, bytes)
+            .try_take_eighth(Consumer::Waiting, bytes)
             .then(|| Reservation::of(&self.memory, Consumer::Waiting, bytes))
     }
 

@@ -90,9 +90,10 @@ impl Pool {
         is_taken
     }
 
-    /// [`Self::try_take`] for one of several consumers that must leave room for others: at most half of all is for it.
-    pub(crate) fn try_take_half(&self, who: Consumer, bytes: u64) -> bool {
-        self.taken_by(who) + bytes <= self.capacity / 2 && self.try_take(who, bytes)
+    /// [`Self::try_take`] for what goes to the disk easily and must leave room for others: at most an eighth of all is for
+    /// it.
+    pub(crate) fn try_take_eighth(&self, who: Consumer, bytes: u64) -> bool {
+        self.taken_by(who) + bytes <= self.capacity / 8 && self.try_take(who, bytes)
     }
 
     /// Takes `bytes`; records go to the disk to make room.
@@ -140,10 +141,10 @@ impl Reservation {
         Self { pool: Arc::clone(pool), who, bytes }
     }
 
-    /// [`Self::resize`] if there is room without anything making way, and the consumer has no more than half of all then.
+    /// [`Self::resize`] if there is room without anything making way, and the consumer has no more than an eighth of all then.
     pub(crate) fn try_resize(&mut self, bytes: u64) -> bool {
         let fits = match bytes.checked_sub(self.bytes) {
-            Some(more) => self.pool.try_take_half(self.who, more),
+            Some(more) => self.pool.try_take_eighth(self.who, more),
             None => {
                 self.pool.give(self.who, self.bytes - bytes);
                 true
