@@ -14,9 +14,6 @@ use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemD
 use crate::sources::{Sources, resolve_crs_of_all};
 use crate::warning::Warning;
 
-/// Bytes that decoding takes on a thread.
-pub(crate) const DECODE_BYTES: u64 = 12 << 20;
-
 /// Converts the inputs of `plan` to one dataset for each target. One goes into the output folder itself, several into
 /// folders of their names below it.
 ///
@@ -44,7 +41,7 @@ pub fn convert_on(
     let sources = Sources::open(plan, events)?;
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
-    let least = Least::of(targets.iter().map(|t| t.output().least_points()), DECODE_BYTES, 0);
+    let least = least(targets, &sources, &intake);
     let budget = Budget::new(plan, intake.schema.stride, least)?;
     resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
@@ -89,6 +86,12 @@ pub fn convert_on(
     rt.check_stop()?;
     staged.finish()?;
     Ok(report)
+}
+
+/// What the inputs and outputs need at least.
+pub(crate) fn least(targets: &[Target], sources: &Sources, intake: &Intake) -> Least {
+    let decoding = sources.all.iter().zip(&intake.sources).map(|(s, intake)| s.scan.decode_bytes(&intake.wanted));
+    Least::of(targets.iter().map(|t| t.output().least_points()), decoding.max().unwrap_or(0), 0)
 }
 
 /// What there is to say if the process grew beyond the ceiling during this run.

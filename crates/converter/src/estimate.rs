@@ -1,13 +1,13 @@
 //! What a run would do, from the headers alone.
 
 use crate::cloud::{Cube, Intake, Range, tidy_world};
-use crate::convert::DECODE_BYTES;
+use crate::convert::least;
 use crate::error::ConvertError;
 use crate::gather::{from_headers, is_coarse, is_lossless, quantized};
 use crate::outputs::{self, DiskSize, Target, choose_attributes};
 use crate::plan::Plan;
 use crate::report::{Estimate, grid_report, input_reports};
-use crate::runtime::{Budget, Least, Silent};
+use crate::runtime::{Budget, Silent};
 use crate::sources::{Sources, resolve_crs_of_all};
 
 /// Bytes of metadata and report together.
@@ -23,8 +23,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let schema = &intake.schema;
-    let least = Least::of(targets.iter().map(|t| t.output().least_points()), DECODE_BYTES, 0);
-    let budget = Budget::new(plan, schema.stride, least)?;
+    let budget = Budget::new(plan, schema.stride, least(targets, &sources, &intake))?;
     let mut warnings = sources.warnings.clone();
     let crs = resolve_crs_of_all(plan, &sources.all, &mut warnings)?;
     let lattice = from_headers(plan, &sources)?;
