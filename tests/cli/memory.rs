@@ -39,7 +39,6 @@ fn check(scan: &[u8], options: &[&str]) {
         }
         let warnings = report["warnings"].as_array().unwrap();
         assert!(warnings.iter().all(|w| w["kind"] != "above_ceiling"), "{warnings:?}");
-        assert!(report["temp_bytes"].as_u64().unwrap() > 0, "{format}: all fits into {least} MiB");
         let [scarce, ample] = ["least", "plenty"].map(|name| dataset(&dir.path(&format!("{name}-{format}"))));
         assert!(scarce == ample, "{format}: the datasets differ");
     }

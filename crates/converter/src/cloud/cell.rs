@@ -1,5 +1,7 @@
 //! Where points are: cells of the octree as they are stored, and how many points there are in each.
 
+use std::collections::HashMap;
+
 use pointmill_format::NodeKey;
 
 use super::frames::JobBounds;
@@ -33,8 +35,6 @@ pub(crate) struct CensusCell {
     pub(crate) points: u64,
     /// Points known to repeat the place of another of the cell: those of places that very many share.
     pub(crate) repeats: u64,
-    /// Extremes of the positions, known for the fullest cells.
-    pub(crate) bounds: Option<JobBounds>,
 }
 
 impl CensusCell {
@@ -42,6 +42,15 @@ impl CensusCell {
     pub(crate) fn distinct(&self) -> u64 {
         self.points - self.repeats
     }
+}
+
+/// How many points there are where.
+#[derive(Debug, Default)]
+pub(crate) struct Census {
+    /// Every occupied cell of one level of the octree, in Morton order.
+    pub(crate) cells: Vec<CensusCell>,
+    /// Extremes of the positions in the fullest of them.
+    pub(crate) bounds: HashMap<NodeKey, JobBounds>,
 }
 
 /// A place that very many points share.

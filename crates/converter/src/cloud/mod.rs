@@ -22,7 +22,7 @@ mod stats;
 mod store;
 
 pub(crate) use big_sort::BigSort;
-pub(crate) use cell::{Cell, CensusCell, SharedPlace, xyz};
+pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, xyz};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
@@ -63,8 +63,8 @@ pub(crate) struct Cloud<'a> {
     pub(crate) store: Arc<Store>,
     /// Where the records are: cells of the octree that do not overlap, in Morton order.
     pub(crate) cells: Vec<Cell>,
-    /// Every occupied cell of one level of the octree, in Morton order.
-    pub(crate) census: Vec<CensusCell>,
+    /// How many points there are where.
+    pub(crate) census: Census,
     /// What the cells take of the run's memory.
     _room: Reservation,
     pub(crate) stats: Stats,
@@ -84,7 +84,7 @@ pub(crate) struct Gathered {
     pub(crate) frame: RecordFrame,
     pub(crate) store: Arc<Store>,
     pub(crate) cells: Vec<Cell>,
-    pub(crate) census: Vec<CensusCell>,
+    pub(crate) census: Census,
     /// What the cells take.
     pub(crate) room: Reservation,
     pub(crate) stats: Stats,

@@ -11,13 +11,13 @@ const MOST_CELLS: usize = 1 << 18;
 
 /// Points by cell. The width of the cells depends on the points alone: the least at which there are [`MOST_CELLS`] at most.
 #[derive(Debug, Default)]
-pub(super) struct Census {
+pub(super) struct Counts {
     counts: HashMap<u64, u64, CellHash>,
     /// Levels by which its cells are wider than those of the partition.
     wider: u32,
 }
 
-impl Census {
+impl Counts {
     /// Adds points of a cell of the partition.
     pub(super) fn add(&mut self, cell: u64, points: u64) {
         *self.counts.entry(coarser(cell, self.wider)).or_default() += points;
@@ -58,8 +58,7 @@ impl Census {
     /// The cells, in Morton order.
     pub(super) fn finish(self, partition: &Partition, cube: &Cube) -> Vec<CensusCell> {
         let Self { counts, wider } = self;
-        let cell =
-            |(cell, points)| CensusCell { key: partition.node(cell, wider, cube), points, repeats: 0, bounds: None };
+        let cell = |(cell, points)| CensusCell { key: partition.node(cell, wider, cube), points, repeats: 0 };
         let mut cells: Vec<CensusCell> = counts.into_iter().map(cell).collect();
         cells.sort_unstable_by(|a, b| morton::compare(xyz(a.key), xyz(b.key)));
         cells
@@ -72,7 +71,7 @@ mod tests {
     use crate::gather::partition::pack;
 
     fn count(cells: impl Iterator<Item = u64>) -> (u32, Vec<(u64, u64)>) {
-        let mut census = Census::default();
+        let mut census = Counts::default();
         cells.for_each(|cell| census.add(cell, 1));
         let mut counts: Vec<_> = census.counts.into_iter().collect();
         counts.sort_unstable();
@@ -88,7 +87,7 @@ mod tests {
         assert_eq!(forwards, scattered);
         assert_eq!((forwards.0, forwards.1.len()), (1, 40 * 40 * 40));
         assert!(forwards.1.iter().all(|(_, points)| *points == 8));
-        let mut halves = [Census::default(), Census::default()];
+        let mut halves = [Counts::default(), Counts::default()];
         cells.iter().enumerate().for_each(|(i, cell)| halves[usize::from(i > 1000)].add(*cell, 1));
         let [mut few, many] = halves;
         few.merge(many);

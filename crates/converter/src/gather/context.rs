@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use pointmill_format::Lattice;
 
 use super::axis::SourceMap;
-use super::census::Census;
+use super::census::Counts;
 use super::cut::Cut;
 use super::lattice::ulp;
 use super::origins::Origins;
@@ -90,7 +90,7 @@ pub(super) struct Collected {
     pub(super) cells: CellParts,
     /// Records in no order of space, to be grouped once all are in.
     pub(super) loose: Segments,
-    pub(super) census: Census,
+    pub(super) census: Counts,
     /// Segments that were added to the cells.
     pub(super) segments: u64,
 }

@@ -40,8 +40,8 @@ impl Outliers {
 /// Looks at the cells of the partition, not at the points. What counts is how many places there are on either side: a
 /// hundred thousand points in one place are one, or the advice would leave out all that was measured.
 pub(super) fn find(gathered: &Gathered) -> Option<Outliers> {
-    let handful = handful(gathered.census.iter().map(CensusCell::distinct).sum());
-    let cells: Vec<&CensusCell> = gathered.census.iter().collect();
+    let handful = handful(gathered.census.cells.iter().map(CensusCell::distinct).sum());
+    let cells: Vec<&CensusCell> = gathered.census.cells.iter().collect();
     let (kept, left_out) = trim(cells, handful);
     let (cube, lattice) = (&gathered.frame.cube, &gathered.lattice.lattice);
     let corner = cube.offset(lattice);
@@ -98,7 +98,7 @@ mod tests {
     use pointmill_format::NodeKey;
 
     fn cell(x: u32, points: u64) -> CensusCell {
-        CensusCell { key: NodeKey { level: 8, x, y: 3, z: 0 }, points, repeats: 0, bounds: None }
+        CensusCell { key: NodeKey { level: 8, x, y: 3, z: 0 }, points, repeats: 0 }
     }
 
     fn shared(x: u32, points: u64) -> CensusCell {

@@ -15,7 +15,7 @@ use super::loose::Grouper;
 use super::origins::Origins;
 use super::partition::Partition;
 use crate::cloud::{
-    Cell, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz,
+    Cell, Census, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz,
 };
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
@@ -99,7 +99,7 @@ impl<'a> Pass<'a> {
         };
         let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
         let Collected { cells, loose, census, .. } = collected;
-        let census = census.finish(&partition, &cube);
+        let census = Census { cells: census.finish(&partition, &cube), bounds: HashMap::new() };
         let mut nodes: Vec<(NodeKey, CellPart)> =
             cells.into_iter().map(|(packed, part)| (partition.node(packed, 0, &cube), part)).collect();
         if !loose.is_empty() {
@@ -110,7 +110,7 @@ impl<'a> Pass<'a> {
         }
         let cells = finished(nodes);
         let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
-        room.resize(of_cells + (census.capacity() * size_of::<CensusCell>()) as u64)?;
+        room.resize(of_cells + (census.cells.capacity() * size_of::<CensusCell>()) as u64)?;
         Ok(PassEnd::Complete(Box::new(Gathered {
             lattice: lattice.clone(),
             is_lossless: is_rounding(&stats, &lattice.lattice),

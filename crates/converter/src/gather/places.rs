@@ -4,7 +4,8 @@
 use std::collections::HashMap;
 
 use crate::cloud::{
-    Cell, CensusCell, Gathered, JobBounds, RecordFrame, SharedPlace, Store, StoredPoint, TREE_BITS, position, xyz,
+    Cell, Census, CensusCell, Gathered, JobBounds, RecordFrame, SharedPlace, Store, StoredPoint, TREE_BITS, position,
+    xyz,
 };
 use crate::error::ConvertError;
 
@@ -23,7 +24,8 @@ pub(super) fn find(gathered: &mut Gathered) -> Result<Vec<SharedPlace>, ConvertE
     let Gathered { frame, store, cells, census, lattice, .. } = gathered;
     let (origin, lattice) = (frame.origin, lattice.lattice);
     let mut shared = Vec::new();
-    let mut rest = &mut census[..];
+    let Census { cells: counted, bounds } = census;
+    let mut rest = &mut counted[..];
     for stored in cells.iter() {
         let inside = rest.iter().take_while(|cell| cell.key.ancestor(stored.key.level) == Some(stored.key)).count();
         let (mine, others) = std::mem::take(&mut rest).split_at_mut(inside);
@@ -42,7 +44,7 @@ pub(super) fn find(gathered: &mut Gathered) -> Result<Vec<SharedPlace>, ConvertE
                 cell.repeats += points - 1;
                 shared.push(SharedPlace { position: lattice.world(origin.job(place).0), points });
             }
-            cell.bounds = Some(JobBounds { min: origin.job(tally.min), max: origin.job(tally.max) });
+            bounds.insert(cell.key, JobBounds { min: origin.job(tally.min), max: origin.job(tally.max) });
         }
     }
     let bits = |place: &SharedPlace| place.position.map(f64::to_bits);
@@ -147,7 +149,7 @@ mod tests {
                 1 => places.reverse(),
                 _ => places.sort_unstable_by_key(|p| p.wrapping_mul(0x9e37_79b1u32 as i32)),
             }
-            let cell = CensusCell { key: NodeKey::ROOT, points: places.len() as u64, repeats: 0, bounds: None };
+            let cell = CensusCell { key: NodeKey::ROOT, points: places.len() as u64, repeats: 0 };
             let mut tally = Tally::new(&cell, 499);
             let at = |x: &i32| StoredPoint([*x, 1, 2]);
             places.iter().for_each(|x| tally.offer(at(x)));

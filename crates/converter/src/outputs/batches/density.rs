@@ -46,10 +46,16 @@ impl Density {
         let side = |level: u8| cloud.frame.cube.side / 2f64.powi(i32::from(level));
         let patch = |cell: &CensusCell| {
             let own = |b: JobBounds| area([0, 1, 2].map(|a| b.extent(a)), lattice, cell.distinct());
-            let area = cell.bounds.map_or(f64::INFINITY, own).min(side(cell.key.level).powi(2));
+            let area = cloud
+                .census
+                .bounds
+                .get(&cell.key)
+                .copied()
+                .map_or(f64::INFINITY, own)
+                .min(side(cell.key.level).powi(2));
             Patch { points: cell.distinct(), area }
         };
-        let mut keys: Vec<NodeKey> = cloud.census.iter().map(|cell| cell.key).collect();
+        let mut keys: Vec<NodeKey> = cloud.census.cells.iter().map(|cell| cell.key).collect();
         let finest = keys.iter().map(|key| key.level).min().unwrap_or(0);
         let at = |level: u8| {
             keys.iter_mut().for_each(|key| *key = key.ancestor(level).unwrap_or(*key));
@@ -57,7 +63,7 @@ impl Density {
             (side(level), keys.len() as u64)
         };
         let levels = (0..=finest).rev().map(at).collect();
-        Self { patches: cloud.census.iter().map(patch).collect(), levels }
+        Self { patches: cloud.census.cells.iter().map(patch).collect(), levels }
     }
 
     /// Halves the cell from `widest` on, not below `least`, until there are enough.
