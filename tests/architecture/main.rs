@@ -23,7 +23,7 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
         &[
             &["flags"],
             &["exit", "datasets"],
-            &["args", "interrupt"],
+            &["args", "allocator", "interrupt"],
             &["human", "scan_choice"],
             &["inputs"],
             &["commands"],

@@ -76,7 +76,7 @@ impl Budget {
         let least_build = BUILD_BYTES + least_chunk.saturating_mul(bytes_per_chunk_point);
         let of_threads = threads.saturating_mul(reader_bytes.max(least_build));
         let least_bytes = fixed_bytes.saturating_add(of_threads).saturating_add(LEAST_POOL_BYTES);
-        let least_ceiling = (least_bytes.saturating_add(least_bytes / 9)).next_multiple_of(1 << 20);
+        let least_ceiling = (least_bytes.saturating_mul(10).div_ceil(9) + 1).next_multiple_of(1 << 20);
         if ceiling < least_ceiling {
             let why = if least.input_bytes > of_threads {
                 MemoryNeed::Inputs { bytes: least.input_bytes }
@@ -182,7 +182,7 @@ mod tests {
             };
             let enough = Budget::new(&plan(needed >> 20, threads), 38, least).unwrap();
             assert_eq!(enough.least_ceiling, needed);
-            assert!(enough.build_bytes(u64::MAX) + LEAST_POOL_BYTES <= enough.pool_bytes + 1);
+            assert!(enough.build_bytes(u64::MAX) + LEAST_POOL_BYTES / 2 <= enough.pool_bytes);
             assert!(Budget::new(&plan((needed >> 20) - 1, threads), 38, least).is_err());
         }
     }

@@ -186,6 +186,12 @@ pub(crate) fn sync_folder(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
     if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
+/// Waits until all that is written to the file system of a folder is safe; false where the system has no such request.
+pub(crate) fn sync_file_system(disk: &dyn Disk, folder: &Path) -> io::Result<bool> {
+    disk.permit(DiskOperation::Sync)?;
+    os_hints::sync_file_system(&File::open(folder)?)
+}
+
 /// Waits until a file that is closed is safe.
 pub(crate) fn sync_path(disk: &dyn Disk, path: &Path) -> io::Result<()> {
     disk.permit(DiskOperation::Sync)?;

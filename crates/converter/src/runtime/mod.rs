@@ -47,8 +47,8 @@ impl<'a> Runtime<'a> {
             .thread_name(|i| format!("pointmill-{i}"))
             .build()
             .map_err(|e| ConvertError::Internal(format!("starting threads: {e}")))?;
-        let memory = Arc::new(Pool::new(budget.pool_bytes, plan.memory_bytes));
-        Ok(Self { budget, memory, temp, threads, events, pool })
+        let memory = Pool::new(budget.pool_bytes, plan.memory_bytes).with_records(plan.waiting_bytes);
+        Ok(Self { budget, memory: Arc::new(memory), temp, threads, events, pool })
     }
 
     /// Fails if the run was asked to stop.

@@ -52,6 +52,8 @@ pub(crate) struct Pool {
     capacity: u64,
     /// Of the whole process, for errors.
     ceiling: u64,
+    /// For records alone.
+    most_records: u64,
     used: AtomicU64,
     by: [AtomicU64; CONSUMERS],
     evict: Mutex<Option<Weak<dyn Evict>>>,
@@ -60,7 +62,19 @@ pub(crate) struct Pool {
 impl Pool {
     /// A pool of `capacity` bytes below a ceiling of `ceiling` bytes.
     pub(crate) fn new(capacity: u64, ceiling: u64) -> Self {
-        Self { capacity, ceiling, used: AtomicU64::new(0), by: Default::default(), evict: Mutex::new(None) }
+        Self {
+            capacity,
+            ceiling,
+            most_records: u64::MAX,
+            used: AtomicU64::new(0),
+            by: Default::default(),
+            evict: Mutex::new(None),
+        }
+    }
+
+    /// The same with at most so many bytes of records.
+    pub(crate) fn with_records(self, most_records: Option<u64>) -> Self {
+        Self { most_records: most_records.unwrap_or(u64::MAX), ..self }
     }
 
     /// Names what makes room when the pool is empty.
@@ -82,6 +96,9 @@ impl Pool {
 
     /// Takes `bytes` if they are free: for what can go to the disk instead.
     pub(crate) fn try_take(&self, who: Consumer, bytes: u64) -> bool {
+        if who == Consumer::Records && self.taken_by(who).saturating_add(bytes) > self.most_records {
+            return false;
+        }
         let add = |used: u64| used.checked_add(bytes).filter(|sum| *sum <= self.capacity);
         let is_taken = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).is_ok();
         if is_taken {

@@ -9,6 +9,9 @@ use crate::error::ConvertError;
 use crate::outputs::staging::StagedDataset;
 use crate::runtime::{DiskFile, Runtime};
 
+/// More files are not synced one by one: the file system is asked to sync all it has.
+const FEW_FILES: usize = 256;
+
 /// The leaves of a dataset; any number of threads put them.
 pub(super) struct Leaves<'a> {
     staged: &'a StagedDataset,
@@ -66,6 +69,9 @@ impl<'a> Leaves<'a> {
             file.sync("syncing the leaves")?;
         }
         let written = self.written.into_inner().unwrap_or_default();
+        if written.len() > FEW_FILES && self.staged.sync_file_system()? {
+            return Ok(self.bytes.into_inner());
+        }
         let sync = |(): &mut (), leaf: usize| self.staged.sync_file(&written[leaf]);
         rt.in_parallel(written.len(), || (), sync, |()| ())?;
         Ok(self.bytes.into_inner())
