@@ -92,6 +92,9 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
         }
+        Some(ReadAdvice::DetectSeparator) => {
+            "name the one that the rows have, or leave out --separator to have it detected".to_owned()
+        }
         Some(ReadAdvice::DecimalMark) => {
             "say whether commas are decimal marks: --decimal comma or --decimal point".to_owned()
         }

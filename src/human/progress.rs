@@ -10,6 +10,7 @@ use pointmill_converter::{Events, Phase, Warning};
 use serde_json::json;
 
 use super::quantities::{count, rate, seconds};
+use super::text::json_escaped;
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
@@ -188,7 +189,7 @@ impl Events for Progress {
 
 fn write_line(object: &serde_json::Value) {
     // Nothing can be reported when standard error is closed.
-    let _ = writeln!(io::stderr().lock(), "{object}");
+    let _ = writeln!(io::stderr().lock(), "{}", json_escaped(&object.to_string()));
 }
 
 fn style(total: u64) -> ProgressStyle {

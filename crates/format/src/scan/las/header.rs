@@ -6,6 +6,9 @@ use crate::{Aabb, Advice, Fault, Lattice, ReadError, ScanWarning};
 
 /// Bytes of the LAS 1.0–1.2 header; every later one starts with these.
 const MIN_HEADER: u64 = 227;
+/// The first of three doubles.
+const SCALES: u64 = 131;
+const OFFSETS: u64 = 155;
 /// Bytes of the LAS 1.4 header.
 const HEADER_1_4: u64 = 375;
 
@@ -92,7 +95,7 @@ impl Header {
             compressed_bit: bytes[104] & 0xc0 != 0,
             record_len: usize::from(u16_at(&bytes, 105)),
             point_count: u64::from(u32_at(&bytes, 107)),
-            lattice: Lattice { scale: f64x3_at(&bytes, 131), offset: f64x3_at(&bytes, 155) },
+            lattice: Lattice { scale: f64x3_at(&bytes, SCALES as usize), offset: f64x3_at(&bytes, OFFSETS as usize) },
             bounds: bounds(&bytes),
             evlr_start: 0,
             evlr_count: 0,
@@ -136,15 +139,32 @@ impl Header {
             let fault = Fault::OutsideFile { part: "the points", offset, bytes: None, file_bytes };
             return Err(ReadError::broken(path, source.len(), fault).advise(Advice::CutShort));
         }
-        if !self.lattice.is_valid() && self.point_count > 0 {
-            let Lattice { scale, offset } = self.lattice;
-            let what = format!("scale {scale:?} or offset {offset:?} cannot place a point (scales must be > 0)");
-            return Err(ReadError::broken(path, 131, Fault::Header(what)).advise(Advice::ExportAgain));
+        if let Some((at, what)) = self.misplaced().filter(|_| self.point_count > 0) {
+            return Err(ReadError::broken(path, at, Fault::Header(what)).advise(Advice::ExportAgain));
         }
         if self.bounds.is_none() && self.point_count > 0 {
             warnings.push(ScanWarning::Bounds);
         }
         Ok(self)
+    }
+
+    /// The first scale or offset that cannot place a point: its byte, and what is wrong with it.
+    fn misplaced(&self) -> Option<(u64, String)> {
+        let Lattice { scale, offset } = self.lattice;
+        let each = (0..3u64).zip(["x", "y", "z"]).zip(scale.into_iter().zip(offset));
+        each.flat_map(|((axis, name), (scale, offset))| {
+            let (least, most) = (Lattice::FINEST_STEP, Lattice::COARSEST_STEP);
+            let step = format!(
+                "the scale of {name} is {scale:e}, no step that coordinates can have ({least:e} to {most:.1e})"
+            );
+            let place = format!("the offset of {name} is {offset:e}, no place that coordinates can have");
+            [
+                (!Lattice::is_sound_step(scale)).then_some((SCALES + 8 * axis, step)),
+                (!Lattice::is_sound_offset(offset)).then_some((OFFSETS + 8 * axis, place)),
+            ]
+        })
+        .flatten()
+        .min_by_key(|(at, _)| *at)
     }
 }
 
