@@ -184,3 +184,41 @@ fn bounds(bytes: &[u8]) -> Option<Aabb> {
     let aabb = Aabb { min, max };
     (!aabb.is_empty() && min.iter().chain(&max).all(|v| v.is_finite())).then_some(aabb)
 }
+
+#[cfg(test)]
+mod tests {
+    use pointmill_testkit::las::Las;
+
+    use super::super::open;
+    use crate::ErrorKind;
+
+    /// The byte at which a file with one odd number is refused; `None`: it is read.
+    fn refused_at(at: usize, value: f64) -> Option<u64> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.las");
+        let mut bytes = Las { offset: [0.0; 3], ..Las::terrain(5, 1) }.bytes();
+        bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        let error = open(&path).err()?;
+        assert!(matches!(error.kind(), ErrorKind::Broken), "{error}");
+        error.offset()
+    }
+
+    #[test]
+    fn scales_and_offsets_that_place_no_point_are_refused_with_their_byte() {
+        for at in [131, 139, 147] {
+            for scale in [0.0, -0.0, -0.001, 5e-310, 1e-300, 9e-16, 5e20, 1e300, f64::NAN, f64::INFINITY] {
+                assert_eq!(refused_at(at, scale), Some(at as u64), "{scale:e}");
+            }
+            for scale in [1e-15, 1e-12, 1e-7, 0.3048, 1000.0, 4e20] {
+                assert_eq!(refused_at(at, scale), None, "{scale:e}");
+            }
+        }
+        for at in [155, 163, 171] {
+            for offset in [1.1e30, -1e300, f64::NAN, f64::NEG_INFINITY] {
+                assert_eq!(refused_at(at, offset), Some(at as u64), "{offset:e}");
+            }
+            assert_eq!((refused_at(at, -1e30), refused_at(at, 5e-310)), (None, None));
+        }
+    }
+}
