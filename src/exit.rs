@@ -9,7 +9,7 @@ use pointmill_converter::ConvertError;
 use pointmill_format::{Advice, ErrorKind, ReadError, system_reason};
 
 use crate::flags;
-use crate::human::text::{json_escaped, printable, printable_lines};
+use crate::printable::{json_escaped, printable, printable_lines};
 
 /// Why the program ends without success.
 #[derive(Debug)]

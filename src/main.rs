@@ -12,6 +12,7 @@ mod flags;
 mod human;
 mod inputs;
 mod interrupt;
+mod printable;
 mod scan_choice;
 mod text_choice;
 

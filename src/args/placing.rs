@@ -11,7 +11,6 @@ use pointmill_format::{Affine, Lattice};
 
 use crate::crs_choice;
 use crate::exit::Failure;
-use crate::human::quantities::numbers as numbers_text;
 
 /// Numbers of a matrix.
 const NUMBERS: usize = 16;
@@ -143,7 +142,8 @@ fn matrix(text: &str) -> Result<Affine, Failure> {
     for row in rows[..12].chunks_exact(4) {
         let largest = row[..3].iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
         if !FACTORS.contains(&largest) || !Lattice::is_sound_offset(row[3]) {
-            return Err(refuse(format!("the row {} places no point where coordinates can be", numbers_text(row))));
+            let row_text = row.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+            return Err(refuse(format!("the row {} places no point where coordinates can be", row_text)));
         }
     }
     Ok(map)

@@ -10,10 +10,10 @@ use pointmill_converter::{Events, Phase, Warning};
 use serde_json::json;
 
 use super::quantities::{count, rate, seconds};
-use super::text::json_escaped;
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
+use crate::printable::json_escaped;
 
 /// Interval of JSON lines; one per batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);

@@ -6,7 +6,7 @@ use std::path::Path;
 use pointmill_validate::{Accuracy, DatasetKind, LeafQuality, LevelQuality, Outcome};
 
 use super::quantities::{at_most, count, plural, three_digits};
-use super::text::printable;
+use crate::printable::printable;
 
 /// What a validation found: checks, quality by level, problems.
 pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> String {

@@ -9,9 +9,9 @@ use std::{fmt, fs};
 
 use pointmill_format::{OpenOptions, supported_scans, system_reason};
 
+use super::found::{Inputs, Unread, other_files};
 use super::identity::Identity;
 use super::kind::{Kind, is_other, kind, kind_by_ending, kind_in_folder};
-use super::{Inputs, Unread, other_files};
 use crate::exit::Failure;
 use crate::human::quantities::plural;
 
@@ -188,8 +188,14 @@ mod tests {
 
     use super::*;
 
+    fn expand(typed: &[PathBuf]) -> Result<Inputs, Failure> {
+        let mut search = Search::new(&OpenOptions::default());
+        typed.iter().try_for_each(|path| search.add_typed(path))?;
+        search.finish(typed)
+    }
+
     fn search(folder: &Path) -> Inputs {
-        super::super::expand(&[folder.to_path_buf()], &OpenOptions::default()).unwrap()
+        expand(&[folder.to_path_buf()]).unwrap()
     }
 
     fn folder() -> tempfile::TempDir {
@@ -246,7 +252,7 @@ mod tests {
         let typed: Vec<PathBuf> = ["", "*.las", "*.la*"].iter().map(|name| dir.path().join(name)).collect();
         let open = || fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
         let before = open();
-        let inputs = super::super::expand(&typed, &OpenOptions::default()).unwrap();
+        let inputs = expand(&typed).unwrap();
         assert_eq!(inputs.files.len(), 1001);
         assert!(inputs.notes[0].starts_with("5,002 inputs named more than once"), "{:?}", inputs.notes);
         assert!(open() < before + 100, "other tests open files, too, but not a thousand");
@@ -256,7 +262,7 @@ mod tests {
     fn what_cannot_be_looked_into_is_the_failure_where_nothing_else_is_there() {
         let dir = tempfile::tempdir().unwrap();
         symlink("tiles", dir.path().join("tiles")).unwrap();
-        let failure = super::super::expand(&[dir.path().to_path_buf()], &OpenOptions::default()).unwrap_err();
+        let failure = expand(&[dir.path().to_path_buf()]).unwrap_err();
         assert_eq!(failure.code(), 5);
     }
 }
