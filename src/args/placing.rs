@@ -142,8 +142,9 @@ fn matrix(text: &str) -> Result<Affine, Failure> {
     for row in rows[..12].chunks_exact(4) {
         let largest = row[..3].iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
         if !FACTORS.contains(&largest) || !Lattice::is_sound_offset(row[3]) {
-            let row_text = row.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
-            return Err(refuse(format!("the row {} places no point where coordinates can be", row_text)));
+            let short = |v: &f64| if v.abs() < 1e15 { v.to_string() } else { format!("{v:e}") };
+            let shown = row.iter().map(short).collect::<Vec<_>>().join(" ");
+            return Err(refuse(format!("the row {shown} places no point where coordinates can be")));
         }
     }
     Ok(map)

@@ -113,7 +113,8 @@ fn a_pipe_in_a_folder_is_left_out() {
 fn scans_that_no_lattice_can_hold_together_are_refused() {
     let dir = Dir::new();
     dir.write("scans/a.las", &Las::terrain(3000, 1).bytes());
-    dir.write("scans/b.xyz", b"1e300 1 2\n1.5e300 2 3\n");
+    let far: String = (0..3000).map(|i| format!("1.{i:04}e300 {i} 2\n")).collect();
+    dir.write("scans/b.xyz", far.as_bytes());
     dir.run(["convert", "scans", "-o", "out", "-q"]).failed_with(3, &["cannot be coordinates", "--bounds"]);
     let mut far = Las::terrain(3000, 1);
     far.offset[0] = 1e300;

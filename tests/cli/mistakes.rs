@@ -290,7 +290,7 @@ fn inputs_that_cannot_be_read() {
         ("extract~home~-o~ex", 5, &["home", "a folder"]),
         ("extract~notes.txt~-o~ex", 4, &["notes.txt"]),
         ("validate~ds~--against~nowhere", 2, &["nowhere: no such file or folder"]),
-        ("validate~ds~--against~cut.las", 3, &["cut.las"]),
+        ("validate~ds~--against~header.las", 3, &["header.las", "cut short"]),
     ]);
 }
 
