@@ -46,6 +46,11 @@
 //! [`potree2::Dataset::set_max_node_bytes`]. A decompressor that panics on corrupt bytes is caught, and the panic is an
 //! error ([`Fault::Decode`]); the panic hook of the process is left alone, so the default one prints a line. One that
 //! exhausts the stack ends the process: a damaged GPS time in LAZ may.
+
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
 #![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a separate module
 
 mod dataset_kind;
