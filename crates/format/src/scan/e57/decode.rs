@@ -33,7 +33,7 @@ pub(super) fn piece(
     for (_, fill) in plan.fills.iter().enumerate().filter(|(column, _)| is_wanted(*column)) {
         Roles::mark(*fill, &mut needed);
     }
-    let Scratch { raw, decoded, batch } = scratch;
+    let Scratch { raw, decoded, batch, .. } = scratch;
     let streams = Streams::gather(&scan.source, cut, &plan.fields, &needed, raw, decoded)?;
     let n = cut.records as usize;
     let values = Values { fields: &plan.fields, streams, n };
