@@ -77,10 +77,10 @@ impl<'a> Coder<'a> {
         self.at >= BROKEN
     }
 
-    /// Met what no encoder writes.
+    /// Met what no encoder writes; if bytes were missing before, that is the reason.
     #[cold]
     pub(super) fn fail(&mut self) {
-        if !self.is_broken() {
+        if !self.is_off() {
             self.at += BROKEN;
         }
         self.value = 0;

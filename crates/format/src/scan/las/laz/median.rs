@@ -22,11 +22,9 @@ impl Median {
     /// Without a branch that depends on the values.
     #[inline(always)]
     pub(super) fn add(&mut self, value: i32) {
-        let [a, b, c, d, e] = self.values;
-        let high = self.drops_largest;
-        self.drops_largest = if high { value < c } else { c >= value };
-        // those that stay
-        let kept = if high { [a, b, c, d] } else { [b, c, d, e] };
+        let (median, drops_smallest) = (self.values[2], usize::from(!self.drops_largest));
+        self.drops_largest = (value < median) | ((value == median) & !self.drops_largest);
+        let kept: [i32; 4] = std::array::from_fn(|i| self.values[drops_smallest + i]);
         self.values = [
             kept[0].min(value),
             kept[0].max(kept[1].min(value)),

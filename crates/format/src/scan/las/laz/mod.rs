@@ -26,6 +26,8 @@ mod pointwise;
 mod returns;
 mod stop;
 mod table;
+#[cfg(test)]
+mod tests;
 mod version_1;
 mod wave_packet;
 
