@@ -109,8 +109,7 @@ impl Channel {
     fn position(&mut self, coder: &mut Coder<'_>) -> usize {
         let Values { x, y, returns, number, new_time } = &mut self.last;
         let single = usize::from(*returns == 1);
-        let [x_median, y_median] =
-            &mut self.medians[context_16(*returns, *number) << 1 | usize::from(*new_time)];
+        let [x_median, y_median] = &mut self.medians[context_16(*returns, *number) << 1 | usize::from(*new_time)];
 
         let dx = self.dx.next(coder, x_median.get(), single);
         *x = x.wrapping_add(dx);

@@ -87,8 +87,7 @@ impl GpsTime {
     #[inline]
     pub(super) fn next(&mut self, coder: &mut Coder<'_>) -> i64 {
         for _ in 0..=MOST_CHANGES {
-            let change =
-                if self.sequences[self.current].step == 0 { self.step_first(coder) } else { self.step(coder) };
+            let change = if self.sequences[self.current].step == 0 { self.step_first(coder) } else { self.step(coder) };
             match change {
                 0 => return self.time(),
                 by => self.current = (self.current + by) & 3,

@@ -179,10 +179,8 @@ impl LayeredModels {
                     Decoder::Time(FieldLayer::new()),
                 ]),
                 ItemKind::Rgb14 => decoders.push(Decoder::Rgb(ItemLayer::new(at, version))),
-                ItemKind::RgbNir14 => decoders.extend([
-                    Decoder::Rgb(ItemLayer::new(at, version)),
-                    Decoder::Nir(ItemLayer::new(at + 6, version)),
-                ]),
+                ItemKind::RgbNir14 => decoders
+                    .extend([Decoder::Rgb(ItemLayer::new(at, version)), Decoder::Nir(ItemLayer::new(at + 6, version))]),
                 ItemKind::WavePacket14 => decoders.push(Decoder::WavePacket),
                 ItemKind::Byte14 => {
                     let places = at..at + usize::from(bytes);

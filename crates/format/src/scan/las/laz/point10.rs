@@ -103,7 +103,9 @@ impl Point10 {
         self.changes.reset();
         [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(Family::reset);
         self.angles.iter_mut().for_each(Bytes::reset);
-        [&mut self.intensity, &mut self.source, &mut self.dx, &mut self.dy, &mut self.z].into_iter().for_each(Integer::reset);
+        [&mut self.intensity, &mut self.source, &mut self.dx, &mut self.dy, &mut self.z]
+            .into_iter()
+            .for_each(Integer::reset);
         self.intensities = [0; 16];
         self.medians = [[Median::new(); 2]; 16];
         self.heights = [0; 8];

@@ -160,7 +160,9 @@ impl GpsTime {
         let (predicted, context) = match multiple {
             0 => (self.step / 4, 2),
             1 => (self.step, 1),
-            _ => (self.step.wrapping_mul(multiple as i32), 3 + usize::from(multiple >= 10) + usize::from(multiple >= 50)),
+            _ => {
+                (self.step.wrapping_mul(multiple as i32), 3 + usize::from(multiple >= 10) + usize::from(multiple >= 50))
+            }
         };
         let by = self.corrections.next(coder, predicted, context);
         self.time = self.time.wrapping_add(i64::from(by));

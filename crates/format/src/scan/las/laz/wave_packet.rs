@@ -56,7 +56,9 @@ impl WavePacket {
         (self.last_kind, self.last_step) = (SAME, 0);
         self.descriptors.reset();
         self.kinds.iter_mut().for_each(Tiny::reset);
-        [&mut self.steps, &mut self.sizes, &mut self.return_points, &mut self.directions].into_iter().for_each(Integer::reset);
+        [&mut self.steps, &mut self.sizes, &mut self.return_points, &mut self.directions]
+            .into_iter()
+            .for_each(Integer::reset);
     }
 
     pub(super) fn next(&mut self, coder: &mut Coder<'_>, item: &mut [u8; LEN]) {

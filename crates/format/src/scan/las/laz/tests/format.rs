@@ -3,9 +3,7 @@
 use std::io::Cursor;
 
 use ::laz::LazVlr;
-use ::laz::record::{
-    LayeredPointRecordCompressor, RecordCompressor, SequentialPointRecordCompressor,
-};
+use ::laz::record::{LayeredPointRecordCompressor, RecordCompressor, SequentialPointRecordCompressor};
 use pointmill_testkit::Random;
 
 use super::super::{

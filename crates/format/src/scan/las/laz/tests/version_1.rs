@@ -68,8 +68,7 @@ fn integers_of_any_width_come_back() {
             2 => mask - random.below(3) as u32,
             _ => random.next_u32() >> random.below(32) & mask,
         };
-        let numbers: Vec<(i32, i32)> =
-            (0..5000).map(|_| (number().cast_signed(), number().cast_signed())).collect();
+        let numbers: Vec<(i32, i32)> = (0..5000).map(|_| (number().cast_signed(), number().cast_signed())).collect();
         let mut encoder = ArithmeticEncoder::new(Cursor::new(Vec::new()));
         let mut integers = IntegerCompressorBuilder::new().bits(bits).contexts(3).build_initialized();
         for (i, (predicted, real)) in numbers.iter().enumerate() {
