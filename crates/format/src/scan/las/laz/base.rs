@@ -97,10 +97,10 @@ impl Channel {
         }
         *number = match changes & NUMBER {
             0 => *number,
-            1 => *number + 1 & 15,
-            2 => *number + 15 & 15,
+            1 => (*number + 1) & 15,
+            2 => (*number + 15) & 15,
             _ if *new_time => coder.symbol(self.numbers.of(*number)) as u8,
-            _ => *number + 2 + coder.symbol(&mut self.numbers_of_pulse) as u8 & 15,
+            _ => (*number + 2 + coder.symbol(&mut self.numbers_of_pulse) as u8) & 15,
         };
     }
 
@@ -119,7 +119,8 @@ impl Channel {
         *y = y.wrapping_add(dy);
         y_median.add(dy);
 
-        single + ((self.dx.last_bits() + self.dy.last_bits()) / 2 & !1).min(18)
+        let bits = (self.dx.last_bits() + self.dy.last_bits()) / 2;
+        single + (bits & !1).min(18)
     }
 }
 

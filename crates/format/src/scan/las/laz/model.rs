@@ -101,7 +101,7 @@ impl<const N: usize, const T: usize> Model<N, T> {
             if self.total > Self::MAX_TOTAL {
                 self.halve();
             }
-            self.cycle = (u32::from(self.cycle) * 5 >> 2).min((symbols + 6) << 3) as u16;
+            self.cycle = (u32::from(self.cycle) * 5 / 4).min((symbols + 6) << 3) as u16;
         }
         self.left = self.cycle;
         self.share_out();
@@ -120,7 +120,7 @@ impl<const N: usize, const T: usize> Model<N, T> {
         let mut before = 0;
         let symbols = usize::from(self.symbols);
         for (bound, count) in self.bounds[..symbols].iter_mut().zip(&self.counts) {
-            *bound = (scale * before >> (31 - SHARE_BITS)) as u16;
+            *bound = ((scale * before) >> (31 - SHARE_BITS)) as u16;
             before += u32::from(*count);
         }
         if T == 0 {
@@ -176,7 +176,7 @@ impl BitModel {
             self.total += u16::from(self.zeros == self.total);
         }
         self.zero = (u32::from(self.zeros) * ((1 << 31) / u32::from(self.total))) >> (31 - Self::SHARE_BITS);
-        self.cycle = (self.cycle * 5 >> 2).min(64);
+        self.cycle = (self.cycle * 5 / 4).min(64);
         self.left = self.cycle;
     }
 }
@@ -243,7 +243,7 @@ mod tests {
         assert!(model.bounds[..symbols].windows(2).all(|pair| pair[0] < pair[1]));
         model.reset();
         model.prepare();
-        assert_eq!(usize::from(model.take(0x7fff).0), symbols - 1, "equal shares again");
+        assert_eq!(model.take(0x7fff).0, symbols - 1, "equal shares again");
     }
 
     #[test]

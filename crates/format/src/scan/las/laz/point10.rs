@@ -164,7 +164,8 @@ impl Point10 {
         *y = y.wrapping_add(dy);
         y_median.add(dy);
 
-        let z_context = single + ((self.dx.last_bits() + self.dy.last_bits()) / 2 & !1).min(18);
+        let bits = (self.dx.last_bits() + self.dy.last_bits()) / 2;
+        let z_context = single + (bits & !1).min(18);
         let height = &mut self.heights[level(returns, number)];
         *height = self.z.next(coder, *height, z_context);
         *z = *height;

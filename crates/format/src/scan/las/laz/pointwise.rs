@@ -37,7 +37,7 @@ enum Colour {
 
 #[derive(Debug)]
 enum Extra {
-    V1(Integer),
+    V1(Box<Integer>),
     V2(Vec<Bytes>),
 }
 
@@ -80,7 +80,7 @@ impl PointwiseModels {
             last_colour: [0; 3],
             wave: version(ItemKind::WavePacket13).map(|_| Box::new(WavePacket::new())),
             extra: match version(ItemKind::Byte) {
-                Some(1) => Extra::V1(Integer::new(8, extra)),
+                Some(1) => Extra::V1(Box::new(Integer::new(8, extra))),
                 _ => Extra::V2(vec![Bytes::new(256); extra]),
             },
             last_extra: vec![0; extra],

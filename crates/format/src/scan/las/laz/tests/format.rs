@@ -34,6 +34,9 @@ pub(super) fn all_parts() -> Parts {
         .fold(Parts::POSITIONS, Parts::with)
 }
 
+/// Fills records.
+type Fill<'a> = dyn FnMut(&mut [u8]) -> (usize, Result<(), Stop>) + 'a;
+
 /// What a decoder gave: whole records, and why there are no more.
 pub(super) type Decoded = (Vec<u8>, Result<(), Stop>);
 
@@ -152,7 +155,7 @@ impl Format {
         let len = self.record_len();
         let mut out = vec![0; points * len];
         let mut good = 0;
-        let fill: &mut dyn FnMut(&mut [u8]) -> (usize, Result<(), Stop>) = match models {
+        let fill: &mut Fill<'_> = match models {
             Models::Layered(models) => match Layered::new(models, chunk, all_parts()) {
                 Ok(mut decoder) => &mut move |out| decoder.fill(out),
                 Err(stop) => return (Vec::new(), Err(stop)),
