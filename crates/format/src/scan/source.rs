@@ -72,6 +72,7 @@ impl Source {
             return Err(self.cut_short(offset, len).advise(Advice::CutShort));
         };
         if buf.len() < len {
+            buf.reserve_exact(len - buf.len());
             buf.resize(len, 0);
         }
         let out = &mut buf[..len];

@@ -9,16 +9,16 @@ use super::laszip::LaszipRecord;
 use super::laz::{Input, Pointwise, Stop};
 use super::pieces::Storage;
 use super::schema::Schema;
-use crate::scan::decode::{batch_points, fitting_batch, point_bytes};
+use crate::scan::decode::{batch_points, fitting_batch, point_bytes, resize};
 use crate::scan::source::Source;
 use crate::{Advice, Fault, Piece, PointBatch, ReadError, Scratch, Sink, Wanted};
 
 /// A chunk larger than this is read through a buffer instead of at once.
-const MAX_CHUNK_IN_MEMORY: u64 = 64 << 20;
+pub(super) const MAX_CHUNK_IN_MEMORY: u64 = 64 << 20;
 
 /// Plain records that are read at once: 139 kB of format 3, so that they are still in the second-level cache when
 /// they become columns.
-const READ_RECORDS: usize = 8 * kernels::BLOCK;
+pub(super) const READ_RECORDS: usize = 8 * kernels::BLOCK;
 
 /// [`crate::Scan::decode`].
 pub(super) fn piece(
@@ -129,9 +129,9 @@ impl Emitter<'_, '_> {
         points: usize,
         decoded: &mut Vec<u8>,
     ) -> (usize, Result<(), Stop>) {
-        let most = kernels::BLOCK * self.record_len;
+        let most = points.min(kernels::BLOCK) * self.record_len;
         if decoded.len() < most {
-            decoded.resize(most, 0);
+            resize(decoded, most);
         }
         kernels::resize(points, &self.schema.fields, self.wanted, self.batch);
         let mut good = 0;

@@ -45,6 +45,7 @@ mod header;
 mod kernels;
 mod laszip;
 mod laz;
+mod memory;
 mod mend;
 mod pieces;
 mod records;
@@ -128,6 +129,10 @@ impl Scan for LasScan {
 
     fn pieces(&self) -> &[Piece] {
         &self.plan.pieces
+    }
+
+    fn decode_bytes(&self, wanted: &Wanted) -> u64 {
+        memory::decode_bytes(self, wanted)
     }
 
     fn decode(

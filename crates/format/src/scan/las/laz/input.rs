@@ -4,7 +4,7 @@ use super::stop::Stop;
 use crate::scan::source::Source;
 
 /// Bytes of a window: large enough that reading costs little beside decoding, small beside a batch.
-const WINDOW: usize = 256 << 10;
+pub(in super::super) const WINDOW: usize = 256 << 10;
 
 /// Bytes with a decoder in them.
 pub(in super::super) enum Input<'a> {

@@ -31,7 +31,7 @@ mod tests;
 mod version_1;
 mod wave_packet;
 
-pub(super) use input::Input;
+pub(super) use input::{Input, WINDOW};
 pub(super) use items::{Item, ItemKind, record_len};
 pub(super) use layered::{Layered, LayeredModels, Part, Parts};
 pub(super) use pointwise::{Pointwise, PointwiseModels};
