@@ -2,7 +2,6 @@
 
 mod archive;
 mod batches;
-#[cfg(feature = "las")]
 mod chosen;
 mod decimal;
 mod decode;
