@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -16,6 +16,8 @@ use crate::flags;
 
 /// Interval of JSON lines; one per batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);
+/// Cleaning up that takes longer than this is told.
+const PATIENCE: Duration = Duration::from_millis(500);
 /// Maximum warnings printed; the report has all of them.
 const MAX_WARNINGS: u64 = 20;
 
@@ -31,6 +33,7 @@ pub(crate) struct Progress {
     quiet: bool,
     warnings: AtomicU64,
     stop: Option<&'static AtomicBool>,
+    has_ended: Arc<AtomicBool>,
     done: AtomicU64,
     state: Mutex<State>,
 }
@@ -59,6 +62,7 @@ impl Progress {
             quiet: talk.quiet,
             warnings: AtomicU64::new(0),
             stop,
+            has_ended: Arc::default(),
             done: AtomicU64::new(0),
             state: Mutex::new(State { phase: "start", total: 0, began: now, last_json: now }),
         }
@@ -117,6 +121,20 @@ impl Progress {
         self.step(done.saturating_sub(self.done.load(Ordering::Relaxed)));
     }
 
+    /// Says that what was made is being removed, if that takes long and nothing else shows it.
+    fn tell_of_cleaning(&self) {
+        if self.quiet || !matches!(self.face, Face::Silent) {
+            return;
+        }
+        let has_ended = Arc::clone(&self.has_ended);
+        std::thread::spawn(move || {
+            std::thread::sleep(PATIENCE);
+            if !has_ended.load(Ordering::Relaxed) {
+                print_line("removing what was made so far");
+            }
+        });
+    }
+
     /// Reports a warning.
     pub(crate) fn note(&self, line: &str) {
         if self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
@@ -136,6 +154,7 @@ impl Progress {
 
     /// Clears the bar, so that other lines can follow; true if the result is to be printed as text.
     pub(crate) fn end(&self) -> bool {
+        self.has_ended.store(true, Ordering::Relaxed);
         match &self.face {
             Face::Bar(bar) => bar.finish_and_clear(),
             Face::Json => self.write_json(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner)),
@@ -171,6 +190,9 @@ impl Progress {
 impl Events for Progress {
     fn phase(&self, phase: Phase, total: u64) {
         self.begin(phase.name(), total);
+        if phase == Phase::CleanUp {
+            self.tell_of_cleaning();
+        }
     }
 
     fn advance(&self, points: u64) {

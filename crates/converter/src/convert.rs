@@ -34,8 +34,35 @@ pub fn convert_on(
     let mut clock = Clock::start(events);
     clock.begin(Phase::Probe, 0);
     outputs::check(plan, targets)?;
-    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk))?;
-    let sources = Sources::open(plan, events)?;
+    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?;
+    staged.warnings.iter().for_each(|w| events.warning(w));
+    match write(plan, targets, events, &staged, disk, &mut clock) {
+        Ok(mut report) => {
+            if let Some(left) = staged.finish(events)? {
+                events.warning(&left);
+                report.warnings.push(left);
+            }
+            Ok(report)
+        }
+        Err(error) => {
+            events.phase(Phase::CleanUp, 0); // removing many files takes its time
+            drop(staged);
+            Err(error)
+        }
+    }
+}
+
+/// All passes, up to an output that is complete but for its name.
+fn write(
+    plan: &Plan,
+    targets: &[Target],
+    events: &dyn Events,
+    staged: &StagedFolder,
+    disk: Arc<dyn Disk>,
+    clock: &mut Clock<'_>,
+) -> Result<Report, ConvertError> {
+    let mut sources = Sources::open(plan, events)?;
+    sources.warnings.extend(staged.warnings.iter().cloned());
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let budget = Budget::new(plan, intake.schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
@@ -44,7 +71,7 @@ pub fn convert_on(
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, disk), events)?;
 
     let demand = Demand { moments: wants.moments, uses: targets.len() as u32 };
-    let cloud = gather(plan, &sources, &intake, demand, &rt, &mut clock)?;
+    let cloud = gather(plan, &sources, &intake, demand, &rt, clock)?;
 
     let mut outputs = Vec::new();
     for target in targets {
@@ -72,7 +99,6 @@ pub fn convert_on(
     let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
     staged.write_report(&text)?;
     rt.check_stop()?;
-    staged.finish()?;
     Ok(report)
 }
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use pointmill_format::bytes;
 
-use super::os_hints;
+use super::{os_files, os_hints};
 use crate::error::ConvertError;
 
 /// Something that is about to be done to the disk.
@@ -33,6 +33,23 @@ pub trait Disk: Debug + Send + Sync {
     /// # Errors
     /// What the operation fails with.
     fn permit(&self, operation: DiskOperation) -> io::Result<()>;
+
+    /// The best way in which an output can be replaced; what the file system cannot do is not done, whatever this says.
+    fn replacing(&self) -> Replacing {
+        Replacing::AtOnce
+    }
+}
+
+/// How a folder takes the place of another, from the best way to the worst.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Replacing {
+    /// The names change places.
+    AtOnce,
+    /// The old folder is moved aside, then the new one to its place.
+    InTwoSteps,
+    /// What is in the folder is moved, as in a mounted folder, which cannot be.
+    EntryByEntry,
 }
 
 /// The file system as it is.
@@ -50,6 +67,7 @@ impl Disk for SystemDisk {
 pub(crate) struct DiskFile {
     file: File,
     path: PathBuf,
+    is_temporary: bool,
     disk: Arc<dyn Disk>,
 }
 
@@ -61,12 +79,12 @@ impl DiskFile {
             File::options().read(true).write(true).create(true).truncate(true).open(path)
         };
         let file = create().map_err(|e| ConvertError::io(path, "making the file", e))?;
-        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk) })
+        Ok(Self { file, path: path.to_path_buf(), is_temporary: false, disk: Arc::clone(disk) })
     }
 
     /// Writes all of `bytes` at `offset`; `doing` is for the error ("writing a leaf").
     pub(crate) fn write_at(&self, bytes: &[u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
-        self.try_write_at(bytes, offset).map_err(|e| ConvertError::io(&self.path, doing, e))
+        self.try_write_at(bytes, offset).map_err(|e| self.failed(doing, e))
     }
 
     fn try_write_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
@@ -76,7 +94,7 @@ impl DiskFile {
 
     /// Fills `buf` from `offset`.
     pub(crate) fn read_at(&self, buf: &mut [u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
-        bytes::read_exact_at(&self.file, buf, offset).map_err(|e| ConvertError::io(&self.path, doing, e))
+        bytes::read_exact_at(&self.file, buf, offset).map_err(|e| self.failed(doing, e))
     }
 
     /// Cuts or extends the file.
@@ -85,7 +103,7 @@ impl DiskFile {
             self.disk.permit(DiskOperation::Write)?;
             self.file.set_len(bytes)
         };
-        cut().map_err(|e| ConvertError::io(&self.path, doing, e))
+        cut().map_err(|e| self.failed(doing, e))
     }
 
     /// Waits until the file is safe.
@@ -94,12 +112,13 @@ impl DiskFile {
             self.disk.permit(DiskOperation::Sync)?;
             self.file.sync_all()
         };
-        sync().map_err(|e| ConvertError::io(&self.path, doing, e))
+        sync().map_err(|e| self.failed(doing, e))
     }
 
     /// The error of a writer on top of this file.
     pub(crate) fn failed(&self, doing: &'static str, error: io::Error) -> ConvertError {
-        ConvertError::io(&self.path, doing, error)
+        let error = ConvertError::io(&self.path, doing, error);
+        if self.is_temporary { error.temporary() } else { error }
     }
 
     /// Asks the system to begin writing a range to the disk, without waiting.
@@ -126,8 +145,8 @@ impl TempFiles {
             self.disk.permit(DiskOperation::Create)?;
             tempfile::tempfile_in(&self.folder)
         };
-        let file = make().map_err(|e| ConvertError::io(&self.folder, "making a temporary file", e))?;
-        Ok(DiskFile { file, path: self.folder.clone(), disk: Arc::clone(&self.disk) })
+        let file = make().map_err(|e| ConvertError::io(&self.folder, "making a temporary file", e).temporary())?;
+        Ok(DiskFile { file, path: self.folder.clone(), is_temporary: true, disk: Arc::clone(&self.disk) })
     }
 }
 
@@ -182,4 +201,10 @@ pub(crate) fn create_folder(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
 pub(crate) fn rename(disk: &dyn Disk, from: &Path, to: &Path) -> io::Result<()> {
     disk.permit(DiskOperation::Rename)?;
     fs::rename(from, to)
+}
+
+/// What two paths lead to changes places; false: the file system cannot do that.
+pub(crate) fn exchange(disk: &dyn Disk, a: &Path, b: &Path) -> io::Result<bool> {
+    disk.permit(DiskOperation::Rename)?;
+    os_files::exchange(a, b)
 }

@@ -13,6 +13,8 @@ pub enum Phase {
     Build,
     /// Hierarchy, metadata, syncing and renaming; no unit.
     Finish,
+    /// Removing what a run that failed or was stopped has made so far; no unit.
+    CleanUp,
 }
 
 impl Phase {
@@ -23,6 +25,7 @@ impl Phase {
             Self::Read => "read",
             Self::Build => "build",
             Self::Finish => "finish",
+            Self::CleanUp => "clean up",
         }
     }
 }

@@ -4,12 +4,13 @@ mod budget;
 mod clock;
 pub(crate) mod disk;
 mod events;
+pub(crate) mod os_files;
 pub(crate) mod os_hints;
 mod workers;
 
 pub(crate) use budget::{Budget, Least};
 pub(crate) use clock::{Clock, PhaseTime};
-pub use disk::{Disk, DiskOperation, SystemDisk};
+pub use disk::{Disk, DiskOperation, Replacing, SystemDisk};
 pub(crate) use disk::{DiskFile, Sequential, TempFiles};
 pub use events::{Events, Phase, Silent};
 
