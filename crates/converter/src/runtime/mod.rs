@@ -50,6 +50,11 @@ impl<'a> Runtime<'a> {
         if self.events.stop_requested() { Err(ConvertError::Interrupted) } else { Ok(()) }
     }
 
+    /// Where the request to stop comes from, for what outlives a borrow of this.
+    pub(crate) fn events(&self) -> &'a dyn Events {
+        self.events
+    }
+
     /// Reports that `points` more are done in the current phase.
     pub(crate) fn advance(&self, points: u64) {
         self.events.advance(points);

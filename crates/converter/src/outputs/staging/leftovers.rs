@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::hidden::{Found, HiddenFolder, Side};
 use super::ours::Standing;
-use super::replace::undo;
+use super::replace::{When, undo};
 use crate::error::{ConvertError, OutputFault};
 use crate::runtime::Events;
 use crate::warning::Warning;
@@ -50,7 +50,7 @@ fn settle_one(
     events: &dyn Events,
     warnings: &mut Vec<Warning>,
 ) -> Result<(), ConvertError> {
-    match undo(&hidden, output) {
+    match undo(&hidden, output, When::Unfinished) {
         Ok(is_undone) => warnings.extend(is_undone.then(|| Warning::OldOutputBack { output: output.to_path_buf() })),
         Err(e) => {
             hidden.keep();

@@ -93,7 +93,7 @@ impl Replace<'_> {
         write().map_err(self.failed("writing what is to be moved"))?;
         let moved = self.move_entries(going, &coming);
         if let Err(e) = moved {
-            if let Err(e) = undo(self.hidden, self.output) {
+            if let Err(e) = undo(self.hidden, self.output, When::Always) {
                 self.hidden.keep();
                 return Err(self.failed("moving the old output back")(e));
             }
@@ -137,18 +137,27 @@ fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
+/// When to undo that entries were moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum When {
+    /// If not all are in their places.
+    Unfinished,
+    Always,
+}
+
 /// Undoes what was begun and not finished. True if something was: what stood at the place of the output is there again.
 ///
 /// # Errors
 /// The file system refuses, or something else stands there now.
-pub(super) fn undo(hidden: &HiddenFolder, output: &Path) -> io::Result<bool> {
+pub(super) fn undo(hidden: &HiddenFolder, output: &Path, when: When) -> io::Result<bool> {
     let (new, old) = (hidden.path_of_new(), hidden.path_of_old());
     let journal = hidden.path().join(MOVING);
     match fs::read_to_string(&journal) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => undo_rename(&new, &old, output),
         Err(e) => Err(e),
         Ok(text) => {
-            let is_undone = undo_entries(&text, &new, &old, output)?;
+            let is_complete = !new.is_dir() || names_in(&new)?.is_empty();
+            let is_undone = !(is_complete && when == When::Unfinished) && undo_entries(&text, &new, &old, output)?;
             fs::remove_file(&journal)?;
             Ok(is_undone)
         }
@@ -172,9 +181,6 @@ fn undo_entries(text: &str, new: &Path, old: &Path, output: &Path) -> io::Result
     let Some(names) = text.strip_suffix('\n').and_then(|text| text.strip_suffix(ALL)) else {
         return Ok(false); // nothing is moved before all names are written
     };
-    if !new.is_dir() || names_in(new)?.is_empty() {
-        return Ok(false); // all is in place
-    }
     let is_there = |path: &Path| fs::symlink_metadata(path).is_ok();
     let mut is_undone = false;
     let mut names: Vec<&str> = names.lines().filter(|name| !name.contains(['/', '\\']) && *name != "..").collect();
