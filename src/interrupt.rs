@@ -1,9 +1,13 @@
 //! Ctrl-C, requests to terminate, and other signals.
 //!
-//! A command that can stop by itself and clean up asks for the flag; it stops within a second. Cleaning up may take longer
-//! and is not cut short by a second signal, only by a third. Other commands end at once.
+//! A command that can stop by itself and clean up asks for the flag. Where it does not stop soon, because a library or the
+//! system keeps its threads, what it made is removed from here and the process ends: it stops within a second. Cleaning up
+//! may take longer, which is told, and is not cut short by a second signal, only by a third. Other commands end at once.
 
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::exit::{Failure, print_line};
@@ -11,6 +15,18 @@ use crate::exit::{Failure, print_line};
 static STOP: AtomicBool = AtomicBool::new(false);
 static STOPS_BY_ITSELF: AtomicBool = AtomicBool::new(false);
 static SIGNALS: AtomicU32 = AtomicU32::new(0);
+
+/// Who removes what was made: the command (`SETTLING`) or, if it does not stop in time, this module (`ABANDONED`).
+static STAGE: AtomicU8 = AtomicU8::new(WORKING);
+const WORKING: u8 = 0;
+const SETTLING: u8 = 1;
+const ABANDONED: u8 = 2;
+static FOLDER: Mutex<Option<PathBuf>> = Mutex::new(None);
+
+/// A command that was asked to stop has this long to do so.
+const GRACE: Duration = Duration::from_millis(600);
+/// Cleaning up that takes longer than this is told.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Makes Ctrl-C end the process with exit code 130, and a file that grows beyond the limit an error of the write.
 pub(crate) fn watch() {
@@ -21,7 +37,7 @@ pub(crate) fn watch() {
         let before = SIGNALS.fetch_add(1, Ordering::Relaxed);
         match before {
             _ if !STOPS_BY_ITSELF.load(Ordering::Relaxed) => end("interrupted"),
-            0 => {}
+            0 => drop(std::thread::Builder::new().spawn(abandon_late_work)),
             1 => say("stopping already, and removing what was made so far; once more ends the program at once"),
             _ => end("interrupted; the next run with the same output removes what this one leaves"),
         }
@@ -39,7 +55,51 @@ pub(crate) fn stop_flag() -> &'static AtomicBool {
 
 /// The command does not check the flag any more: from now on a signal ends the process at once.
 pub(crate) fn no_more_checks() {
+    settling();
     STOPS_BY_ITSELF.store(false, Ordering::Relaxed);
+}
+
+/// Where the command makes its output, all of which is to be removed if it stops.
+pub(crate) fn works_in(folder: &Path) {
+    *FOLDER.lock().unwrap_or_else(PoisonError::into_inner) = Some(folder.to_path_buf());
+}
+
+/// The command has stopped working: it cleans up, or gives its output the name, and is not disturbed.
+pub(crate) fn settling() {
+    if STAGE.compare_exchange(WORKING, SETTLING, Ordering::AcqRel, Ordering::Acquire) == Err(ABANDONED) {
+        loop {
+            std::thread::park(); // the process is about to end
+        }
+    }
+}
+
+/// Says that what was made is being removed, if the process still lives after a while.
+pub(crate) fn tell_of_cleaning(tell: impl FnOnce() + Send + 'static) {
+    let teller = || {
+        std::thread::sleep(PATIENCE);
+        tell();
+    };
+    let _ = std::thread::Builder::new().spawn(teller);
+}
+
+/// The line for people.
+pub(crate) fn cleaning_line() {
+    print_line("removing what was made so far");
+}
+
+/// Ends the process in place of a command that has not stopped in time.
+fn abandon_late_work() {
+    std::thread::sleep(GRACE);
+    if STAGE.compare_exchange(WORKING, ABANDONED, Ordering::AcqRel, Ordering::Acquire).is_err() {
+        return;
+    }
+    tell_of_cleaning(cleaning_line);
+    let folder = FOLDER.lock().unwrap_or_else(PoisonError::into_inner).take();
+    if let Some(folder) = folder {
+        // Threads may make files in it until the process ends. What they leave the next run removes.
+        let _ = (0..3).find(|_| fs::remove_dir_all(&folder).is_ok());
+    }
+    end("interrupted; nothing was written");
 }
 
 fn end(line: &'static str) {
@@ -47,11 +107,12 @@ fn end(line: &'static str) {
     std::process::exit(i32::from(Failure::Interrupted(String::new()).code()));
 }
 
-/// Does not wait for long: another thread may hold standard error, whose reader has stopped reading.
-fn say(line: &'static str) {
+/// Prints a line, and does not wait for long: another thread may hold standard error, whose reader has stopped reading.
+pub(crate) fn say(line: impl Into<String>) {
+    let line = line.into();
     let (done, wait) = std::sync::mpsc::channel();
     let printer = std::thread::Builder::new().spawn(move || {
-        print_line(line);
+        print_line(&line);
         let _ = done.send(());
     });
     if printer.is_ok() {

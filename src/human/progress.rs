@@ -1,8 +1,9 @@
 //! Progress and warnings of a run on standard error, and the request to stop.
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -13,11 +14,10 @@ use super::quantities::{count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
+use crate::interrupt;
 
 /// Interval of JSON lines; one per batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);
-/// Cleaning up that takes longer than this is told.
-const PATIENCE: Duration = Duration::from_millis(500);
 /// Maximum warnings printed; the report has all of them.
 const MAX_WARNINGS: u64 = 20;
 
@@ -33,7 +33,6 @@ pub(crate) struct Progress {
     quiet: bool,
     warnings: AtomicU64,
     stop: Option<&'static AtomicBool>,
-    has_ended: Arc<AtomicBool>,
     done: AtomicU64,
     state: Mutex<State>,
 }
@@ -62,7 +61,6 @@ impl Progress {
             quiet: talk.quiet,
             warnings: AtomicU64::new(0),
             stop,
-            has_ended: Arc::default(),
             done: AtomicU64::new(0),
             state: Mutex::new(State { phase: "start", total: 0, began: now, last_json: now }),
         }
@@ -121,23 +119,9 @@ impl Progress {
         self.step(done.saturating_sub(self.done.load(Ordering::Relaxed)));
     }
 
-    /// Says that what was made is being removed, if that takes long and nothing else shows it.
-    fn tell_of_cleaning(&self) {
-        if self.quiet || !matches!(self.face, Face::Silent) {
-            return;
-        }
-        let has_ended = Arc::clone(&self.has_ended);
-        std::thread::spawn(move || {
-            std::thread::sleep(PATIENCE);
-            if !has_ended.load(Ordering::Relaxed) {
-                print_line("removing what was made so far");
-            }
-        });
-    }
-
     /// Reports a warning.
     pub(crate) fn note(&self, line: &str) {
-        if self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
+        if self.stopped() || self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
             return;
         }
         match &self.face {
@@ -154,7 +138,6 @@ impl Progress {
 
     /// Clears the bar, so that other lines can follow; true if the result is to be printed as text.
     pub(crate) fn end(&self) -> bool {
-        self.has_ended.store(true, Ordering::Relaxed);
         match &self.face {
             Face::Bar(bar) => bar.finish_and_clear(),
             Face::Json => self.write_json(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner)),
@@ -169,7 +152,8 @@ impl Progress {
     }
 
     fn write_json(&self, state: &mut State) {
-        if !matches!(self.face, Face::Json) {
+        // a run that is to stop must not wait for a reader
+        if !matches!(self.face, Face::Json) || self.stopped() {
             return;
         }
         state.last_json = Instant::now();
@@ -190,8 +174,11 @@ impl Progress {
 impl Events for Progress {
     fn phase(&self, phase: Phase, total: u64) {
         self.begin(phase.name(), total);
-        if phase == Phase::CleanUp {
-            self.tell_of_cleaning();
+        match &self.face {
+            _ if phase != Phase::CleanUp => {}
+            Face::Silent if !self.quiet => interrupt::tell_of_cleaning(interrupt::cleaning_line),
+            Face::Json => interrupt::tell_of_cleaning(|| write_line(&json!({ "phase": Phase::CleanUp.name() }))),
+            _ => {}
         }
     }
 
@@ -201,6 +188,14 @@ impl Events for Progress {
 
     fn warning(&self, warning: &Warning) {
         self.note(&flags::warning_line(warning));
+    }
+
+    fn works_in(&self, folder: &Path) {
+        interrupt::works_in(folder);
+    }
+
+    fn settling(&self) {
+        interrupt::settling();
     }
 
     fn stop_requested(&self) -> bool {

@@ -23,6 +23,7 @@ mod same_points;
 mod sameness;
 mod scans_within;
 mod several;
+mod stops;
 mod support;
 mod text_inputs;
 mod units;

@@ -36,7 +36,10 @@ pub fn convert_on(
     outputs::check(plan, targets)?;
     let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?;
     staged.warnings.iter().for_each(|w| events.warning(w));
-    match write(plan, targets, events, &staged, disk, &mut clock) {
+    events.works_in(staged.path());
+    let written = write(plan, targets, events, &staged, disk, &mut clock);
+    events.settling();
+    match written {
         Ok(mut report) => {
             if let Some(left) = staged.finish(events)? {
                 events.warning(&left);

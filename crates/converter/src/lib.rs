@@ -51,7 +51,7 @@ pub use octree::Sampling;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
 pub use outputs::potree2::{Encoding, Potree2Settings};
-pub use outputs::{HiddenFolder, Target, resolve_path};
+pub use outputs::{StagedFiles, Target, resolve_path};
 pub use plan::{
     AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault, RgbDepth,
     ScaleChoice, Setting,

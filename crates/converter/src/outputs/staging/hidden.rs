@@ -31,7 +31,7 @@ const TRIES: usize = 16;
 ///
 /// `new` in it is to become the output. `old` holds what stood there while that is being moved.
 #[derive(Debug)]
-pub struct HiddenFolder {
+pub(super) struct HiddenFolder {
     path: PathBuf,
     lock: Option<FileLock>,
     /// Folders above the output that were made for it, the lowest first.
@@ -62,7 +62,7 @@ impl HiddenFolder {
     ///
     /// # Errors
     /// The file system refuses.
-    pub fn beside(output: &Path) -> io::Result<Self> {
+    pub(super) fn beside(output: &Path) -> io::Result<Self> {
         let parent = parent_of(output);
         let missing: Vec<PathBuf> = parent.ancestors().take_while(|p| !p.exists()).map(Path::to_path_buf).collect();
         let made = fs::create_dir_all(parent).and_then(|()| Self::make(output, Side::Beside));
@@ -148,8 +148,7 @@ impl HiddenFolder {
     }
 
     /// The folder in it that is to become the output.
-    #[must_use]
-    pub fn path_of_new(&self) -> PathBuf {
+    pub(super) fn path_of_new(&self) -> PathBuf {
         self.path.join("new")
     }
 

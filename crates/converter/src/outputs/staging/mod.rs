@@ -1,6 +1,7 @@
 //! A dataset is made in a hidden folder beside its final name (or in the output, where that is a mounted folder), synced,
 //! and given its name at once: finished or not there. What stood there before is there until that moment.
 
+mod files;
 mod hidden;
 mod leftovers;
 mod ours;
@@ -19,7 +20,8 @@ use crate::runtime::disk::{create_folder, sync_folder, sync_path};
 use crate::runtime::os_files::adopt_owner;
 use crate::runtime::{Disk, DiskFile, Events, Replacing};
 use crate::warning::Warning;
-pub use hidden::HiddenFolder;
+pub use files::StagedFiles;
+use hidden::HiddenFolder;
 use ours::Standing;
 use place::parent_of;
 pub use place::resolve_path;
@@ -66,6 +68,11 @@ impl StagedFolder {
     /// The folder on whose file system the output is made.
     pub(crate) fn parent(&self) -> PathBuf {
         parent_of(self.hidden.path()).to_path_buf()
+    }
+
+    /// The hidden folder.
+    pub(crate) fn path(&self) -> &Path {
+        self.hidden.path()
     }
 
     /// The place of a dataset: the folder itself if it is the only one, else a folder in it.
