@@ -65,7 +65,7 @@ fn a_full_disk_is_answered_with_advice_for_that_disk() {
     let script =
         "mount -t tmpfs -o size=300k none store; \"$0\" convert b.las -o store/out; code=$?; ls -A store; exit $code";
     let Some(ended) = mounted(&dir, script) else { return };
-    ended.failed_with(5, &["store/.out", "output on another disk"]);
+    ended.failed_with(5, &["store/out/octree.bin", "output on another disk"]);
     assert!(!ended.stderr().contains("--temp-dir"), "{}", ended.stderr());
     assert_eq!(ended.stdout(), "", "nothing is left on the disk");
 
@@ -76,4 +76,28 @@ fn a_full_disk_is_answered_with_advice_for_that_disk() {
     ended.failed_with(5, &["run.json", "new is complete"]);
     assert_eq!(ended.stdout(), "full\n");
     dir.validate("new", &["a.las"]);
+}
+
+/// The folder of the output was made for a user who may write nothing beside it.
+#[test]
+fn an_output_in_a_folder_of_others_is_made_and_replaced() {
+    use std::os::unix::fs::{PermissionsExt as _, chown};
+    use std::os::unix::process::CommandExt as _;
+    const USER: u32 = 12_345;
+    let dir = with_scans();
+    std::fs::set_permissions(dir.path(""), std::fs::Permissions::from_mode(0o755)).unwrap();
+    if chown(dir.path("out"), Some(USER), Some(USER)).is_err() {
+        eprintln!("skipped: no rights to give folders away");
+        return;
+    }
+    for scan in ["a.las", "b.las", "a.las"] {
+        let mut command = dir.command(["convert", scan, "-o", "out", "--overwrite", "-q"]);
+        let Ok(output) = command.uid(USER).gid(USER).output() else {
+            eprintln!("skipped: that user cannot start the program");
+            return;
+        };
+        assert_eq!(Ended(output).stderr(), "");
+        dir.validate("out", &[scan]);
+    }
+    assert_eq!(std::fs::read_dir(dir.path("out")).unwrap().count(), 4);
 }

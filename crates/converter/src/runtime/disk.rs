@@ -72,14 +72,14 @@ pub(crate) struct DiskFile {
 }
 
 impl DiskFile {
-    /// Makes the file `path`.
-    pub(crate) fn create(path: &Path, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+    /// Makes the file `path`; errors name `shown`.
+    pub(crate) fn create(path: &Path, shown: PathBuf, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
         let create = || {
             disk.permit(DiskOperation::Create)?;
             File::options().read(true).write(true).create(true).truncate(true).open(path)
         };
-        let file = create().map_err(|e| ConvertError::io(path, "making the file", e))?;
-        Ok(Self { file, path: path.to_path_buf(), is_temporary: false, disk: Arc::clone(disk) })
+        let file = create().map_err(|e| ConvertError::io(&shown, "making the file", e))?;
+        Ok(Self { file, path: shown, is_temporary: false, disk: Arc::clone(disk) })
     }
 
     /// Writes all of `bytes` at `offset`; `doing` is for the error ("writing a leaf").

@@ -25,8 +25,8 @@ fn exchange_names(a: &Path, b: &Path) -> io::Result<()> {
     // SAFETY: both paths are strings that end with a zero and live until the call is over; it reads no other memory.
     // Called by number, because older C libraries lack the function.
     let result = unsafe {
-        let cwd = libc::c_long::from(libc::AT_FDCWD);
-        libc::syscall(libc::SYS_renameat2, cwd, a.as_ptr(), cwd, b.as_ptr(), libc::c_long::from(libc::RENAME_EXCHANGE))
+        let (cwd, flags) = (libc::AT_FDCWD as libc::c_long, libc::RENAME_EXCHANGE as libc::c_long);
+        libc::syscall(libc::SYS_renameat2, cwd, a.as_ptr(), cwd, b.as_ptr(), flags)
     };
     #[cfg(target_os = "macos")]
     // SAFETY: both paths are strings that end with a zero and live until the call is over; it reads no other memory.

@@ -62,3 +62,41 @@ impl StagedFiles {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runtime::Silent;
+
+    #[test]
+    fn all_files_appear_and_what_a_killed_run_moved_is_put_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("images");
+        let staged = StagedFiles::new(&out, &Silent).unwrap();
+        fs::write(staged.folder().join("a.png"), "a").unwrap();
+        staged.place(&[]).unwrap();
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+        fs::write(out.join("mine.txt"), "mine").unwrap();
+
+        let mut killed = StagedFiles::new(&out, &Silent).unwrap();
+        fs::write(killed.folder().join("a.png"), "new a").unwrap();
+        fs::write(killed.folder().join("b.png"), "b").unwrap();
+        // as far as it came: one old file aside, one new file in its place
+        fs::write(killed.hidden.path().join("moving"), "a.png\nb.png\nall of them\n").unwrap();
+        fs::create_dir(killed.hidden.path_of_old()).unwrap();
+        fs::rename(out.join("a.png"), killed.hidden.path_of_old().join("a.png")).unwrap();
+        fs::rename(killed.folder().join("b.png"), out.join("b.png")).unwrap();
+        killed.hidden.keep();
+        drop(killed);
+
+        let next = StagedFiles::new(&out, &Silent).unwrap();
+        assert_eq!(next.warnings().len(), 1);
+        assert_eq!(fs::read(out.join("a.png")).unwrap(), b"a");
+        assert!(!out.join("b.png").exists());
+        fs::write(next.folder().join("a.png"), "new a").unwrap();
+        next.place(&["a.png".to_owned()]).unwrap();
+        assert_eq!(fs::read(out.join("a.png")).unwrap(), b"new a");
+        assert_eq!(fs::read(out.join("mine.txt")).unwrap(), b"mine");
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
+    }
+}

@@ -81,8 +81,9 @@ impl StagedFolder {
         if !is_only_one {
             dataset.name = kind.name();
             dataset.folder.push(dataset.name);
+            dataset.shown.push(dataset.name);
             create_folder(&*self.disk, &dataset.folder)
-                .map_err(|e| ConvertError::io(&dataset.folder, "making the folder of a dataset", e))?;
+                .map_err(|e| ConvertError::io(&dataset.shown, "making the folder of a dataset", e))?;
         }
         Ok(dataset)
     }
@@ -93,7 +94,8 @@ impl StagedFolder {
     }
 
     fn whole(&self) -> StagedDataset {
-        StagedDataset { folder: self.hidden.path_of_new(), name: "", disk: Arc::clone(&self.disk) }
+        let (folder, shown) = (self.hidden.path_of_new(), self.place.given.clone());
+        StagedDataset { folder, shown, name: "", disk: Arc::clone(&self.disk) }
     }
 
     /// Gives the folder its final name; whatever fails before it has it is undone. What stood there goes afterwards.
@@ -146,8 +148,10 @@ impl Place {
         if *standing == Standing::Nothing || best != Replacing::EntryByEntry {
             match HiddenFolder::beside(&self.path) {
                 Ok(hidden) if *standing == Standing::Nothing => return Ok((hidden, best)),
-                Ok(hidden) if self.can_be_moved(&hidden) && self.keeps_owner(standing, &hidden) => {
-                    return Ok((hidden, best));
+                Ok(mut hidden) => {
+                    if self.can_be_moved(&mut hidden) && self.keeps_owner(standing, &hidden) {
+                        return Ok((hidden, best));
+                    }
                 }
                 Err(e) if *standing == Standing::Nothing || !is_denied(&e) => {
                     return Err(ConvertError::io(&self.given, "making a folder beside the output", e));
@@ -163,7 +167,7 @@ impl Place {
 
     /// Learns it from the system without moving anything: a folder never takes the place of one with something in it,
     /// and what cannot be moved at all is refused first.
-    fn can_be_moved(&self, hidden: &HiddenFolder) -> bool {
+    fn can_be_moved(&self, hidden: &mut HiddenFolder) -> bool {
         if cfg!(not(unix)) {
             return true;
         }
@@ -171,7 +175,11 @@ impl Place {
         let made = fs::create_dir(&full).and_then(|()| fs::write(full.join("full"), ""));
         let moved = made.and_then(|()| fs::rename(&self.path, &full));
         if moved.is_ok() {
-            return fs::rename(&full, &self.path).is_ok() && false;
+            // a file system that keeps no promise: back with it
+            if fs::rename(&full, &self.path).is_err() {
+                hidden.keep();
+            }
+            return false;
         }
         let _ = fs::remove_dir_all(&full);
         moved.is_err_and(|e| matches!(e.kind(), io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists))
@@ -191,6 +199,8 @@ fn is_denied(error: &io::Error) -> bool {
 /// A dataset on its way into a [`StagedFolder`].
 pub(crate) struct StagedDataset {
     folder: PathBuf,
+    /// What errors name: where it is to be.
+    shown: PathBuf,
     name: &'static str,
     disk: Arc<dyn Disk>,
 }
@@ -203,7 +213,7 @@ impl StagedDataset {
 
     /// Makes a file; whoever writes it syncs it.
     pub(crate) fn create(&self, name: &str) -> Result<DiskFile, ConvertError> {
-        DiskFile::create(&self.folder.join(name), &self.disk)
+        DiskFile::create(&self.folder.join(name), self.shown.join(name), &self.disk)
     }
 
     /// Writes and syncs a small file.
@@ -216,12 +226,12 @@ impl StagedDataset {
     /// Syncs a file that was made before and is closed.
     pub(crate) fn sync_file(&self, name: &str) -> Result<(), ConvertError> {
         let path = self.folder.join(name);
-        sync_path(&*self.disk, &path).map_err(|e| ConvertError::io(&path, "syncing the file", e))
+        sync_path(&*self.disk, &path).map_err(|e| ConvertError::io(self.shown.join(name), "syncing the file", e))
     }
 
     /// Syncs the names of the files.
     pub(crate) fn sync(&self) -> Result<(), ConvertError> {
-        sync_folder(&*self.disk, &self.folder).map_err(|e| ConvertError::io(&self.folder, "syncing the output", e))
+        sync_folder(&*self.disk, &self.folder).map_err(|e| ConvertError::io(&self.shown, "syncing the output", e))
     }
 }
 
@@ -435,5 +445,29 @@ mod tests {
         let warnings = staged.warnings.iter().map(Warning::kind).collect::<Vec<_>>();
         assert_eq!(warnings, ["leftover", "old_output_back"]);
         assert!(unknown.exists() && out.join("metadata.json").exists() && !old.exists());
+    }
+
+    #[test]
+    fn what_of_the_old_output_cannot_be_removed_is_told_and_removed_by_the_next_run() {
+        struct Stops;
+        impl Events for Stops {
+            fn stop_requested(&self) -> bool {
+                true
+            }
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        for _ in 0..2 {
+            let staged = stage(&out, true).unwrap();
+            staged.whole().write("metadata.json", METADATA.as_bytes()).unwrap();
+            let left = staged.finish(&Stops).unwrap();
+            assert!(out.join("metadata.json").exists());
+            if let Some(Warning::Leftover { path, .. }) = left {
+                assert!(path.join("metadata.json").exists());
+            }
+        }
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2, "the old output is left over");
+        drop(stage(&out, true).unwrap());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 }
