@@ -15,6 +15,7 @@ use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
 use crate::interrupt;
+use crate::printable::json_escaped;
 
 /// Interval of JSON lines; one per batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);
@@ -205,7 +206,7 @@ impl Events for Progress {
 
 fn write_line(object: &serde_json::Value) {
     // Nothing can be reported when standard error is closed.
-    let _ = writeln!(io::stderr().lock(), "{object}");
+    let _ = writeln!(io::stderr().lock(), "{}", json_escaped(&object.to_string()));
 }
 
 fn style(total: u64) -> ProgressStyle {

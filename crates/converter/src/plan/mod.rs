@@ -16,6 +16,8 @@ pub struct Plan {
     pub inputs: Vec<PathBuf>,
     /// Files that were found with the scans and are none: they are told and counted, not read.
     pub other_files: Vec<PathBuf>,
+    /// Places where scans may be that could not be looked into, and why: listed in the report.
+    pub skipped_inputs: Vec<(PathBuf, String)>,
     /// What text and E57 files do not say of themselves.
     pub open: OpenOptions,
     /// The folder to make.
@@ -178,6 +180,7 @@ impl Plan {
         Self {
             inputs,
             other_files: Vec::new(),
+            skipped_inputs: Vec::new(),
             open: OpenOptions::default(),
             output,
             name: String::new(),
