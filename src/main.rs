@@ -3,6 +3,12 @@
 //! Results go to standard output, everything else to standard error; a failure is one line there. `README.md` has the
 //! table of exit codes, `exit.rs` is where they come from.
 
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
+
+mod allocator;
 mod args;
 mod commands;
 mod crs_choice;
@@ -25,6 +31,7 @@ use commands::{convert, extract, info, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {
+    allocator::give_back_early();
     exit::remember_panics();
     interrupt::watch();
     let result = std::panic::catch_unwind(|| run(&args()?)).unwrap_or_else(|_| Err(exit::last_panic()));

@@ -28,6 +28,9 @@ const SHORT_BYTES: usize = 64 << 10;
 /// How often a run that waits for a node asks whether it is to stop.
 const ASK: Duration = Duration::from_millis(100);
 
+/// Bytes of a position in a Brotli payload.
+const BROTLI_POSITION_BYTES: u64 = 16;
+
 /// Turns stored records into payloads; one for each thread.
 pub(crate) struct PayloadEncoder<'a> {
     events: &'a dyn Events,
@@ -149,5 +152,14 @@ impl NodeEncoder for PayloadEncoder<'_> {
             }
         }
         Ok(())
+    }
+
+    fn is_row_by_row(&self) -> bool {
+        self.encoding == Encoding::Default
+    }
+
+    fn bytes_per_point(&self) -> u64 {
+        // plain and sorted records, planes and their compressed bytes; codes, keys, and the order of the points
+        4 * (self.layout.stride as u64 + BROTLI_POSITION_BYTES) + 16 + 16 + 4
     }
 }

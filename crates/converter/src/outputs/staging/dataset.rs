@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::error::ConvertError;
-use crate::runtime::disk::{sync_folder, sync_path};
+use crate::runtime::disk::{sync_file_system, sync_folder, sync_path};
 use crate::runtime::{Disk, DiskFile};
 
 /// A dataset on its way into a [`super::StagedFolder`].
@@ -27,11 +27,21 @@ impl StagedDataset {
         DiskFile::create(&self.folder.join(name), self.shown.join(name), &self.disk)
     }
 
+    /// Opens a file that was made before, to write more.
+    pub(crate) fn open(&self, name: &str) -> Result<DiskFile, ConvertError> {
+        DiskFile::open(&self.folder.join(name), self.shown.join(name), &self.disk)
+    }
+
     /// Writes and syncs a small file.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ConvertError> {
         let file = self.create(name)?;
         file.write_at(bytes, 0, "writing the file")?;
         file.sync("writing the file")
+    }
+
+    /// Syncs everything that the file system of the dataset has; false where the system cannot.
+    pub(crate) fn sync_file_system(&self) -> Result<bool, ConvertError> {
+        sync_file_system(&*self.disk, &self.folder).map_err(|e| ConvertError::io(&self.shown, "syncing the files", e))
     }
 
     /// Syncs a file that was made before and is closed.
