@@ -162,7 +162,7 @@ mod tests {
     fn the_kind_of_error_decides_the_code() {
         let io_error = || io::Error::from(io::ErrorKind::StorageFull);
         let exists = || ConvertError::Output(OutputFault::Exists("x".into()));
-        let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error() };
+        let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error(), is_temporary: false };
         let why = MemoryNeed::Part("nodes");
         let table: [(Failure, u8); 9] = [
             (ConvertError::Internal("x".into()).into(), 1),

@@ -27,7 +27,9 @@ fn advice(advice: &Advice) -> String {
     match advice {
         Advice::ReplaceOutput => "choose another output, or pass --overwrite".to_owned(),
         Advice::RaiseMemory { mib } => format!("pass --memory {mib}MiB or more"),
-        Advice::FreeDisk => "free some space, or put temporary files elsewhere with --temp-dir".to_owned(),
+        Advice::FreeTemporaryDisk => {
+            "free some space there, or put temporary files elsewhere with --temp-dir".to_owned()
+        }
         Advice::DropDuplicates => "pass --duplicates drop".to_owned(),
         Advice::KeepDuplicates => "leave out --duplicates drop, or convert to potree2".to_owned(),
         Advice::CutBounds { bounds: Some(b) } => format!("--bounds {} keeps all others", bounds_value(b)),

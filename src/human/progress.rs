@@ -1,6 +1,7 @@
 //! Progress and warnings of a run on standard error, and the request to stop.
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,6 +14,7 @@ use super::quantities::{count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
+use crate::interrupt;
 use crate::printable::json_escaped;
 
 /// Interval of JSON lines; one per batch would be thousands.
@@ -120,7 +122,7 @@ impl Progress {
 
     /// Reports a warning.
     pub(crate) fn note(&self, line: &str) {
-        if self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
+        if self.stopped() || self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
             return;
         }
         match &self.face {
@@ -151,7 +153,8 @@ impl Progress {
     }
 
     fn write_json(&self, state: &mut State) {
-        if !matches!(self.face, Face::Json) {
+        // a run that is to stop must not wait for a reader
+        if !matches!(self.face, Face::Json) || self.stopped() {
             return;
         }
         state.last_json = Instant::now();
@@ -172,6 +175,12 @@ impl Progress {
 impl Events for Progress {
     fn phase(&self, phase: Phase, total: u64) {
         self.begin(phase.name(), total);
+        match &self.face {
+            _ if phase != Phase::CleanUp => {}
+            Face::Silent if !self.quiet => interrupt::tell_of_cleaning(interrupt::cleaning_line),
+            Face::Json => interrupt::tell_of_cleaning(|| write_line(&json!({ "phase": Phase::CleanUp.name() }))),
+            _ => {}
+        }
     }
 
     fn advance(&self, points: u64) {
@@ -180,6 +189,14 @@ impl Events for Progress {
 
     fn warning(&self, warning: &Warning) {
         self.note(&flags::warning_line(warning));
+    }
+
+    fn works_in(&self, folder: &Path) {
+        interrupt::works_in(folder);
+    }
+
+    fn settling(&self) {
+        interrupt::settling();
     }
 
     fn stop_requested(&self) -> bool {

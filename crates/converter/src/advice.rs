@@ -15,8 +15,12 @@ pub enum Advice {
         /// Smallest ceiling that is enough, MiB.
         mib: u64,
     },
-    /// Free disk space, or use another folder for temporary files.
+    /// Free space where the output is, or choose an output on another disk.
     FreeDisk,
+    /// Free space where temporary files are, or use another folder for them.
+    FreeTemporaryDisk,
+    /// Raise the limit on the size of files, or choose another file system.
+    AllowLargerFiles,
     /// Drop duplicates.
     DropDuplicates,
     /// Keep the duplicates, or convert to the octree alone.
@@ -59,6 +63,8 @@ pub enum Advice {
     MoveAway,
     /// Choose another output.
     OtherOutput,
+    /// Wait until the other run has ended, or choose another output.
+    WaitForRun,
 }
 
 impl fmt::Display for Advice {
@@ -73,7 +79,9 @@ impl fmt::Display for Advice {
                 return write!(f, "keep only the points from {min:?} to {max:?}, drop outliers, or keep them");
             }
             Self::ReplaceOutput => "choose another output, or allow it to be replaced",
-            Self::FreeDisk => "free some space, or put temporary files elsewhere",
+            Self::FreeDisk => "free some space there, or choose an output on another disk",
+            Self::FreeTemporaryDisk => "free some space there, or put temporary files elsewhere",
+            Self::AllowLargerFiles => "raise the limit on the size of files, or choose another file system",
             Self::DropDuplicates => "drop duplicates",
             Self::KeepDuplicates => "keep duplicates, or convert to potree2",
             Self::CutBounds { bounds: None } => "limit the bounds to leave them out, or correct the input",
@@ -93,6 +101,7 @@ impl fmt::Display for Advice {
             }
             Self::MoveAway => "move it away, or choose another output",
             Self::OtherOutput => "choose another output",
+            Self::WaitForRun => "wait until it has ended, or choose another output",
         };
         f.write_str(words)
     }

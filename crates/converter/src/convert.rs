@@ -34,11 +34,41 @@ pub fn convert_on(
     events: &dyn Events,
 ) -> Result<Report, ConvertError> {
     let mut clock = Clock::start(events);
-    let peak_before = peak_resident_bytes();
     clock.begin(Phase::Probe, 0);
     outputs::check(plan, targets)?;
-    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk))?;
-    let sources = Sources::open(plan, events)?;
+    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?;
+    staged.warnings.iter().for_each(|w| events.warning(w));
+    events.works_in(staged.path());
+    let written = write(plan, targets, events, &staged, disk, &mut clock);
+    events.settling();
+    match written {
+        Ok(mut report) => {
+            if let Some(left) = staged.finish(events)? {
+                events.warning(&left);
+                report.warnings.push(left);
+            }
+            Ok(report)
+        }
+        Err(error) => {
+            events.phase(Phase::CleanUp, 0); // removing many files takes its time
+            drop(staged);
+            Err(error)
+        }
+    }
+}
+
+/// All passes, up to an output that is complete but for its name.
+fn write(
+    plan: &Plan,
+    targets: &[Target],
+    events: &dyn Events,
+    staged: &StagedFolder,
+    disk: Arc<dyn Disk>,
+    clock: &mut Clock<'_>,
+) -> Result<Report, ConvertError> {
+    let peak_before = peak_resident_bytes();
+    let mut sources = Sources::open(plan, events)?;
+    sources.warnings.extend(staged.warnings.iter().cloned());
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let least = least(targets, &sources, &intake);
@@ -49,7 +79,7 @@ pub fn convert_on(
 
     let demand = Demand { moments: wants.moments, uses: targets.len() as u32 };
     let reading = rt.budget.reading(&rt.memory)?;
-    let cloud = gather(plan, &sources, &intake, demand, &rt, &mut clock)?;
+    let cloud = gather(plan, &sources, &intake, demand, &rt, clock)?;
     drop(reading);
 
     let mut outputs = Vec::new();
@@ -84,7 +114,6 @@ pub fn convert_on(
     let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
     staged.write_report(&text)?;
     rt.check_stop()?;
-    staged.finish()?;
     Ok(report)
 }
 

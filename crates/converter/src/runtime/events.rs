@@ -1,5 +1,7 @@
 //! How a run reports what it is doing, and how it is asked to stop.
 
+use std::path::Path;
+
 use crate::warning::Warning;
 
 /// The phases of a run, in order.
@@ -13,6 +15,8 @@ pub enum Phase {
     Build,
     /// Hierarchy, metadata, syncing and renaming; no unit.
     Finish,
+    /// Removing what a run that failed or was stopped has made so far; no unit.
+    CleanUp,
 }
 
 impl Phase {
@@ -23,6 +27,7 @@ impl Phase {
             Self::Read => "read",
             Self::Build => "build",
             Self::Finish => "finish",
+            Self::CleanUp => "clean up",
         }
     }
 }
@@ -35,6 +40,11 @@ pub trait Events: Sync {
     fn advance(&self, _points: u64) {}
     /// Something the user should know.
     fn warning(&self, _warning: &Warning) {}
+    /// All that the run has made so far is in this folder, but for temporary files without a name. It is removed if the
+    /// run fails.
+    fn works_in(&self, _folder: &Path) {}
+    /// From now on a request to stop changes nothing: the output gets its name, or what was made is removed.
+    fn settling(&self) {}
     /// True if the run must end; asked often.
     fn stop_requested(&self) -> bool {
         false

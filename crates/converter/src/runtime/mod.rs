@@ -4,13 +4,14 @@ mod budget;
 mod clock;
 pub(crate) mod disk;
 mod events;
+pub(crate) mod os_files;
 pub(crate) mod os_hints;
 mod pool;
 mod workers;
 
 pub(crate) use budget::{Budget, Least};
 pub(crate) use clock::{Clock, PhaseTime};
-pub use disk::{Disk, DiskOperation, SystemDisk};
+pub use disk::{Disk, DiskOperation, Replacing, SystemDisk};
 pub(crate) use disk::{DiskFile, Sequential, TempFiles};
 pub use events::{Events, Phase, Silent};
 pub(crate) use pool::{Consumer, Evict, Pool, Reservation};
@@ -54,6 +55,11 @@ impl<'a> Runtime<'a> {
     /// Fails if the run was asked to stop.
     pub(crate) fn check_stop(&self) -> Result<(), ConvertError> {
         if self.events.stop_requested() { Err(ConvertError::Interrupted) } else { Ok(()) }
+    }
+
+    /// Where the request to stop comes from, for what outlives a borrow of this.
+    pub(crate) fn events(&self) -> &'a dyn Events {
+        self.events
     }
 
     /// Reports that `points` more are done in the current phase.

@@ -70,6 +70,9 @@ impl Sources {
         let mut options = plan.open.clone();
         options.description_bytes.get_or_insert(plan.memory_bytes / DESCRIPTION_SHARE);
         for path in &paths {
+            if events.stop_requested() {
+                return Err(ConvertError::Interrupted);
+            }
             let opened = pointmill_format::open_scan(path, &options);
             match opened.and_then(|scan| Ok((missing_points(&*scan, plan.unreadable)?, scan))) {
                 Ok((missing, scan)) => {
