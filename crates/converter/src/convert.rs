@@ -32,10 +32,11 @@ pub fn convert_on(
     events: &dyn Events,
 ) -> Result<Report, ConvertError> {
     let mut clock = Clock::start(events);
-    clock.begin(Phase::Probe, 0);
+    clock.begin(Phase::Probe, plan.inputs.len() as u64);
     outputs::check(plan, targets)?;
     let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk))?;
-    let sources = Sources::open(plan, events)?;
+    let mut sources = Sources::open(plan, events)?;
+    let warnings = std::mem::take(&mut sources.warnings);
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let budget = Budget::new(plan, intake.schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
@@ -44,7 +45,7 @@ pub fn convert_on(
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, disk), events)?;
 
     let demand = Demand { moments: wants.moments, uses: targets.len() as u32 };
-    let cloud = gather(plan, &sources, &intake, demand, &rt, &mut clock)?;
+    let cloud = gather(plan, &sources, &intake, demand, warnings, &rt, &mut clock)?;
 
     let mut outputs = Vec::new();
     for target in targets {
@@ -68,9 +69,8 @@ pub fn convert_on(
         phases: clock.finish(),
         seconds: clock.seconds(),
     };
-    let report = report::report(&cloud, account)?;
-    let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
-    staged.write_report(&text)?;
+    let report = report::report(cloud, account)?;
+    staged.write_report(&report)?;
     rt.check_stop()?;
     staged.finish()?;
     Ok(report)

@@ -134,6 +134,11 @@ pub enum InputFault {
         /// Index of the point in the scan.
         point: u64,
     },
+    /// A file was changed between the read of its header and that of its points.
+    Changed {
+        /// The scan.
+        path: PathBuf,
+    },
     /// Colours declared as 8 bits deep have values above 255.
     DeepColours {
         /// The scan.
@@ -168,6 +173,11 @@ pub enum MemoryNeed {
         threads: u64,
         /// Points that each of them must have in memory.
         points: u64,
+    },
+    /// What is kept of each input.
+    Inputs {
+        /// How many.
+        inputs: u64,
     },
     /// Points that share one place and must be written as one node.
     OnePlace {
@@ -308,6 +318,7 @@ impl InputFault {
             Self::FarPoints { .. } => Some(Advice::CutBounds { bounds: None }),
             Self::CostlyOutliers { others, .. } => Some(Advice::CutOutliers { bounds: *others }),
             Self::InvalidPosition { .. } => Some(Advice::SkipInvalid),
+            Self::Changed { .. } => Some(Advice::StopWriting),
             Self::DeepColours { .. } => Some(Advice::DetectRgbDepth),
             Self::NoneReadable | Self::NothingLeft { .. } => None,
         }
@@ -340,6 +351,9 @@ impl fmt::Display for InputFault {
             }
             Self::InvalidPosition { path, point } => {
                 write!(f, "{}: point {point} has no finite position", path.display())
+            }
+            Self::Changed { path } => {
+                write!(f, "{}: the file was changed while it was being read", path.display())
             }
             Self::DeepColours { path } => {
                 write!(f, "{}: has colour values above 255, so they cannot be 8 bits deep", path.display())
@@ -381,6 +395,7 @@ impl fmt::Display for MemoryNeed {
             Self::Threads { threads, points } => {
                 write!(f, "{threads} worker threads need {points} points each in memory")
             }
+            Self::Inputs { inputs } => write!(f, "there are {inputs} inputs, and something is kept of each"),
             Self::OnePlace { points } => {
                 write!(f, "{points} points share one place and must be written as one node")
             }

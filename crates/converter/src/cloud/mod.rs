@@ -3,6 +3,7 @@
 
 mod cell;
 mod checksum;
+mod colour_range;
 mod cube;
 mod facts;
 mod frames;
@@ -19,6 +20,7 @@ mod segments;
 mod shortfall;
 mod stats;
 mod store;
+mod widening;
 
 pub(crate) use cell::{Cell, SharedPlace};
 pub(crate) use checksum::Checksum;
@@ -26,7 +28,7 @@ pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
 pub(crate) use frames::{JobBounds, JobColumns, JobPoint, StoredOrigin, StoredPoint, TreePoint};
 pub(crate) use grouping::{CellHash, Grouping};
-pub(crate) use intake::Intake;
+pub(crate) use intake::{Intake, LayoutIntake};
 pub(crate) use lattice::JobLattice;
 pub(crate) use ledger::Ledger;
 pub(crate) use moments::Moments;
@@ -35,8 +37,9 @@ pub(crate) use record::{RecordFrame, copy_record, position};
 pub(crate) use regroup::Regrouper;
 pub(crate) use segments::{Segment, Segments};
 pub(crate) use shortfall::Shortfall;
-pub(crate) use stats::{Change, Range, Stats};
+pub(crate) use stats::{Change, Range, SourceStats, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
+pub(crate) use widening::{Group, Widening};
 
 use pointmill_format::Aabb;
 
@@ -136,7 +139,7 @@ impl<'a> Cloud<'a> {
 
     /// Least step of the coordinates of the sources, world units; that of the lattice where a source states none.
     pub(crate) fn source_step(&self) -> [f64; 3] {
-        let step = |source: &crate::sources::Source, a: usize| match source.survey.fineness[a] {
+        let step = |source: &crate::sources::Source, a: usize| match source.stored.fineness[a] {
             Fineness::Grid { grid, .. } => grid.step,
             Fineness::Step(step) => step,
             Fineness::Single | Fineness::Double => self.lattice.lattice.scale[a],

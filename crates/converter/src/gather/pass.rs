@@ -1,21 +1,22 @@
 //! One pass over the sources, with a lattice and bounds that are believed until they prove wrong.
 
 use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex};
 
-use pointmill_format::{Aabb, Advice, AxisGrid, Lattice, Scratch};
+use pointmill_format::{Aabb, Advice, Lattice, Scratch};
 
-use super::axis::SourceMap;
 use super::batch::Worker;
 use super::context::{CellPart, CellParts, Context, Demand};
-use super::cut::Cut;
 use super::lattice::ulp;
-use super::origins::Origins;
 use super::partition::Partition;
-use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton};
+use super::visit::Visit;
+use crate::cloud::{
+    Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, SourceStats, Stats, Store, morton,
+};
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
 use crate::runtime::Runtime;
-use crate::sources::{Fineness, Source, Sources};
+use crate::sources::Sources;
 use crate::warning::{Warning, reason_of};
 
 /// How a pass over the inputs ended.
@@ -48,20 +49,13 @@ impl<'a> Pass<'a> {
         far_cut: Option<Aabb>,
         rt: &'a Runtime<'a>,
     ) -> Self {
-        let map = |s: &Source| SourceMap::new(s.scan.info().lattice.as_ref(), &lattice.lattice);
-        let cuts = |bounds: Option<Aabb>| -> Vec<Option<Cut>> {
-            sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect()
-        };
         let context = Context {
             plan,
             sources,
             intake,
-            maps: sources.all.iter().map(map).collect(),
-            claims: sources.all.iter().map(|s| claims(s, &lattice.lattice)).collect(),
+            far_cut,
+            seen: Mutex::new(vec![SourceStats::default(); sources.all.len()]),
             lattice: lattice.lattice,
-            far_cuts: cuts(far_cut),
-            cuts: cuts(plan.filter.bounds),
-            origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
             store: Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, rt.budget.store_bytes),
             wants_moments: demand.moments,
@@ -111,18 +105,17 @@ impl<'a> Pass<'a> {
     }
 
     fn read(&self) -> Result<(Stats, CellParts), ConvertError> {
-        let pieces = |(s, source): (usize, &Source)| (0..source.scan.pieces().len()).map(move |p| (s, p));
-        let pieces: Vec<(usize, usize)> = self.context.sources.all.iter().enumerate().flat_map(pieces).collect();
+        let sources = self.context.sources;
         let parts = self.rt.in_parallel(
-            pieces.len(),
-            || (Worker::new(&self.context), Scratch::default()),
-            |(worker, scratch), unit| {
-                let (source, piece) = pieces[unit];
-                self.piece(source, piece, worker, scratch)
+            sources.pieces(),
+            || Reader { worker: Worker::new(&self.context), visit: None, scratch: Scratch::default() },
+            |reader, unit| {
+                let (source, piece) = sources.piece(unit);
+                self.piece(source, piece, reader)
             },
-            |(worker, _)| worker.finish(),
+            |reader| reader.finish(&self.context),
         )?;
-        let mut stats = Stats::new(&self.context.intake.schema, self.context.sources.all.len());
+        let mut stats = Stats::new(&self.context.intake.schema);
         let mut cells = CellParts::default();
         for part in parts {
             let (part, more) = part?;
@@ -133,27 +126,31 @@ impl<'a> Pass<'a> {
                 part.moments.merge(&more.moments);
             }
         }
+        let mut seen = self.context.seen.lock().map_err(|_| ConvertError::Internal("a worker thread failed".into()))?;
+        stats.sources = std::mem::take(&mut seen);
         Ok((stats, cells))
     }
 
     /// Decodes one piece; what a broken piece held is counted or is an error, by policy.
-    fn piece(
-        &self,
-        source: usize,
-        piece: usize,
-        worker: &mut Worker<'_>,
-        scratch: &mut Scratch,
-    ) -> Result<(), ConvertError> {
-        let scan = &self.context.sources.all[source].scan;
+    fn piece<'s>(&'s self, source: usize, piece: usize, reader: &mut Reader<'s>) -> Result<(), ConvertError> {
+        let Reader { worker, visit, scratch } = reader;
+        if let Some(left) = visit.take_if(|visit| visit.index != source) {
+            left.end(&self.context)?;
+        }
+        let visit = match visit {
+            Some(visit) => visit,
+            None => visit.insert(Visit::begin(&self.context, source)?),
+        };
+        let scan = Arc::clone(&visit.scan);
         let mut outcome = Ok(());
         let mut points = 0u64;
-        let decoded = scan.decode(piece, &self.context.intake.sources[source].wanted, scratch, &mut |batch| {
+        let decoded = scan.decode(piece, &visit.intake.wanted, scratch, &mut |batch| {
             outcome = self.rt.check_stop();
             if outcome.is_err() {
                 return ControlFlow::Break(());
             }
             points += batch.len() as u64;
-            outcome = worker.take(source, batch);
+            outcome = worker.take(visit, batch);
             self.rt.advance(batch.len() as u64);
             if outcome.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
@@ -180,13 +177,20 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// The axes on which the points of a source have to prove a claim: a lattice that does not hold the claimed grid moves
-/// them anyway.
-fn claims(source: &Source, lattice: &Lattice) -> [bool; 3] {
-    std::array::from_fn(|a| {
-        let job = AxisGrid { step: lattice.scale[a], offset: lattice.offset[a] };
-        matches!(source.survey.fineness[a], Fineness::Grid { grid, is_claim: true } if job.holds(&grid))
-    })
+/// What a thread works with.
+struct Reader<'a> {
+    worker: Worker<'a>,
+    /// The source that was read last: the next piece may be one of it.
+    visit: Option<Visit<'a>>,
+    scratch: Scratch,
+}
+
+impl Reader<'_> {
+    /// Hands over everything that was gathered and measured.
+    fn finish(self, pass: &Context<'_>) -> Result<(Stats, CellParts), ConvertError> {
+        self.visit.map_or(Ok(()), |visit| visit.end(pass))?;
+        self.worker.finish()
+    }
 }
 
 /// True if no coordinate moved by more than the rounding of doubles.

@@ -1,18 +1,23 @@
 //! A dataset is made beside its final name, synced and renamed: finished or not there.
 
 use std::fs;
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill_format::DatasetKind;
+use serde::Serialize;
 use tempfile::TempDir;
 
 use crate::error::{ConvertError, OutputFault};
 use crate::runtime::disk::{create_folder, rename, sync_folder, sync_path};
-use crate::runtime::{Disk, DiskFile};
+use crate::runtime::{Disk, DiskFile, Sequential};
 
 /// The account of a run, beside the datasets or in the one that there is.
 pub(crate) const REPORT_FILE: &str = "report.json";
+
+/// Bytes of JSON that are written at once.
+const JSON_BUFFER: usize = 64 << 10;
 
 /// A folder that becomes the output when all is well, and vanishes when not.
 pub(crate) struct StagedFolder {
@@ -59,8 +64,8 @@ impl StagedFolder {
     }
 
     /// Writes and syncs the report beside the datasets, or in the one that there is.
-    pub(crate) fn write_report(&self, text: &str) -> Result<(), ConvertError> {
-        self.whole().write(REPORT_FILE, text.as_bytes())
+    pub(crate) fn write_report(&self, report: &impl Serialize) -> Result<(), ConvertError> {
+        self.whole().write_json(REPORT_FILE, report)
     }
 
     fn whole(&self) -> StagedDataset {
@@ -124,6 +129,16 @@ impl StagedDataset {
         let file = self.create(name)?;
         file.write_at(bytes, 0, "writing the file")?;
         file.sync("writing the file")
+    }
+
+    /// Writes and syncs an object, however large, as indented JSON.
+    fn write_json(&self, name: &str, object: &impl Serialize) -> Result<(), ConvertError> {
+        let doing = "writing the file";
+        let file = self.create(name)?;
+        let mut writer = BufWriter::with_capacity(JSON_BUFFER, Sequential::new(&file));
+        let written = serde_json::to_writer_pretty(&mut writer, object).map_err(io::Error::from);
+        written.and_then(|()| writer.flush()).map_err(|e| file.failed(doing, e))?;
+        file.sync(doing)
     }
 
     /// Syncs a file that was made before and is closed.

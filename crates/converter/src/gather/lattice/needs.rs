@@ -26,12 +26,12 @@ impl Knowledge {
     /// What the headers declare and samples show. Declared bounds never make a prescribed step coarser: they may lie.
     pub(super) fn of_headers(plan: &Plan, sources: &Sources) -> Self {
         let cut = |b: Aabb| plan.filter.bounds.as_ref().map_or(b, |c| intersection(&b, c));
-        let bounds = |s: &Source| s.survey.extent.map_or(Aabb::EMPTY, |e| cut(e.bounds));
+        let bounds = |s: &Source| s.extent.map_or(Aabb::EMPTY, |e| cut(e.bounds));
         let bounds: Vec<Aabb> = sources.all.iter().map(bounds).collect();
         let (mut all, mut seen, mut is_sampled) = (Aabb::EMPTY, Aabb::EMPTY, false);
         let mut certain = [Reach::default(); 3];
         for (source, bounds) in sources.all.iter().zip(&bounds) {
-            if let Some(lattice) = source.scan.info().lattice {
+            if let Some(lattice) = source.stored.lattice {
                 for (reach, offset) in certain.iter_mut().zip(lattice.offset) {
                     reach.farthest = reach.farthest.max(offset.abs());
                 }
@@ -40,8 +40,8 @@ impl Knowledge {
                 continue;
             }
             all = all.union(bounds);
-            let is_own = source.scan.info().lattice.is_none() && source.scan.info().bounds_declared.is_none();
-            is_sampled |= source.survey.extent.is_some_and(|e| e.is_sampled);
+            let is_own = source.stored.lattice.is_none() && source.bounds_declared.is_none();
+            is_sampled |= source.extent.is_some_and(|e| e.is_sampled);
             if is_own {
                 seen = seen.union(bounds);
             }
@@ -63,7 +63,7 @@ impl Knowledge {
         let mut all = [0, 1, 2].map(|a| Reach::of(&Aabb { min, max }, a));
         // decoding adds the offset, however near 0 the sum is
         for source in &sources.all {
-            if let Some(own) = source.scan.info().lattice {
+            if let Some(own) = source.stored.lattice {
                 all.iter_mut().zip(own.offset).for_each(|(r, offset)| r.farthest = r.farthest.max(offset.abs()));
             }
         }
@@ -96,15 +96,22 @@ impl Knowledge {
     }
 }
 
-/// What each source asks of an axis.
+/// What the sources ask of an axis, in their order; what neighbours have in common once.
 pub(super) fn needs(sources: &Sources, known: &Knowledge, axis: usize) -> Vec<Need> {
-    sources.all.iter().enumerate().map(|(i, source)| need(source, known, i, axis)).collect()
+    let mut needs = Vec::new();
+    for (i, source) in sources.all.iter().enumerate() {
+        let need = need(source, known, i, axis);
+        if needs.last() != Some(&need) {
+            needs.push(need);
+        }
+    }
+    needs
 }
 
 fn need(source: &Source, known: &Knowledge, i: usize, axis: usize) -> Need {
-    let lattice = source.scan.info().lattice;
+    let lattice = source.stored.lattice;
     let own = |l: Lattice| AxisGrid { step: l.scale[axis], offset: l.offset[axis] };
-    match (source.survey.fineness[axis], lattice) {
+    match (source.stored.fineness[axis], lattice) {
         (Fineness::Grid { is_claim: true, .. }, Some(lattice)) if known.broken[i][axis] => {
             Need::Grid { grid: own(lattice), origin: GridOrigin::Lattice }
         }
@@ -112,7 +119,7 @@ fn need(source: &Source, known: &Knowledge, i: usize, axis: usize) -> Need {
         (Fineness::Grid { grid, is_claim: false }, _) => Need::Grid { grid, origin: GridOrigin::Lattice },
         (Fineness::Grid { grid, .. }, Some(_)) => Need::Grid { grid, origin: GridOrigin::Divisor },
         (Fineness::Grid { grid, .. }, None) => {
-            let is_stated = matches!(source.scan.info().resolution[axis], pointmill_format::Resolution::Grid(_));
+            let is_stated = matches!(source.stored.resolution[axis], pointmill_format::Resolution::Grid(_));
             let origin = if is_stated { GridOrigin::Stated } else { GridOrigin::Decimals };
             Need::Grid { grid, origin }
         }
@@ -145,7 +152,7 @@ pub(super) fn finest_of_sources(sources: &Sources, known: &Knowledge) -> [Option
 /// 0 where it is a point of every source's grid of that step, so that sources of any kind give the same lattice; else
 /// the least of their offsets.
 pub(super) fn fixed_offset(sources: &Sources, axis: usize, step: f64) -> f64 {
-    let offset = |s: &Source| match s.survey.fineness[axis] {
+    let offset = |s: &Source| match s.stored.fineness[axis] {
         Fineness::Grid { grid, .. } => Some(grid.offset),
         _ => None,
     };
