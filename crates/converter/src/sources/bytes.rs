@@ -1,6 +1,6 @@
 //! What inputs take of the memory, beside their points.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{Source, Sources};
 use crate::error::{ConvertError, MemoryNeed};
@@ -35,7 +35,7 @@ pub(super) fn check(plan: &Plan, bytes: u64, inputs: usize) -> Result<(), Conver
 }
 
 /// What inputs of these paths take in all, at least: before their headers were read.
-pub(super) fn least_bytes(paths: &[PathBuf]) -> u64 {
+pub(super) fn least_bytes(paths: &[&Path]) -> u64 {
     let each = (size_of::<Source>() + size_of::<PathBuf>()) as u64 + LATER_BYTES;
     paths.iter().map(|path| each + path_bytes(path.as_os_str().len())).sum()
 }

@@ -15,9 +15,10 @@ mod source;
 mod survey;
 mod union;
 
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use pointmill_format::{Aabb, Scan};
+use pointmill_format::{Aabb, Attribute, Scan};
 
 pub(crate) use crs::resolve_all as resolve_crs_of_all;
 pub use crs::{ResolvedCrs, resolve_crs};
@@ -41,6 +42,9 @@ use crate::plan::Plan;
 use crate::runtime::{Events, Workers};
 use crate::warning::Warning;
 
+/// Inputs whose headers are looked at before what they have in common is put together.
+const AT_ONCE: usize = 4096;
+
 /// Threads that read headers: more only wait for the disk.
 const MOST_THREADS: usize = 32;
 
@@ -60,59 +64,83 @@ pub(crate) struct Sources {
     open: OpenScans,
 }
 
+/// Headers as they come in.
+#[derive(Default)]
+struct Found {
+    all: Vec<Source>,
+    /// By source.
+    attributes: Vec<Arc<[Attribute]>>,
+    points_declared: u64,
+    points_missing: u64,
+    warnings: Vec<Warning>,
+}
+
+impl Found {
+    /// Adds the next input.
+    fn add(&mut self, outcome: Outcome, open: &OpenScans) -> Result<(), ConvertError> {
+        let mut probed = match outcome {
+            Outcome::Open(probed) => probed,
+            Outcome::Skipped(warning) => {
+                self.warnings.push(*warning);
+                return Ok(());
+            }
+        };
+        if let Some(scan) = probed.scan.take() {
+            open.keep(self.all.len(), scan)?;
+        }
+        let Probed { source, attributes, points, points_missing, mut warnings, .. } = *probed;
+        let first_unit = self.all.last().map_or(0, |last| last.first_unit + u64::from(last.pieces));
+        self.all.push(Source { first_unit, ..source });
+        self.attributes.push(attributes);
+        self.points_declared = self.points_declared.saturating_add(points);
+        self.points_missing = self.points_missing.saturating_add(points_missing);
+        self.warnings.append(&mut warnings);
+        Ok(())
+    }
+
+    fn combine(self, open: OpenScans) -> Result<Sources, ConvertError> {
+        let Self { mut all, attributes, points_declared, points_missing, mut warnings } = self;
+        if all.is_empty() {
+            return Err(InputFault::NoneReadable.into());
+        }
+        let union = Union::of(&attributes);
+        warnings.extend(union.warnings);
+        all.iter_mut().zip(union.layout_of).for_each(|(source, layout)| source.layout = layout);
+        let divisors = Divisors::of(&all, &open)?;
+        settle_fineness(&mut all, &divisors);
+        let (attributes, layouts) = (union.schema, union.layouts);
+        Ok(Sources { all, attributes, layouts, points_declared, points_missing, warnings, open })
+    }
+}
+
 impl Sources {
     /// Looks at the headers of all inputs of the plan, in order of path, on its threads.
+    ///
+    /// # Errors
+    /// That of the first input that cannot be read, a ceiling of memory that is too small for so many, or the request to
+    /// stop.
     pub(crate) fn open(plan: &Plan, events: &dyn Events) -> Result<Self, ConvertError> {
-        let mut paths = plan.inputs.clone();
-        paths.sort();
+        let mut paths: Vec<&Path> = plan.inputs.iter().map(PathBuf::as_path).collect();
+        paths.sort_unstable();
         paths.dedup();
-        let mut warnings = Vec::new();
-        if !plan.other_files.is_empty() {
-            warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
-        }
         bytes::check(plan, bytes::least_bytes(&paths), paths.len())?;
         let workers = Workers::start(plan.threads.min(paths.len()).min(MOST_THREADS), events)?;
         let open = OpenScans::new(Opener::new(plan, workers.threads), plan.threads);
         let probe = Probe { open: &open, unreadable: plan.unreadable, shared: Mutex::new(Shared::default()) };
-        let outcomes = probe.all(&paths, &workers)?;
-        drop(probe);
-        let mut found = Vec::with_capacity(outcomes.len());
-        for outcome in outcomes {
-            match outcome {
-                Outcome::Open(mut probed) => {
-                    warnings.append(&mut probed.warnings);
-                    found.push(*probed);
-                }
-                Outcome::Skipped(warning) => warnings.push(warning),
+        let mut found = Found { all: Vec::with_capacity(paths.len()), ..Found::default() };
+        if !plan.other_files.is_empty() {
+            found.warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
+        }
+        for (round, some) in paths.chunks(AT_ONCE).enumerate() {
+            for outcome in probe.some(round * AT_ONCE, some, &workers)? {
+                found.add(outcome, &open)?;
             }
         }
-        if found.is_empty() {
-            return Err(InputFault::NoneReadable.into());
-        }
-        let sources = Self::combine(found, open, warnings)?;
+        drop(probe);
+        let sources = found.combine(open)?;
         bytes::check(plan, sources.bytes(), paths.len())?;
         sources.warnings.iter().for_each(|w| events.warning(w));
         Ok(sources)
-    }
-
-    fn combine(found: Vec<Probed>, open: OpenScans, mut warnings: Vec<Warning>) -> Result<Self, ConvertError> {
-        let union = Union::of(found.iter().map(|probed| &probed.attributes));
-        warnings.extend(union.warnings);
-        let (mut points_declared, mut points_missing, mut first_unit) = (0u64, 0u64, 0);
-        let mut all = Vec::with_capacity(found.len());
-        for (index, (probed, layout)) in found.into_iter().zip(union.layout_of).enumerate() {
-            points_declared = points_declared.saturating_add(probed.points);
-            points_missing = points_missing.saturating_add(probed.points_missing);
-            if let Some(scan) = probed.scan {
-                open.keep(index, scan)?;
-            }
-            all.push(Source { layout, first_unit, ..probed.source });
-            first_unit += u64::from(all[index].pieces);
-        }
-        let divisors = Divisors::of(&all, &open)?;
-        settle_fineness(&mut all, &divisors);
-        let (attributes, layouts) = (union.schema, union.layouts);
-        Ok(Self { all, attributes, layouts, points_declared, points_missing, warnings, open })
     }
 
     /// The scan of a source, open.
@@ -162,13 +190,13 @@ impl Sources {
 fn settle_fineness(sources: &mut [Source], divisors: &Divisors) {
     let mut last: Option<Arc<source::Stored>> = None;
     for source in sources {
-        let mut stored = (*source.stored).clone();
-        if let Some(lattice) = &stored.lattice {
-            stored.fineness = divisors.fineness(lattice);
+        let Some(lattice) = &source.stored.lattice else { continue };
+        let fineness = divisors.fineness(lattice);
+        if fineness != source.stored.fineness {
+            let stored = source::Stored { fineness, ..(*source.stored).clone() };
+            let same = last.filter(|last| **last == stored);
+            source.stored = same.unwrap_or_else(|| Arc::new(stored));
+            last = Some(Arc::clone(&source.stored));
         }
-        let same = last.filter(|last| **last == stored);
-        let stored = same.unwrap_or_else(|| Arc::new(stored));
-        source.stored = Arc::clone(&stored);
-        last = Some(stored);
     }
 }

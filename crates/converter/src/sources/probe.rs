@@ -1,6 +1,6 @@
 //! Headers of all inputs, on all threads. What is found does not depend on which of them comes first.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use pointmill_format::{Advice, Attribute, ErrorKind, ReadError, Scan};
@@ -31,7 +31,7 @@ pub(super) struct Probed {
 /// An input that was looked at.
 pub(super) enum Outcome {
     Open(Box<Probed>),
-    Skipped(Warning),
+    Skipped(Box<Warning>),
 }
 
 /// Looks at inputs.
@@ -42,16 +42,21 @@ pub(super) struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// All inputs in the order of `paths`.
+    /// Some inputs, in the order of `paths`; `first`: the index of the first among all.
     ///
     /// # Errors
     /// Of the first input that cannot be read, if the policy says so; the run was asked to stop.
-    pub(super) fn all(&self, paths: &[PathBuf], workers: &Workers<'_>) -> Result<Vec<Outcome>, ConvertError> {
+    pub(super) fn some(
+        &self,
+        first: usize,
+        paths: &[&Path],
+        workers: &Workers<'_>,
+    ) -> Result<Vec<Outcome>, ConvertError> {
         let parts = workers.in_parallel(
             paths.len(),
             Vec::new,
             |found: &mut Vec<(usize, Outcome)>, index| {
-                found.push((index, self.one(index, &paths[index], workers)?));
+                found.push((index, self.one(first + index, paths[index], workers)?));
                 workers.advance(1);
                 Ok(())
             },
@@ -72,7 +77,8 @@ impl Probe<'_> {
                 Ok(Outcome::Open(Box::new(probed)))
             }
             Err(error) if self.unreadable == OnFault::Skip && !matches!(error.kind(), ErrorKind::Unsupported) => {
-                Ok(Outcome::Skipped(Warning::InputSkipped { path: path.to_path_buf(), error: reason_of(&error) }))
+                let warning = Warning::InputSkipped { path: path.to_path_buf(), error: reason_of(&error) };
+                Ok(Outcome::Skipped(Box::new(warning)))
             }
             Err(error) => Err(error.into()),
         }
@@ -88,7 +94,7 @@ impl Probe<'_> {
             path: path.into(),
             format: shared.format(&info.format),
             crs: shared.crs(&info.crs),
-            stored: Arc::new(Stored { lattice: info.lattice, resolution: info.resolution, fineness }),
+            stored: shared.stored(&Stored { lattice: info.lattice, resolution: info.resolution, fineness }),
             layout: 0,
             points_declared: info.points_declared,
             bounds_declared: info.bounds_declared,

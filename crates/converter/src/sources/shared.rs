@@ -6,12 +6,16 @@ use std::sync::Arc;
 
 use pointmill_format::{Attribute, Crs, ScanInfo};
 
+use super::source::Stored;
+use super::survey::Fineness;
+
 /// Values that were seen. Equal ones share memory.
 #[derive(Default)]
 pub(super) struct Shared {
     formats: Known<str>,
     systems: Known<Crs>,
     attributes: Known<[Attribute]>,
+    stored: Known<Stored>,
 }
 
 impl Shared {
@@ -25,6 +29,14 @@ impl Shared {
             format!("{:?}{:?}", crs.unit, crs.vertical_unit).hash(h);
         });
         self.systems.share(hash, crs, || Arc::new(crs.clone()))
+    }
+
+    pub(super) fn stored(&mut self, stored: &Stored) -> Arc<Stored> {
+        let hash = hash_of(|h| {
+            stored.lattice.map(|l| [l.scale, l.offset].map(|v| v.map(f64::to_bits))).hash(h);
+            stored.fineness.map(Fineness::bits).hash(h);
+        });
+        self.stored.share(hash, stored, || Arc::new(stored.clone()))
     }
 
     pub(super) fn attributes(&mut self, info: &ScanInfo) -> Arc<[Attribute]> {

@@ -44,6 +44,18 @@ pub(crate) enum Fineness {
     Double,
 }
 
+impl Fineness {
+    /// Differs where the fineness does.
+    pub(super) fn bits(self) -> [u64; 3] {
+        match self {
+            Self::Grid { grid, is_claim } => [1 + u64::from(is_claim), grid.step.to_bits(), grid.offset.to_bits()],
+            Self::Step(step) => [3, step.to_bits(), 0],
+            Self::Single => [4, 0, 0],
+            Self::Double => [5, 0, 0],
+        }
+    }
+}
+
 /// What is known of a source before it is read.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Survey {
