@@ -12,6 +12,7 @@ mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod many;
 mod odd_places;
 mod placing;
 mod precision;

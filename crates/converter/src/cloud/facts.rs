@@ -38,7 +38,8 @@ impl Facts {
         let mut widening = Widening::default();
         if let Some(rgb) = schema.rgb() {
             let all = sources.all.iter().zip(&stats.sources);
-            let depths: Vec<bool> = all.map(|(s, stats)| is_eight_bit(plan.rgb_depth, s.rgb_is_16_bit, stats)).collect();
+            let depths: Vec<bool> =
+                all.map(|(s, stats)| is_eight_bit(plan.rgb_depth, s.rgb_is_16_bit, stats)).collect();
             let mut narrow = vec![false; sources.all.len()];
             for (i, seen) in stats.sources.iter().enumerate().filter(|(_, s)| s.kept > 0) {
                 let source = &sources.all[i];

@@ -50,8 +50,7 @@ impl Intake {
             let columns: Vec<Option<usize>> = layout.columns.iter().map(|c| places[c.attribute]).collect();
             let read = layout.columns.iter().enumerate().filter(|(i, _)| columns[*i].is_some());
             let recasts = read.filter_map(|(i, c)| Some((i, c.recast.clone()?))).collect();
-            let is_filtered =
-                |i: usize| plan.filter.classes.is_some() && layout.attributes[i].name == "classification";
+            let is_filtered = |i: usize| plan.filter.classes.is_some() && layout.attributes[i].name == "classification";
             let wanted = columns.iter().enumerate().map(|(i, c)| c.is_some() || is_filtered(i)).collect::<Wanted>();
             LayoutIntake { columns, recasts, wanted }
         };

@@ -25,7 +25,8 @@ mod tests {
 
     #[test]
     fn the_soft_limit_is_read_from_what_the_system_says() {
-        let line = |figure: &str| format!("Max processes  9 9 processes\nMax open files            {figure} 4096 files\n");
+        let line =
+            |figure: &str| format!("Max processes  9 9 processes\nMax open files            {figure} 4096 files\n");
         assert_eq!(soft_limit(&line("1024")), Some(1024));
         assert_eq!(soft_limit(&line("unlimited")), Some(usize::MAX));
         assert_eq!(soft_limit("Max processes 9 9 processes"), None);

@@ -300,9 +300,8 @@ mod tests {
 
     #[test]
     fn lists_that_scans_share_go_where_they_would_go_one_by_one() {
-        let named = |names: &[&str]| -> Vec<Attribute> {
-            names.iter().map(|n| Attribute::new(*n, T::Float64, 1)).collect()
-        };
+        let named =
+            |names: &[&str]| -> Vec<Attribute> { names.iter().map(|n| Attribute::new(*n, T::Float64, 1)).collect() };
         // "timestamp" joins "time" until a scan has both
         let lists = [named(&["time"]), named(&["timestamp"]), named(&["time", "timestamp"]), named(&["h"])];
         let mut random = pointmill_testkit::Random::new(7);

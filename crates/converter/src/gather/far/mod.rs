@@ -83,13 +83,7 @@ impl Recent {
 }
 
 /// Pieces that cannot be decoded were reported when the points were read.
-fn add_piece(
-    scan: &dyn Scan,
-    piece: usize,
-    cut: Option<&Aabb>,
-    scratch: &mut Scratch,
-    mut take: impl FnMut([f64; 3]),
-) {
+fn add_piece(scan: &dyn Scan, piece: usize, cut: Option<&Aabb>, scratch: &mut Scratch, mut take: impl FnMut([f64; 3])) {
     let wanted = Wanted::positions(scan.info());
     let _ = scan.decode(piece, &wanted, scratch, &mut |batch: &PointBatch| {
         let lattice = scan.info().lattice;
