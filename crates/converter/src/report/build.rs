@@ -35,6 +35,7 @@ pub(crate) struct Account {
 pub(crate) fn report(mut cloud: Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
     let Account { settings, other_files, outputs, phases, seconds } = account;
     let mut warnings = std::mem::take(&mut cloud.warnings);
+    cloud.cells = Vec::new();
     warnings.extend(outputs.iter().flat_map(|o| &o.warnings).cloned());
     let (cloud, stats) = (&cloud, &cloud.stats);
     Ok(Report {
@@ -104,7 +105,7 @@ pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec
         let coloured = cloud.filter(|c| c.intake.of(source).has(c.schema().rgb()));
         let label = labels.entry(Arc::as_ptr(&source.crs)).or_insert_with(|| resolve_crs(&source.crs).label.into());
         InputReport {
-            path: source.path.to_path_buf(),
+            path: Arc::clone(&source.path),
             format: Arc::clone(&source.format),
             points_declared: source.points_declared,
             points_read: seen.map_or(0, |s| s.read),

@@ -87,14 +87,14 @@ pub struct OutputReport {
     pub warnings: Vec<Warning>,
 }
 
-/// One input.
-#[derive(Debug, Clone, Default, Serialize)]
+/// One input. There may be very many: what they have in common they share.
+#[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct InputReport {
     /// The file; serialised as text, with U+FFFD for what is no Unicode in its name.
     #[serde(serialize_with = "lossy")]
-    pub path: PathBuf,
-    /// Its kind, for people; shared by inputs of one kind.
+    pub path: Arc<Path>,
+    /// Its kind, for people.
     #[serde(serialize_with = "text")]
     pub format: Arc<str>,
     /// Claimed by the header.
@@ -110,7 +110,7 @@ pub struct InputReport {
     pub bounds_measured: Option<[f64; 6]>,
     /// How finely the file stores these coordinates, per axis, world units; null: in doubles that show no step.
     pub resolution: [Option<f64>; 3],
-    /// As found, shortened for people ("EPSG:2994", "WKT: NAD83 / …") or empty; shared by inputs of one system.
+    /// As found, shortened for people ("EPSG:2994", "WKT: NAD83 / …") or empty.
     #[serde(serialize_with = "text")]
     pub crs: Arc<str>,
     /// 8 or 16 where the file has colour.

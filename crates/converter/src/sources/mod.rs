@@ -43,7 +43,7 @@ use crate::runtime::{Events, Workers};
 use crate::warning::Warning;
 
 /// Inputs whose headers are looked at before what they have in common is put together.
-const AT_ONCE: usize = 4096;
+const AT_ONCE: usize = 1024;
 
 /// Threads that read headers: more only wait for the disk.
 const MOST_THREADS: usize = 32;
