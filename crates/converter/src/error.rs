@@ -176,8 +176,8 @@ pub enum MemoryNeed {
     },
     /// What is kept of each input.
     Inputs {
-        /// How many.
-        inputs: u64,
+        /// Bytes of all of them.
+        bytes: u64,
     },
     /// Points that share one place and must be written as one node.
     OnePlace {
@@ -395,7 +395,7 @@ impl fmt::Display for MemoryNeed {
             Self::Threads { threads, points } => {
                 write!(f, "{threads} worker threads need {points} points each in memory")
             }
-            Self::Inputs { inputs } => write!(f, "there are {inputs} inputs, and something is kept of each"),
+            Self::Inputs { bytes } => write!(f, "what is kept of each input takes {} MiB in all", bytes >> 20),
             Self::OnePlace { points } => {
                 write!(f, "{points} points share one place and must be written as one node")
             }

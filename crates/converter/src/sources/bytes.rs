@@ -26,11 +26,11 @@ const SHARE: u64 = 2;
 const FEW_BYTES: u64 = 8 << 20;
 
 /// Fails if the inputs take too much of the memory of the plan.
-pub(super) fn check(plan: &Plan, bytes: u64, inputs: usize) -> Result<(), ConvertError> {
+pub(super) fn check(plan: &Plan, bytes: u64) -> Result<(), ConvertError> {
     if bytes <= (plan.memory_bytes / SHARE).max(FEW_BYTES) {
         return Ok(());
     }
-    let why = MemoryNeed::Inputs { inputs: inputs as u64 };
+    let why = MemoryNeed::Inputs { bytes };
     Err(ConvertError::Memory { ceiling: plan.memory_bytes, needed: bytes.saturating_mul(SHARE), why })
 }
 
