@@ -174,9 +174,9 @@ pub enum MemoryNeed {
         /// Points that each of them must have in memory.
         points: u64,
     },
-    /// What is kept of each input.
+    /// What is known of the inputs.
     Inputs {
-        /// Bytes of all of them.
+        /// Bytes for all of them.
         bytes: u64,
     },
     /// Points that share one place and must be written as one node.
@@ -395,7 +395,7 @@ impl fmt::Display for MemoryNeed {
             Self::Threads { threads, points } => {
                 write!(f, "{threads} worker threads need {points} points each in memory")
             }
-            Self::Inputs { bytes } => write!(f, "what is kept of each input takes {} MiB in all", bytes >> 20),
+            Self::Inputs { bytes } => write!(f, "what is known of the inputs takes {} MiB", bytes.div_ceil(1 << 20)),
             Self::OnePlace { points } => {
                 write!(f, "{points} points share one place and must be written as one node")
             }

@@ -28,12 +28,14 @@ pub(crate) struct LayoutIntake {
     pub(crate) recasts: Vec<(usize, Recast)>,
     /// The columns to decode: those, and what the filter looks at.
     pub(crate) wanted: Wanted,
+    /// By attribute of the schema: whether one of the columns is it.
+    present: Vec<bool>,
 }
 
 impl LayoutIntake {
     /// True if these sources have the attribute with that index in the schema.
     pub(crate) fn has(&self, attribute: Option<usize>) -> bool {
-        attribute.is_some() && self.columns.contains(&attribute)
+        attribute.and_then(|i| self.present.get(i)).copied().unwrap_or(false)
     }
 }
 
@@ -52,7 +54,9 @@ impl Intake {
             let recasts = read.filter_map(|(i, c)| Some((i, c.recast.clone()?))).collect();
             let is_filtered = |i: usize| plan.filter.classes.is_some() && layout.attributes[i].name == "classification";
             let wanted = columns.iter().enumerate().map(|(i, c)| c.is_some() || is_filtered(i)).collect::<Wanted>();
-            LayoutIntake { columns, recasts, wanted }
+            let mut present = vec![false; schema.attributes.len()];
+            columns.iter().flatten().for_each(|&i| present[i] = true);
+            LayoutIntake { columns, recasts, wanted, present }
         };
         let layouts = sources.layouts.iter().map(of_layout).collect();
         Self { schema, mark, unread, layouts, rgb_depth: plan.rgb_depth }

@@ -54,7 +54,7 @@ pub(super) fn add(
             }
         }
     }
-    for place in (0..schema.attributes.len()).filter(|p| !columns.contains(&Some(*p))) {
+    for place in (0..schema.attributes.len()).filter(|p| !visit.intake.has(Some(*p))) {
         // What this source does not have is stored as zeros.
         if Some(place) == rgb {
             visit.seen.rgb.add([0; 3]);

@@ -161,3 +161,31 @@ fn is_too_many_files(error: &ReadError) -> bool {
 fn lock<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, ConvertError> {
     mutex.lock().map_err(|_| ConvertError::Internal("a thread failed while it opened a scan".into()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Plan;
+    use crate::sources::Sources;
+
+    #[test]
+    fn the_scans_used_last_stay_open_and_all_can_be_opened_again() {
+        let file = |name: &str| concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/las/").to_owned() + name;
+        let inputs = ["format0.las", "format1.las", "format2.las", "format3.las"].map(|name| file(name).into());
+        let plan = Plan::new(inputs.to_vec(), "out".into());
+        let sources = Sources::open(&plan, &crate::runtime::Silent).unwrap().all;
+        let open = OpenScans::with_room_for(Opener::new(&plan, 1), 2);
+        let get = |i: usize| open.get(i, &sources[i]).unwrap();
+        let (first, second) = (get(0), get(1));
+        assert!(Arc::ptr_eq(&first, &get(0)));
+        get(2);
+        assert!(Arc::ptr_eq(&first, &get(0)), "used after the second one");
+        assert!(!Arc::ptr_eq(&second, &get(1)), "it was closed for the third");
+        for i in (0..4).rev() {
+            assert_eq!(get(i).info().path, *sources[i].path);
+            let kept = open.kept.lock().unwrap();
+            assert!(kept.scans.len() <= 2);
+            assert_eq!(kept.bytes, kept.scans.values().map(|place| place.bytes).sum::<usize>());
+        }
+    }
+}
