@@ -6,9 +6,10 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use pointmill_converter::ConvertError;
-use pointmill_format::{Advice, ErrorKind, ReadError};
+use pointmill_format::{Advice, ErrorKind, ReadError, system_reason};
 
 use crate::flags;
+use crate::printable::{json_escaped, printable, printable_lines};
 
 /// Why the program ends without success.
 #[derive(Debug)]
@@ -56,28 +57,34 @@ impl Failure {
         | Self::Memory(line)
         | Self::Faults(line)
         | Self::Interrupted(line)) = self;
-        print_line(line);
+        // to be stopped is no error
+        let word = if matches!(self, Self::Interrupted(_)) { "pointmill" } else { "error" };
+        write_line(word, line);
     }
 
     /// The operating system refused; `doing` names the attempt ("writing the report").
     pub(crate) fn io(path: &Path, doing: &str, error: &io::Error) -> Self {
-        Self::Io(format!("{}: {doing}: {error}", path.display()))
+        Self::Io(format!("{}: {doing}: {}", path.display(), system_reason(error)))
     }
 }
 
-/// Prints one line on standard error. Line breaks inside it (a file name may hold them) become spaces.
+/// Prints a note on standard error: one line, whatever names it holds.
 pub(crate) fn print_line(line: &str) {
-    let line = line.replace(['\n', '\r'], " ");
-    // Nothing can be reported when standard error is closed.
-    let _ = writeln!(io::stderr().lock(), "pointmill: {line}");
+    write_line("pointmill", line);
 }
 
-/// Writes a result to standard output. A closed pipe (`| head`) is not an error.
+fn write_line(word: &str, line: &str) {
+    // Nothing can be reported when standard error is closed.
+    let _ = writeln!(io::stderr().lock(), "{word}: {}", printable(line));
+}
+
+/// Writes a result to standard output, with nothing in it that a terminal obeys. A closed pipe (`| head`) is not an
+/// error.
 pub(crate) fn emit(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(printable_lines(text).as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        Err(e) => Err(Failure::Io(format!("writing to standard output: {e}"))),
+        Err(e) => Err(Failure::Io(format!("writing to standard output: {}", system_reason(&e)))),
         Ok(()) => Ok(()),
     }
 }
@@ -85,7 +92,7 @@ pub(crate) fn emit(text: &str) -> Result<(), Failure> {
 /// Pretty JSON and a line break.
 pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Internal(format!("internal error: {e}")))?;
-    Ok(text + "\n")
+    Ok(json_escaped(&text).into_owned() + "\n")
 }
 
 impl From<ReadError> for Failure {
@@ -118,8 +125,7 @@ impl From<ConvertError> for Failure {
 
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
 
-/// Keeps panics silent and remembers the last one. A decompressor that panics on corrupt bytes is caught by the reader
-/// and reported as a broken input, so nothing may be printed here; `main` reports panics that were not caught.
+/// Keeps panics silent and remembers the last one: a worker's panic ends the run, and `main` reports it once.
 pub(crate) fn remember_panics() {
     let backtrace_wanted = std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0");
     let default_hook = std::panic::take_hook();
@@ -157,7 +163,7 @@ mod tests {
         let io_error = || io::Error::from(io::ErrorKind::StorageFull);
         let exists = || ConvertError::Output(OutputFault::Exists("x".into()));
         let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error() };
-        let why = MemoryNeed::OnePlace { points: 1 };
+        let why = MemoryNeed::Part("nodes");
         let table: [(Failure, u8); 9] = [
             (ConvertError::Internal("x".into()).into(), 1),
             (exists().into(), 2),

@@ -12,12 +12,15 @@ use crate::human::progress::Progress;
 use crate::human::quantities::plural;
 use crate::human::validation;
 use crate::inputs;
-use crate::scan_choice;
+use crate::{scan_choice, text_choice};
 
 /// A folder with the outputs of one conversion to several formats is validated one after the other; all are
 /// reported, and the first failure gives the exit code.
 pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
     args.reading.placing.refuse_idle_crs()?;
+    if args.against.is_empty() {
+        args.reading.refuse_without_scans()?;
+    }
     let datasets = several(&args.dataset);
     if datasets.is_empty() {
         require_dataset(&args.dataset)?;
@@ -52,8 +55,9 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(), Failure> {
     if !args.against.is_empty() {
         let found = inputs::expand(&args.against, &options.open)?;
         scan_choice::check(&found.files, &options.open)?;
+        text_choice::check(&found.files, &options.open)?;
         if !args.talk.quiet {
-            found.all_notes().for_each(|note| print_line(&note));
+            found.all_notes().chain(found.unread_notes()).for_each(|note| print_line(&note));
         }
         options.against = found.files;
     }

@@ -43,9 +43,8 @@
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
 //! found in a file are never trusted; an allocation is bounded by the size of the file or, for compressed nodes, by
-//! [`potree2::Dataset::set_max_node_bytes`]. A decompressor that panics on corrupt bytes is caught, and the panic is an
-//! error ([`Fault::Decode`]); the panic hook of the process is left alone, so the default one prints a line. One that
-//! exhausts the stack ends the process: a damaged GPS time in LAZ may.
+//! [`potree2::Dataset::set_max_node_bytes`]. No bytes make it panic; a piece that cannot be decoded is an error
+//! ([`Fault::Decode`]).
 #![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a separate module
 
 mod dataset_kind;
@@ -62,7 +61,7 @@ pub mod potree2;
 pub mod scan;
 
 pub use dataset_kind::{DatasetKind, Located, locate};
-pub use error::{Advice, ErrorKind, Fault, ReadError};
+pub use error::{Advice, ErrorKind, Fault, ReadError, system_reason};
 pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};

@@ -16,9 +16,9 @@ use serde_json::Value;
 
 use crate::args::InfoArgs;
 use crate::datasets;
-use crate::exit::{Failure, emit, print_line};
+use crate::exit::{Failure, emit, print_line, to_json};
 use crate::inputs;
-use crate::scan_choice;
+use crate::{scan_choice, text_choice};
 
 /// Describes a dataset; each kind has a file here.
 fn describe_dataset(dataset: &Located) -> Result<Description, Failure> {
@@ -54,6 +54,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
             Err(failure) => out.fail(failure),
             Ok(found) => {
                 found.all_notes().for_each(|note| print_line(&note));
+                found.unread_failure("").into_iter().for_each(|failure| out.fail(failure));
                 for file in &found.files {
                     out.show(scan::describe(file, &options, args.deep))?;
                 }
@@ -66,13 +67,14 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
 
 /// Checks that the scans that were chosen are in one of all inputs.
 fn check_choice(paths: &[PathBuf], options: &OpenOptions) -> Result<(), Failure> {
-    if options.scans.is_none() {
+    if options.scans.is_none() && !text_choice::is_given(options) {
         return Ok(());
     }
     // what cannot be found is reported in its turn
     let expanded = paths.iter().filter_map(|path| inputs::expand(std::slice::from_ref(path), options).ok());
     let files: Vec<PathBuf> = expanded.flat_map(|found| found.files).collect();
-    scan_choice::check(&files, options)
+    scan_choice::check(&files, options)?;
+    if files.is_empty() { Ok(()) } else { text_choice::check(&files, options) }
 }
 
 /// The output so far: of very many scans nothing is kept.
@@ -88,7 +90,7 @@ impl Output {
         match description {
             Ok(Description { text, json, fault }) => {
                 if self.json {
-                    emit(&element(&json, self.objects == 0))?;
+                    emit(&element(&json, self.objects == 0)?)?;
                     self.objects += 1;
                 } else {
                     emit(&text)?;
@@ -119,9 +121,9 @@ impl Output {
 }
 
 /// The text of an element of an array that is written piece by piece.
-fn element(object: &Value, is_first: bool) -> String {
-    let lines = format!("{object:#}").replace('\n', "\n  "); // texts in JSON have no line breaks
-    format!("{}  {lines}", if is_first { "[\n" } else { ",\n" })
+fn element(object: &Value, is_first: bool) -> Result<String, Failure> {
+    let lines = to_json(object)?.trim_end().replace('\n', "\n  "); // texts in JSON have no line breaks
+    Ok(format!("{}  {lines}", if is_first { "[\n" } else { ",\n" }))
 }
 
 #[cfg(test)]
@@ -133,7 +135,7 @@ mod tests {
     #[test]
     fn an_array_written_piece_by_piece_is_that_of_the_library() {
         let objects = [json!({"a": [1, 2], "b": {"c": "x\ny"}}), json!({}), json!({"d": null})];
-        let pieces: String = objects.iter().enumerate().map(|(i, object)| element(object, i == 0)).collect();
-        assert_eq!(pieces + "\n]\n", format!("{:#}\n", Value::Array(objects.to_vec())));
+        let pieces: String = objects.iter().enumerate().map(|(i, object)| element(object, i == 0).unwrap()).collect();
+        assert_eq!(pieces + "\n]\n", to_json(&objects).unwrap());
     }
 }

@@ -2,8 +2,6 @@
 
 use pointmill_format::Column;
 
-use super::stats::Range;
-
 /// Least and greatest red, green and blue of 16 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ColourRange {
@@ -74,14 +72,9 @@ impl ColourRange {
         self.max.iter().any(|v| *v > 0)
     }
 
-    /// The same as numbers.
-    pub(crate) fn range(&self) -> Range {
-        let mut range = Range::new(3);
-        if !self.is_empty() {
-            range.min = self.min.map(f64::from).to_vec();
-            range.max = self.max.map(f64::from).to_vec();
-        }
-        range
+    /// Least and greatest values as numbers; `None` if there is no colour.
+    pub(crate) fn ends(&self) -> Option<[[f64; 3]; 2]> {
+        (!self.is_empty()).then(|| [self.min.map(f64::from), self.max.map(f64::from)])
     }
 }
 
@@ -98,12 +91,12 @@ mod tests {
         let (mut all, mut chosen) = (ColourRange::default(), ColourRange::default());
         all.include(&column, None);
         assert_eq!(all, ColourRange { min: [1000, 9, 1000], max: [1006, 1006, 60_000] });
-        assert!(!all.fits_eight_bits() && chosen.is_empty() && !chosen.is_lit() && chosen.range().is_empty());
+        assert!(!all.fits_eight_bits() && chosen.is_empty() && !chosen.is_lit() && chosen.ends().is_none());
         chosen.include(&column, Some(&[0, 50]));
         let Column::UInt16(values) = &column else { panic!() };
         let of = |e: usize| (values[e].min(values[150 + e]), values[e].max(values[150 + e]));
-        assert_eq!(chosen.range().min, [0, 1, 2].map(|e| f64::from(of(e).0)));
-        assert_eq!(chosen.range().max, [0, 1, 2].map(|e| f64::from(of(e).1)));
+        let ends = [[0, 1, 2].map(|e| f64::from(of(e).0)), [0, 1, 2].map(|e| f64::from(of(e).1))];
+        assert_eq!(chosen.ends(), Some(ends));
         let mut few = ColourRange::default();
         few.include(&Column::UInt16(vec![3, 200, 255]), None);
         assert!(few.fits_eight_bits() && few.is_lit());

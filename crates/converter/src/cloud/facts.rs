@@ -43,7 +43,10 @@ impl Facts {
             let mut narrow = vec![false; sources.all.len()];
             for (i, seen) in stats.sources.iter().enumerate().filter(|(_, s)| s.kept > 0) {
                 let source = &sources.all[i];
-                let mut range = seen.rgb.range();
+                let mut range = Range::new(3);
+                if let Some([min, max]) = seen.rgb.ends() {
+                    (range.min, range.max) = (min.to_vec(), max.to_vec());
+                }
                 if intake.of(source).has(Some(rgb)) && depths[i] {
                     if plan.rgb_depth == RgbDepth::Eight && !seen.rgb.fits_eight_bits() {
                         return Err(InputFault::DeepColours { path: source.path.to_path_buf() }.into());

@@ -6,6 +6,7 @@ pub(crate) mod disk;
 mod events;
 mod open_files;
 pub(crate) mod os_hints;
+mod pool;
 mod workers;
 
 pub(crate) use budget::{Budget, Least};
@@ -14,9 +15,11 @@ pub use disk::{Disk, DiskOperation, SystemDisk};
 pub(crate) use disk::{DiskFile, Sequential, TempFiles};
 pub use events::{Events, Phase, Silent};
 pub(crate) use open_files::most_open_files;
+pub(crate) use pool::{Consumer, Evict, Pool, Reservation};
 pub(crate) use workers::Workers;
 
 use std::ops::Deref;
+use std::sync::Arc;
 
 use crate::error::ConvertError;
 use crate::plan::Plan;
@@ -24,6 +27,8 @@ use crate::plan::Plan;
 /// Threads, memory, files and events of one run.
 pub(crate) struct Runtime<'a> {
     pub(crate) budget: Budget,
+    /// Memory that is shared out as it is needed.
+    pub(crate) memory: Arc<Pool>,
     pub(crate) temp: TempFiles,
     workers: Workers<'a>,
 }
@@ -36,7 +41,8 @@ impl<'a> Runtime<'a> {
         temp: TempFiles,
         events: &'a dyn Events,
     ) -> Result<Self, ConvertError> {
-        Ok(Self { budget, temp, workers: Workers::start(plan.threads, events)? })
+        let memory = Pool::new(budget.pool_bytes, plan.memory_bytes).with_records(plan.waiting_bytes);
+        Ok(Self { budget, memory: Arc::new(memory), temp, workers: Workers::start(plan.threads, events)? })
     }
 }
 

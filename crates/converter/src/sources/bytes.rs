@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Source, Sources};
+use super::source::Source;
+use super::union::Layout;
 use crate::error::{ConvertError, MemoryNeed};
 use crate::plan::Plan;
 
@@ -40,15 +41,13 @@ pub(super) fn least_bytes(paths: &[&Path]) -> u64 {
     paths.iter().map(|path| each + path_bytes(path.as_os_str().len())).sum()
 }
 
-impl Sources {
-    /// What they take until the end of the run, open scans aside: of these there are few.
-    pub(crate) fn bytes(&self) -> u64 {
-        let of_source = |s: &Source| path_bytes(s.path.as_os_str().len()) + size_of_val(&*s.origins) as u64;
-        let sources: u64 = self.all.iter().map(of_source).sum();
-        let each = (size_of::<Source>() + size_of::<PathBuf>()) as u64 + LATER_BYTES;
-        let placed: usize = self.layouts.iter().map(|layout| size_of_val(&*layout.columns)).sum();
-        sources + each * self.all.len() as u64 + placed as u64 + self.warnings.len() as u64 * WARNING_BYTES
-    }
+/// What inputs take until the end of the run, open scans aside: of these there are few.
+pub(super) fn of(sources: &[Source], layouts: &[Layout], warnings: usize) -> u64 {
+    let of_source = |s: &Source| path_bytes(s.path.as_os_str().len()) + size_of_val(&*s.origins) as u64;
+    let own: u64 = sources.iter().map(of_source).sum();
+    let each = (size_of::<Source>() + size_of::<PathBuf>()) as u64 + LATER_BYTES;
+    let placed: usize = layouts.iter().map(|layout| size_of_val(&*layout.columns)).sum();
+    own + each * sources.len() as u64 + placed as u64 + warnings as u64 * WARNING_BYTES
 }
 
 fn path_bytes(len: usize) -> u64 {

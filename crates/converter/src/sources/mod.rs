@@ -15,10 +15,11 @@ mod source;
 mod survey;
 mod union;
 
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use pointmill_format::{Aabb, Attribute, Scan};
+use pointmill_format::{Aabb, Attribute, Scan, Wanted};
 
 pub(crate) use crs::resolve_all as resolve_crs_of_all;
 pub use crs::{ResolvedCrs, resolve_crs};
@@ -45,6 +46,9 @@ use crate::warning::Warning;
 /// Inputs whose headers are looked at before what they have in common is put together.
 const AT_ONCE: usize = 1024;
 
+/// Scans that are asked what decoding takes; of others it is what decoding all columns takes.
+const MOST_ASKED: usize = 16;
+
 /// Threads that read headers: more only wait for the disk.
 const MOST_THREADS: usize = 32;
 
@@ -61,6 +65,8 @@ pub(crate) struct Sources {
     /// Points declared by headers but not there.
     pub(crate) points_missing: u64,
     pub(crate) warnings: Vec<Warning>,
+    /// What all inputs take of the memory until the end of the run, bytes; open scans aside: of these there are few.
+    pub(crate) bytes: u64,
     open: OpenScans,
 }
 
@@ -109,7 +115,8 @@ impl Found {
         let divisors = Divisors::of(&all, &open)?;
         settle_fineness(&mut all, &divisors);
         let (attributes, layouts) = (union.schema, union.layouts);
-        Ok(Sources { all, attributes, layouts, points_declared, points_missing, warnings, open })
+        let bytes = bytes::of(&all, &layouts, warnings.len());
+        Ok(Sources { bytes, all, attributes, layouts, points_declared, points_missing, warnings, open })
     }
 }
 
@@ -131,6 +138,10 @@ impl Sources {
         if !plan.other_files.is_empty() {
             found.warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
         }
+        found.warnings.extend(plan.skipped_inputs.iter().map(|(path, why)| Warning::InputSkipped {
+            path: path.clone(),
+            error: format!("{}: {why}", path.display()),
+        }));
         for (round, some) in paths.chunks(AT_ONCE).enumerate() {
             for outcome in probe.some(round * AT_ONCE, some, &workers)? {
                 found.add(outcome, &open)?;
@@ -138,7 +149,7 @@ impl Sources {
         }
         drop(probe);
         let sources = found.combine(open)?;
-        bytes::check(plan, sources.bytes())?;
+        bytes::check(plan, sources.bytes)?;
         sources.warnings.iter().for_each(|w| events.warning(w));
         Ok(sources)
     }
@@ -149,6 +160,27 @@ impl Sources {
     /// The file cannot be opened again, or was changed since its header was read.
     pub(crate) fn scan(&self, source: usize) -> Result<Arc<dyn Scan>, ConvertError> {
         self.open.get(source, &self.all[source])
+    }
+
+    /// The most that decoding takes on one thread, bytes. `wanted`: the columns that are read of a source.
+    ///
+    /// # Errors
+    /// As [`Self::scan`].
+    pub(crate) fn decode_bytes<'w>(&self, wanted: impl Fn(&Source) -> &'w Wanted) -> Result<u64, ConvertError> {
+        // scans that take the same for the same columns are alike: one of each is asked, those that take most first
+        let mut kinds: Vec<(u64, u32, usize)> =
+            self.all.iter().enumerate().map(|(i, s)| (s.decode_bytes, s.layout, i)).collect();
+        kinds.sort_unstable_by_key(|(bytes, layout, i)| (Reverse(*bytes), *layout, *i));
+        kinds.dedup_by_key(|(bytes, layout, _)| (*bytes, *layout));
+        let mut most = 0;
+        for (asked, (bytes, _, i)) in kinds.into_iter().enumerate() {
+            if bytes <= most {
+                break;
+            }
+            let own = if asked < MOST_ASKED { self.scan(i)?.decode_bytes(wanted(&self.all[i])) } else { bytes };
+            most = own.max(most);
+        }
+        Ok(most)
     }
 
     /// The number of pieces of all scans.
@@ -182,7 +214,7 @@ impl Sources {
         let open = OpenScans::new(Opener::new(&Plan::new(Vec::new(), "out".into()), 1), 1);
         let attributes = Schema::new(Vec::new());
         let (layouts, warnings) = (Vec::new(), Vec::new());
-        Self { all, attributes, layouts, points_declared: 0, points_missing: 0, warnings, open }
+        Self { all, attributes, layouts, points_declared: 0, points_missing: 0, warnings, bytes: 0, open }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use pointmill_format::{Advice, Attribute, ErrorKind, ReadError, Scan};
+use pointmill_format::{Advice, Attribute, ErrorKind, ReadError, Scan, Wanted};
 
 use super::open_scans::OpenScans;
 use super::same;
@@ -102,6 +102,7 @@ impl Probe<'_> {
             origins: info.parts.iter().map(|part| part.translation).collect(),
             rgb_is_16_bit: info.rgb_is_16_bit,
             file_bytes: info.file_bytes,
+            decode_bytes: scan.decode_bytes(&Wanted::all(info)),
             pieces: pieces.map_err(|_| ReadError::unsupported(path, "more than 4,294,967,295 pieces"))?,
             first_unit: 0,
             mark,

@@ -29,6 +29,8 @@ pub(crate) struct Source {
     /// Colours have 16 bits because the file says so.
     pub(crate) rgb_is_16_bit: bool,
     pub(crate) file_bytes: u64,
+    /// The most that decoding a piece takes, all columns.
+    pub(super) decode_bytes: u64,
     /// Parts that decode alone.
     pub(crate) pieces: u32,
     /// Number of its first piece among those of all scans.
@@ -90,6 +92,7 @@ impl Source {
             origins: Box::default(),
             rgb_is_16_bit: false,
             file_bytes: 0,
+            decode_bytes: 0,
             pieces: 0,
             first_unit: 0,
             mark: 0,
