@@ -45,6 +45,11 @@
 //! found in a file are never trusted; an allocation is bounded by the size of the file or, for compressed nodes, by
 //! [`potree2::Dataset::set_max_node_bytes`]. No bytes make it panic; a piece that cannot be decoded is an error
 //! ([`Fault::Decode`]).
+
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
 #![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a separate module
 
 mod dataset_kind;
