@@ -67,7 +67,7 @@ impl Progress {
         }
     }
 
-    /// A phase begins; `total` counts points, 0 is unknown.
+    /// A phase begins; `total` counts points (scans where headers are read), 0 is unknown.
     pub(crate) fn begin(&self, phase: &'static str, total: u64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.phase != "start" {
@@ -79,7 +79,7 @@ impl Progress {
         self.write_json(&mut state);
         if let Face::Bar(bar) = &self.face {
             bar.reset();
-            bar.set_style(style(total));
+            bar.set_style(style(phase, total));
             bar.set_message(phase);
             bar.set_length(total);
             bar.enable_steady_tick(Duration::from_millis(200));
@@ -166,7 +166,7 @@ impl Progress {
             "phase": state.phase,
             "done": done,
             "total": (state.total > 0).then_some(state.total),
-            "points_per_second": per_second.round(),
+            "points_per_second": (unit(state.phase) == "points").then(|| per_second.round()),
             "eta_seconds": left.map(|s| (s * 10.0).round() / 10.0),
         }));
     }
@@ -209,17 +209,24 @@ fn write_line(object: &serde_json::Value) {
     let _ = writeln!(io::stderr().lock(), "{}", json_escaped(&object.to_string()));
 }
 
-fn style(total: u64) -> ProgressStyle {
+/// What is counted in a phase.
+fn unit(phase: &str) -> &'static str {
+    if phase == Phase::Probe.name() { "scans" } else { "points" }
+}
+
+fn style(phase: &str, total: u64) -> ProgressStyle {
+    let unit = unit(phase);
     let template = match total {
         0 => "{msg:8} {spinner} {elapsed}",
+        _ if phase == Phase::Probe.name() => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {left}",
         _ => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {speed}  {left}",
     };
     let per_second = |state: &ProgressState| state.pos() as f64 / state.elapsed().as_secs_f64().max(1e-3);
     ProgressStyle::with_template(template)
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("=> ")
-        .with_key("points", |state: &ProgressState, w: &mut dyn std::fmt::Write| {
-            let _ = write!(w, "{} of {} points", count(state.pos()), count(state.len().unwrap_or(0)));
+        .with_key("points", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
+            let _ = write!(w, "{} of {} {unit}", count(state.pos()), count(state.len().unwrap_or(0)));
         })
         .with_key("speed", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
             let _ = write!(w, "{}", rate(per_second(state)));

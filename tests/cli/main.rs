@@ -13,6 +13,7 @@ mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod many;
 mod memory;
 mod mistakes;
 mod mounted;

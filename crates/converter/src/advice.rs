@@ -39,6 +39,8 @@ pub enum Advice {
     SkipInvalid,
     /// Skip points exactly at the origin of their scan.
     SkipOriginPoints,
+    /// Convert again once nothing writes to the inputs.
+    StopWriting,
     /// Use the colour depth that was detected.
     DetectRgbDepth,
     /// State the colour depth.
@@ -87,6 +89,7 @@ impl fmt::Display for Advice {
             Self::CutBounds { bounds: None } => "limit the bounds to leave them out, or correct the input",
             Self::SkipInvalid => "skip invalid points to leave such points out",
             Self::SkipOriginPoints => "skip points at the origin of their scan to leave them out",
+            Self::StopWriting => "convert again once nothing writes to the inputs",
             Self::DetectRgbDepth => "let the colour depth be detected",
             Self::SetRgbDepth => "state the colour depth to override this",
             Self::CommasSeparate => "say so if they separate columns",

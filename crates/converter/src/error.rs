@@ -136,6 +136,11 @@ pub enum InputFault {
         /// Index of the point in the scan.
         point: u64,
     },
+    /// A file was changed between the read of its header and that of its points.
+    Changed {
+        /// The scan.
+        path: PathBuf,
+    },
     /// Colours declared as 8 bits deep have values above 255.
     DeepColours {
         /// The scan.
@@ -331,6 +336,7 @@ impl InputFault {
             Self::FarPoints { .. } => Some(Advice::CutBounds { bounds: None }),
             Self::CostlyOutliers { others, .. } => Some(Advice::CutOutliers { bounds: *others }),
             Self::InvalidPosition { .. } => Some(Advice::SkipInvalid),
+            Self::Changed { .. } => Some(Advice::StopWriting),
             Self::DeepColours { .. } => Some(Advice::DetectRgbDepth),
             Self::NoneReadable | Self::NothingLeft { .. } => None,
         }
@@ -363,6 +369,9 @@ impl fmt::Display for InputFault {
             }
             Self::InvalidPosition { path, point } => {
                 write!(f, "{}: point {point} has no finite position", path.display())
+            }
+            Self::Changed { path } => {
+                write!(f, "{}: the file was changed while it was being read", path.display())
             }
             Self::DeepColours { path } => {
                 write!(f, "{}: has colour values above 255, so they cannot be 8 bits deep", path.display())

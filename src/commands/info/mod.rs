@@ -41,7 +41,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     args.reading.placing.refuse_idle_crs()?;
     let options = args.reading.options()?;
     check_choice(&args.paths, &options)?;
-    let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };
+    let mut out = Output { json: args.json, objects: 0, first_failure: None };
     for path in &args.paths {
         let datasets = datasets(path);
         for dataset in &datasets {
@@ -61,9 +61,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
             }
         }
     }
-    if args.json {
-        emit(&to_json(&Value::Array(out.objects))?)?;
-    }
+    out.end()?;
     out.first_failure.map_or(Ok(()), Err)
 }
 
@@ -79,10 +77,11 @@ fn check_choice(paths: &[PathBuf], options: &OpenOptions) -> Result<(), Failure>
     if files.is_empty() { Ok(()) } else { text_choice::check(&files, options) }
 }
 
-/// The output so far.
+/// The output so far: of very many scans nothing is kept.
 struct Output {
     json: bool,
-    objects: Vec<Value>,
+    /// Objects of the array that were written.
+    objects: usize,
     first_failure: Option<Failure>,
 }
 
@@ -91,7 +90,8 @@ impl Output {
         match description {
             Ok(Description { text, json, fault }) => {
                 if self.json {
-                    self.objects.push(json);
+                    emit(&element(&json, self.objects == 0)?)?;
+                    self.objects += 1;
                 } else {
                     emit(&text)?;
                 }
@@ -102,11 +102,40 @@ impl Output {
         Ok(())
     }
 
+    /// Closes the array.
+    fn end(&self) -> Result<(), Failure> {
+        match (self.json, self.objects) {
+            (false, _) => Ok(()),
+            (true, 0) => emit("[]\n"),
+            (true, _) => emit("\n]\n"),
+        }
+    }
+
     /// Reports failures as they occur, except the first, which `main` reports and which gives the exit code.
     fn fail(&mut self, failure: Failure) {
         match self.first_failure {
             None => self.first_failure = Some(failure),
             Some(_) => failure.print(),
         }
+    }
+}
+
+/// The text of an element of an array that is written piece by piece.
+fn element(object: &Value, is_first: bool) -> Result<String, Failure> {
+    let lines = to_json(object)?.trim_end().replace('\n', "\n  "); // texts in JSON have no line breaks
+    Ok(format!("{}  {lines}", if is_first { "[\n" } else { ",\n" }))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn an_array_written_piece_by_piece_is_that_of_the_library() {
+        let objects = [json!({"a": [1, 2], "b": {"c": "x\ny"}}), json!({}), json!({"d": null})];
+        let pieces: String = objects.iter().enumerate().map(|(i, object)| element(object, i == 0).unwrap()).collect();
+        assert_eq!(pieces + "\n]\n", to_json(&objects).unwrap());
     }
 }

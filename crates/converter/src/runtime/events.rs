@@ -7,7 +7,7 @@ use crate::warning::Warning;
 /// The phases of a run, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// Headers of all inputs.
+    /// Headers of all inputs; the unit is inputs.
     Probe,
     /// Decoding every point once; the unit is points.
     Read,
@@ -34,10 +34,10 @@ impl Phase {
 
 /// Receives what happens; called from worker threads, so implementations are quick and thread-safe.
 pub trait Events: Sync {
-    /// A phase begins; `total` is its size in points (0: unknown).
+    /// A phase begins; `total` is its size in its unit (0: unknown).
     fn phase(&self, _phase: Phase, _total: u64) {}
-    /// `points` more are done in the current phase.
-    fn advance(&self, _points: u64) {}
+    /// `steps` more, in the unit of the current phase, are done.
+    fn advance(&self, _steps: u64) {}
     /// Something the user should know.
     fn warning(&self, _warning: &Warning) {}
     /// All that the run has made so far is in this folder, but for temporary files without a name. It is removed if the

@@ -1,11 +1,17 @@
 //! A dataset on its way into the output.
 
+use std::io::{self, BufWriter, Write as _};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use crate::error::ConvertError;
 use crate::runtime::disk::{sync_file_system, sync_folder, sync_path};
-use crate::runtime::{Disk, DiskFile};
+use crate::runtime::{Disk, DiskFile, Sequential};
+
+/// Bytes of JSON that are written at once.
+const JSON_BUFFER: usize = 64 << 10;
 
 /// A dataset on its way into a [`super::StagedFolder`].
 pub(crate) struct StagedDataset {
@@ -37,6 +43,16 @@ impl StagedDataset {
         let file = self.create(name)?;
         file.write_at(bytes, 0, "writing the file")?;
         file.sync("writing the file")
+    }
+
+    /// Writes and syncs an object, however large, as indented JSON.
+    pub(super) fn write_json(&self, name: &str, object: &impl Serialize) -> Result<(), ConvertError> {
+        let doing = "writing the file";
+        let file = self.create(name)?;
+        let mut writer = BufWriter::with_capacity(JSON_BUFFER, Sequential::new(&file));
+        let written = serde_json::to_writer_pretty(&mut writer, object).map_err(io::Error::from);
+        written.and_then(|()| writer.flush()).map_err(|e| file.failed(doing, e))?;
+        file.sync(doing)
     }
 
     /// Syncs everything that the file system of the dataset has; false where the system cannot.

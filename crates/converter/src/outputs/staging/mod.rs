@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill_format::DatasetKind;
+use serde::Serialize;
 
 use crate::error::ConvertError;
 use crate::runtime::disk::{create_folder, sync_folder};
@@ -81,8 +82,8 @@ impl StagedFolder {
     }
 
     /// Writes and syncs the report beside the datasets, or in the one that there is.
-    pub(crate) fn write_report(&self, text: &str) -> Result<(), ConvertError> {
-        self.whole().write(REPORT_FILE, text.as_bytes())
+    pub(crate) fn write_report(&self, report: &impl Serialize) -> Result<(), ConvertError> {
+        self.whole().write_json(REPORT_FILE, report)
     }
 
     fn whole(&self) -> StagedDataset {
