@@ -46,8 +46,8 @@ impl Failure {
         }
     }
 
-    /// Prints the line on standard error.
-    pub(crate) fn print(&self) {
+    /// The line that reports it.
+    pub(crate) fn line(&self) -> &str {
         let (Self::Internal(line)
         | Self::Usage(line)
         | Self::Input(line)
@@ -56,7 +56,12 @@ impl Failure {
         | Self::Memory(line)
         | Self::Faults(line)
         | Self::Interrupted(line)) = self;
-        print_line(line);
+        line
+    }
+
+    /// Prints the line on standard error.
+    pub(crate) fn print(&self) {
+        print_line(self.line());
     }
 
     /// The operating system refused; `doing` names the attempt ("writing the report").

@@ -16,6 +16,7 @@ pub(crate) use convert::{
     OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use values::Attributes;
+use values::parse_bytes;
 
 /// Converts laser scans to datasets that renderers stream, without losing a point.
 #[derive(Debug, Parser)]
@@ -53,6 +54,9 @@ pub(crate) struct ValidateArgs {
     /// Skips spacing, coverage and quality figures, which take most of the time
     #[arg(long)]
     pub(crate) fast: bool,
+    /// Memory limit of the whole process, for example 2GiB [default: 60 % of the available memory]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    pub(crate) memory: Option<u64>,
     /// Number of worker threads [default: all cores]
     #[arg(long, value_name = "N")]
     pub(crate) threads: Option<NonZero<u16>>,

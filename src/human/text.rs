@@ -66,6 +66,6 @@ impl Table {
 }
 
 /// Replaces control characters from a file (a CRS, an attribute name), so that they never reach the terminal.
-pub(super) fn printable(text: &str) -> String {
+pub(crate) fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -24,3 +24,4 @@ mod several;
 mod support;
 mod text_inputs;
 mod units;
+mod validating;

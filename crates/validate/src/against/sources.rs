@@ -1,13 +1,13 @@
 //! The scans a dataset was made from, read as blocks of records in the dataset's terms.
 
 use std::ops::{ControlFlow, Range};
-use std::path::PathBuf;
-use std::sync::Mutex;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 
 use pointmill_format::{
     Attribute, AttributeType, AxisGrid, Column, OpenOptions, PointBatch, Positions, ReadError, Scan, Scratch, Wanted,
-    open_scan, with_column,
+    with_column,
 };
 use rayon::prelude::*;
 
@@ -18,16 +18,30 @@ use super::meaning::{Feed, Meaning, feed};
 use super::rules::Conversion::{self, AsStored, Grey, WholeClass};
 use super::rules::{Rules, grey};
 use super::selection::Selection;
+use super::shelf::{Gathered, Look, Shelf};
 use crate::options::{Progress, ProgressFn};
 
 /// A position moved by this part of a step of its scan is neither's: its integer does not come back.
 const HALF: f64 = 0.499_999;
 
-/// A scan, and where its columns go.
+/// What is kept of every scan, however many there are; they are open only while they are read.
 pub(crate) struct Source {
+    path: PathBuf,
+    /// Parts that are decoded alone.
+    pieces: usize,
+    /// The file says that its colours have 16 bits.
+    pub(crate) declares_16_bit_colour: bool,
+}
+
+impl Source {
+    pub(super) fn new(path: &Path, pieces: usize, declares_16_bit_colour: bool) -> Self {
+        Self { path: path.to_path_buf(), pieces, declares_16_bit_colour }
+    }
+}
+
+/// A scan that is open, and where its columns go.
+pub(super) struct Opened {
     scan: Box<dyn Scan>,
-    /// Positions that the lattice makes equal are told apart: some scan has positions that may move.
-    is_marked: bool,
     /// From its integers to the dataset's lattice, by axis.
     exact: [Option<Exact>; 3],
     /// For each attribute of the dataset: what fills it.
@@ -35,59 +49,73 @@ pub(crate) struct Source {
     /// The column that the filter by class looks at.
     classification: Option<usize>,
     selection: Selection,
-    /// Columns that must have one value, by the metadata: column, what its values mean, value.
-    constants: Vec<(usize, Meaning, Vec<f64>)>,
-    /// Points whose value differs from the constant, by entry of `constants`.
-    deviating: Vec<AtomicU64>,
+    /// Columns that must have one value, by the metadata: column, what its values mean, value, and its place among the
+    /// constants of the rules.
+    constants: Vec<(usize, Meaning, Vec<f64>, usize)>,
 }
 
 /// All scans.
 pub(crate) struct Sources {
     pub(crate) list: Vec<Source>,
     /// (source, piece), all of them.
-    pieces: Vec<(usize, usize)>,
+    pieces: Vec<(u32, u32)>,
     pub(crate) points: u64,
+    shelf: Shelf,
+    /// By attribute of the dataset: doubles that stand for integers beyond 2⁵³ may be rounded.
+    rounds: Vec<bool>,
+    /// Positions that the lattice makes equal are told apart: some scan has positions that may move.
+    is_marked: bool,
+    /// Names of columns that the dataset does not have, sorted.
+    not_in_dataset: Vec<String>,
+    /// Points that differ from what is said to be one value throughout, by entry of the rules' constants; of the last pass.
+    deviating: Vec<AtomicU64>,
+    /// Bytes of the largest piece in its file.
+    piece_bytes: u64,
 }
 
 impl Sources {
-    /// Opens the files; decodes nothing.
+    /// Looks at the files, in parallel; decodes nothing, and leaves few of them open.
     pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions, rules: &Rules) -> Result<Self, ReadError> {
-        let open = |p: &PathBuf| Ok(Source::new(open_scan(p, options)?, rules));
-        let mut list = paths.iter().map(open).collect::<Result<Vec<_>, _>>()?;
-        allow_doubles(&mut list, rules);
-        if list.iter().any(Source::may_move) {
-            list.iter_mut().for_each(|s| s.is_marked = true);
-        }
-        let pieces = list.iter().enumerate();
-        let pieces = pieces.flat_map(|(i, s)| (0..s.scan.pieces().len()).map(move |piece| (i, piece))).collect();
-        let points = list.iter().flat_map(|s| s.scan.pieces()).map(|p| p.points).sum();
-        Ok(Self { list, pieces, points })
+        let shelf = Shelf::new(options);
+        let looks: Vec<Result<Look, ReadError>> = paths
+            .par_iter()
+            .enumerate()
+            .map(|(at, path)| shelf.get(at, path, rules).map(|open| open.look(rules)))
+            .collect();
+        let all = Gathered::of(paths, looks, rules)?;
+        let rounds = |(types, a): (Vec<AttributeType>, &Attribute)| {
+            a.ty == AttributeType::Float64 && (rules.has_no_wide_integers || types.len() > 1)
+        };
+        Ok(Self {
+            list: all.list,
+            pieces: all.pieces,
+            points: all.points,
+            shelf,
+            rounds: all.types.into_iter().zip(&rules.attributes).map(rounds).collect(),
+            is_marked: all.may_move,
+            not_in_dataset: all.names.into_iter().collect(),
+            deviating: rules.constants.iter().map(|_| AtomicU64::new(0)).collect(),
+            piece_bytes: all.piece_bytes,
+        })
     }
 
     /// Names of columns of the scans that the dataset does not have, sorted.
-    pub(crate) fn not_in_dataset(&self, rules: &Rules) -> Vec<String> {
-        let names = self.list.iter().flat_map(|s| s.scan.info().attributes.iter()).map(|a| &a.name);
-        let mut names: Vec<String> =
-            names.filter(|name| rules.attributes.iter().all(|a| a.name != **name)).cloned().collect();
-        names.sort_unstable();
-        names.dedup();
-        names
+    pub(crate) fn not_in_dataset(&self) -> Vec<String> {
+        self.not_in_dataset.clone()
+    }
+
+    /// What a thread takes to decode a piece and to hold a block of it, about, bytes.
+    pub(crate) fn thread_bytes(&self) -> u64 {
+        const READER: u64 = 8 << 20;
+        const STREAMED: u64 = 16 << 20;
+        READER + self.piece_bytes.min(STREAMED)
     }
 
     /// Attributes that were dropped as constant but are not: name, points that differ.
-    pub(crate) fn deviating(&self) -> Vec<(String, u64)> {
-        let mut all: Vec<(String, u64)> = Vec::new();
-        for source in &self.list {
-            for ((column, ..), count) in source.constants.iter().zip(&source.deviating) {
-                let name = &source.scan.info().attributes[*column].name;
-                match all.iter_mut().find(|(n, _)| n == name) {
-                    Some((_, sum)) => *sum += count.load(Relaxed),
-                    None => all.push((name.clone(), count.load(Relaxed))),
-                }
-            }
-        }
-        all.retain(|(_, count)| *count > 0);
-        all
+    pub(crate) fn deviating(&self, rules: &Rules) -> Vec<(String, u64)> {
+        let counts = rules.constants.iter().zip(&self.deviating);
+        let counts = counts.map(|((name, _), count)| (name.clone(), count.load(Relaxed)));
+        counts.filter(|(_, count)| *count > 0).collect()
     }
 
     /// Decodes everything in parallel and hands it over in blocks, with the index of the source and whether the block
@@ -102,18 +130,20 @@ impl Sources {
         let idle: Mutex<Vec<(Scratch, Block)>> = Mutex::default();
         let done = AtomicU64::new(0);
         let failed = AtomicBool::new(false);
+        self.deviating.iter().for_each(|count| count.store(0, Relaxed));
         self.pieces.par_iter().with_max_len(1).try_for_each(|&(at, piece)| {
             if failed.load(Relaxed) {
                 return Ok(()); // another piece brings the error
             }
-            let source = &self.list[at];
+            let (at, piece) = (at as usize, piece as usize);
+            let source = self.open_again(at, piece, rules)?;
             let pop = idle.lock().map_or(None, |mut idle| idle.pop());
             let (mut scratch, mut block) = pop.unwrap_or_default();
             let wanted = source.wanted();
             let result = source.scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
                 for start in (0..batch.len()).step_by(BLOCK_POINTS) {
                     let points = (batch.len() - start).min(BLOCK_POINTS);
-                    source.fill(batch, start, points, rules, &mut block);
+                    source.fill(batch, start, points, (self, rules), &mut block);
                     work(&mut block, at);
                 }
                 let batch_points = batch.len() as u64;
@@ -132,13 +162,19 @@ impl Sources {
     }
 }
 
-impl Source {
-    /// True if the file says that its colours have 16 bits.
-    pub(crate) fn declares_16_bit_colour(&self) -> bool {
-        self.scan.info().rgb_is_16_bit
+impl Sources {
+    fn open_again(&self, at: usize, piece: usize, rules: &Rules) -> Result<Arc<Opened>, ReadError> {
+        let path = &self.list[at].path;
+        let source = self.shelf.get(at, path, rules)?;
+        match source.scan.pieces().len() == self.list[at].pieces && piece < self.list[at].pieces {
+            true => Ok(source),
+            false => Err(ReadError::broken(path, None, "has changed since it was opened first")),
+        }
     }
+}
 
-    fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
+impl Opened {
+    pub(super) fn new(scan: Box<dyn Scan>, rules: &Rules) -> Self {
         let info = scan.info();
         let find = |name: &str| info.attributes.iter().position(|a| a.name == name);
         let attributes = rules.attributes.iter().zip(&rules.conversions);
@@ -147,18 +183,33 @@ impl Source {
         };
         let columns = attributes.map(feed).collect();
         let classification = rules.classes.is_some().then(|| find("classification")).flatten();
-        let constant = |(name, value): &(String, Vec<f64>)| {
+        let constant = |(i, (name, value)): (usize, &(String, Vec<f64>))| {
             let column = find(name)?;
-            Some((column, Meaning::of(&info.attributes[column]), value.clone()))
+            Some((column, Meaning::of(&info.attributes[column]), value.clone(), i))
         };
-        let constants: Vec<_> = rules.constants.iter().filter_map(constant).collect();
-        let deviating = constants.iter().map(|_| AtomicU64::new(0)).collect();
+        let constants = rules.constants.iter().enumerate().filter_map(constant).collect();
         let exact = std::array::from_fn(|a| {
             let own = info.lattice.map(|l| AxisGrid { step: l.scale[a], offset: l.offset[a] });
             own.and_then(|own| Exact::new(own, rules.job_grid(a)))
         });
         let selection = Selection::new(info, rules);
-        Self { is_marked: false, exact, columns, classification, selection, constants, deviating, scan }
+        Self { exact, columns, classification, selection, constants, scan }
+    }
+
+    fn look(&self, rules: &Rules) -> Look {
+        let info = self.scan.info();
+        let feeds = self.columns.iter().map(|feed| Some(info.attributes[feed.as_ref()?.column].ty));
+        let is_absent = |name: &&String| rules.attributes.iter().all(|a| a.name != **name);
+        let pieces = self.scan.pieces();
+        Look {
+            pieces: pieces.len(),
+            points: pieces.iter().map(|p| p.points).sum(),
+            piece_bytes: pieces.iter().map(|p| p.byte_len).max().unwrap_or(0),
+            may_move: !self.exact.iter().all(|e| e.is_some_and(|e| e.is_whole())),
+            declares_16_bit_colour: info.rgb_is_16_bit,
+            types: feeds.collect(),
+            not_in_dataset: info.attributes.iter().map(|a| &a.name).filter(is_absent).cloned().collect(),
+        }
     }
 
     fn wanted(&self) -> Wanted {
@@ -172,7 +223,14 @@ impl Source {
 
     /// Brings points of a batch into the dataset's terms.
     #[allow(clippy::unnecessary_cast)] // one body for every type of column
-    fn fill(&self, batch: &PointBatch, start: usize, points: usize, rules: &Rules, block: &mut Block) {
+    fn fill(
+        &self,
+        batch: &PointBatch,
+        start: usize,
+        points: usize,
+        (all, rules): (&Sources, &Rules),
+        block: &mut Block,
+    ) {
         block.reset(rules.attributes.len());
         block.keep.resize(points, true);
         block.moved.lost.resize(points, false);
@@ -183,7 +241,7 @@ impl Source {
         if rules.drop_duplicates {
             block.residues.extend(self.residues(batch, start, points, rules, &block.positions));
         }
-        if self.is_marked {
+        if all.is_marked {
             block.moved.marks.extend(self.residues(batch, start, points, rules, &block.positions));
         }
         self.selection.apply(batch, start, &mut block.keep);
@@ -202,7 +260,7 @@ impl Source {
                 let class = Attribute::new("classification", AttributeType::Float64, 1);
                 append_words(feed.map(|f| (&batch.columns[f.column], f.elements)), start, points, &class, words);
             } else {
-                append_feed(feed, batch, start..start + points, attribute, words);
+                append_feed(feed, batch, start..start + points, (attribute, all.rounds[i]), words);
             }
             match rules.conversions[i] {
                 AsStored => {}
@@ -224,10 +282,10 @@ impl Source {
                 *keep &= classes.iter().any(|c| *c as f64 == class);
             }
         }
-        for ((column, meaning, value), deviating) in self.constants.iter().zip(&self.deviating) {
+        for (column, meaning, value, constant) in &self.constants {
             let is_rgb = self.scan.info().attributes[*column].name == "rgb";
             let count = count_deviating(&batch.columns[*column], start, (meaning, value), &block.keep, is_rgb);
-            deviating.fetch_add(count, Relaxed);
+            all.deviating[*constant].fetch_add(count, Relaxed);
         }
     }
 
@@ -253,11 +311,6 @@ impl Source {
             }
             residue.word()
         })
-    }
-
-    /// True if its positions may move to the lattice of the job.
-    pub(crate) fn may_move(&self) -> bool {
-        !self.exact.iter().all(|e| e.is_some_and(|e| e.is_whole()))
     }
 
     fn fill_axis(
@@ -305,12 +358,13 @@ impl Source {
     }
 }
 
-/// The words of some points of a batch, as `attribute` has them.
+/// The words of some points of a batch, as `attribute` has them. `rounds`: integers that a double does not hold may be
+/// rounded.
 fn append_feed(
     feed: Option<&Feed>,
     batch: &PointBatch,
     points: Range<usize>,
-    attribute: &Attribute,
+    (attribute, rounds): (&Attribute, bool),
     out: &mut Vec<u64>,
 ) {
     let (start, count) = (points.start, points.len());
@@ -319,25 +373,12 @@ fn append_feed(
             let meant = meaning.values(&batch.columns[*column], start, count);
             append_words(Some((&meant, *elements)), 0, count, attribute, out);
         }
-        Some(Feed { column, exact: true, .. }) => {
+        Some(Feed { column, exact: true, .. }) if !rounds => {
             append_exact_words(&batch.columns[*column], start, count, attribute, out);
         }
         other => {
             let column = other.map(|f| (&batch.columns[f.column], f.elements));
             append_words(column, start, count, attribute, out);
-        }
-    }
-}
-
-/// Doubles may round 64-bit integers where the format has no such integers, or where scans have the quantity in types
-/// that only a double holds both of.
-fn allow_doubles(list: &mut [Source], rules: &Rules) {
-    for (i, _) in rules.attributes.iter().enumerate().filter(|(_, a)| a.ty == AttributeType::Float64) {
-        let type_of = |s: &Source| Some(s.scan.info().attributes[s.columns[i].as_ref()?.column].ty);
-        let mut types: Vec<AttributeType> = list.iter().filter_map(type_of).collect();
-        types.dedup();
-        if rules.has_no_wide_integers || types.len() > 1 {
-            list.iter_mut().filter_map(|s| s.columns[i].as_mut()).for_each(|feed| feed.exact = false);
         }
     }
 }

@@ -21,6 +21,8 @@ pub(super) enum Fault {
     Broken(u64, String),
     /// The byte at which it is something that this version does not read, and what.
     Unsupported(u64, String),
+    /// The byte at which what is read does not fit memory any more.
+    Memory(u64),
     /// The source could not be read.
     Io(io::Error),
 }
@@ -31,6 +33,7 @@ impl Fault {
         match self {
             Self::Broken(_, what) => Self::Broken(at, what),
             Self::Unsupported(_, what) => Self::Unsupported(at, what),
+            Self::Memory(_) => Self::Memory(at),
             Self::Io(e) => Self::Io(e),
         }
     }
