@@ -67,9 +67,10 @@ pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Lattice, Nod
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Batches, Blob, Counted, Crs, Decimal, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_POINTS,
-    OpenOptions, OtherKind, Piece, PointMap, Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanMap, ScanMaps,
-    ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, scans_named, supported_scans,
+    Batches, Blob, Counted, Crs, Decimal, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_BYTES,
+    MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, PointMap, Resolution, Scan, ScanImage, ScanInfo, ScanKind,
+    ScanMap, ScanMaps, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, scans_named,
+    supported_scans,
 };
 pub use write_error::WriteError;
 

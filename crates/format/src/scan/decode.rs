@@ -8,6 +8,24 @@ use crate::{PointBatch, ReadError};
 /// No batch handed to a sink is larger than this.
 pub const MAX_BATCH_POINTS: usize = 65_536;
 
+/// The positions and columns of a batch take no more bytes than this together, unless a single point does: wide points
+/// come in smaller batches.
+pub const MAX_BATCH_BYTES: usize = 4 << 20;
+
+/// Points of a full batch, where each takes `point_bytes` (> 0) bytes.
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+pub(super) fn batch_points(point_bytes: usize) -> usize {
+    MAX_BATCH_BYTES.checked_div(point_bytes).unwrap_or(MAX_BATCH_POINTS).clamp(1, MAX_BATCH_POINTS)
+}
+
+/// Bytes that a point takes in a batch: its position and all attributes, whether they are wanted or not, so that
+/// batches are the same whatever is wanted.
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+pub(super) fn point_bytes(attributes: &[crate::Attribute], is_quantized: bool) -> usize {
+    let axis = if is_quantized { size_of::<i32>() } else { size_of::<f64>() };
+    attributes.iter().fold(3 * axis, |sum, attribute| sum.saturating_add(attribute.size()))
+}
+
 /// Takes the batches of a decode, one after the other; [`ControlFlow::Break`] ends the decode early.
 pub type Sink<'a> = dyn FnMut(&PointBatch) -> ControlFlow<()> + 'a;
 
@@ -79,7 +97,8 @@ pub trait Scan: Send + Sync {
     /// The parts, in file order; their points are consecutive from 0.
     fn pieces(&self) -> &[Piece];
 
-    /// Decodes one piece and hands its points to `sink`, in file order, in batches of at most [`MAX_BATCH_POINTS`].
+    /// Decodes one piece and hands its points to `sink`, in file order, in batches of at most [`MAX_BATCH_POINTS`]
+    /// points and [`MAX_BATCH_BYTES`] bytes.
     ///
     /// A sink that breaks ends the decode early, without an error.
     ///

@@ -41,7 +41,7 @@ pub mod text;
 pub use batches::Batches;
 pub use chosen::scans_named;
 pub use decimal::Decimal;
-pub use decode::{MAX_BATCH_POINTS, Scan, Scratch, Sink};
+pub use decode::{MAX_BATCH_BYTES, MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub use image::{Blob, ImageEncoding, ImageGeometry, ImageKind, ImagePose, ScanImage};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
 pub use mapped::{PointMap, ScanMap, ScanMaps};

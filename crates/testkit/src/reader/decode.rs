@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{MAX_BATCH_POINTS, PointBatch, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted};
+use pointmill_format::{
+    MAX_BATCH_BYTES, MAX_BATCH_POINTS, PointBatch, Positions, ReadError, Scan, ScanInfo, Scratch, Wanted, with_column,
+};
 
 use super::errors::check_scan_error;
 
@@ -22,6 +24,8 @@ pub(super) fn decode(
     let result = scan.decode(index, wanted, scratch, &mut |batch| {
         assert_eq!(batch.first_point, next, "batches are consecutive");
         assert!((1..=MAX_BATCH_POINTS).contains(&batch.len()), "a batch of {} points", batch.len());
+        let bytes = column_bytes(batch);
+        assert!(bytes <= MAX_BATCH_BYTES || batch.len() == 1, "a batch of {} points takes {bytes} bytes", batch.len());
         next += batch.len() as u64;
         assert!(next <= end, "more points than piece {index} has");
         check_batch(scan.info(), wanted, batch);
@@ -35,6 +39,15 @@ pub(super) fn decode(
     let (raw, file_bytes) = (scratch.raw.len() as u64, scan.info().file_bytes);
     assert!(raw <= file_bytes, "{raw} bytes are read from a file of {file_bytes}");
     result
+}
+
+/// Bytes of positions and columns.
+fn column_bytes(batch: &PointBatch) -> usize {
+    let positions = match &batch.positions {
+        Positions::Quantized(axes) => axes.iter().map(|v| size_of_val(v.as_slice())).sum::<usize>(),
+        Positions::World(axes) => axes.iter().map(|v| size_of_val(v.as_slice())).sum(),
+    };
+    positions + batch.columns.iter().map(|c| with_column!(c, v => size_of_val(v.as_slice()))).sum::<usize>()
 }
 
 fn check_batch(info: &ScanInfo, wanted: &Wanted, batch: &PointBatch) {

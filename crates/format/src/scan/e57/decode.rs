@@ -1,4 +1,4 @@
-//! A piece to a batch.
+//! A piece to batches.
 
 use super::fields::Field;
 use super::file::{E57Scan, ScanPlan};
@@ -7,8 +7,8 @@ use super::scaling::{Scaled, Scaling};
 use super::schema::{Fill, PositionFields, Roles, Triple};
 use super::streams::Streams;
 use super::unpack::{each, each_integer, fill};
-use crate::scan::decode::fitting_batch;
-use crate::{Changes, Column, Fault, Positions, ReadError, Scratch, Sink, Wanted, with_column};
+use crate::scan::decode::{batch_points, fitting_batch, point_bytes};
+use crate::{Changes, Column, Fault, PointBatch, Positions, ReadError, Scratch, Sink, Wanted, with_column};
 
 /// [`crate::Scan::decode`].
 pub(super) fn piece(
@@ -35,31 +35,19 @@ pub(super) fn piece(
     }
     let Scratch { raw, decoded, batch } = scratch;
     let streams = Streams::gather(&scan.source, cut, &plan.fields, &needed, raw, decoded)?;
-    let n = cut.records as usize;
-    let values = Values { fields: &plan.fields, streams, n };
+    let records = cut.records as usize;
+    // whole bytes of every stream, so that a batch starts at a byte border
+    let step = (batch_points(point_bytes(&scan.info.attributes, false)) / 8 * 8).max(8);
     let batch = fitting_batch(batch, &scan.info.attributes, false);
-    batch.first_point = piece.first_point;
-    if let Positions::World(xyz) = &mut batch.positions {
-        xyz.iter_mut().for_each(|axis| axis.resize(n, 0.0));
-        values.positions(&plan.positions, &plan.pose, xyz.each_mut().map(Vec::as_mut_slice));
-    }
-    let xs: &[f64] = match &batch.positions {
-        Positions::World([x, ..]) => x,
-        Positions::Quantized(_) => &[],
-    };
-    let mut counted = Vec::new();
-    for (i, (column, attribute)) in batch.columns.iter_mut().zip(scan.info.attributes.iter()).enumerate() {
-        let len = if is_wanted(i) { n * attribute.elements } else { 0 };
-        with_column!(&mut *column, v => v.resize(len, Default::default()));
-        if len > 0 {
-            let mut tally = Tally { xs, changes: Changes::default() };
-            values.column(plan, plan.fills[i], column, &mut tally);
-            counted.push((i, tally.changes));
+    for first in (0..records).step_by(step) {
+        let values = Values { fields: &plan.fields, streams: &streams, first, n: (records - first).min(step) };
+        batch.first_point = piece.first_point + first as u64;
+        batch.clear_changes();
+        values.to_batch(plan, wanted, batch);
+        if sink(batch).is_break() {
+            break;
         }
     }
-    counted.iter().for_each(|(column, changes)| batch.count_changes(*column, changes));
-    // the last batch of the piece: whether the sink wants more makes no difference
-    let _ = sink(batch);
     Ok(())
 }
 
@@ -95,16 +83,47 @@ impl Tally<'_> {
 /// The packed values of a run of records.
 pub(super) struct Values<'a> {
     pub(super) fields: &'a [Field],
-    pub(super) streams: Streams<'a>,
+    pub(super) streams: &'a Streams<'a>,
+    /// The first of the records within the streams, a multiple of 8.
+    pub(super) first: usize,
     /// Records.
     pub(super) n: usize,
 }
 
 impl Values<'_> {
+    /// Positions and wanted columns of the records.
+    fn to_batch(&self, plan: &ScanPlan, wanted: &Wanted, batch: &mut PointBatch) {
+        if let Positions::World(xyz) = &mut batch.positions {
+            xyz.iter_mut().for_each(|axis| axis.resize(self.n, 0.0));
+            self.positions(&plan.positions, &plan.pose, xyz.each_mut().map(Vec::as_mut_slice));
+        }
+        let xs: &[f64] = match &batch.positions {
+            Positions::World([x, ..]) => x,
+            Positions::Quantized(_) => &[],
+        };
+        let elements: Vec<_> = batch.attributes().iter().map(|attribute| attribute.elements).collect();
+        let mut counted = Vec::new();
+        for (i, (column, elements)) in batch.columns.iter_mut().zip(elements).enumerate() {
+            let len = if wanted.is_wanted(i) { self.n * elements } else { 0 };
+            with_column!(&mut *column, v => v.resize(len, Default::default()));
+            if len > 0 {
+                let mut tally = Tally { xs, changes: Changes::default() };
+                self.column(plan, plan.fills[i], column, &mut tally);
+                counted.push((i, tally.changes));
+            }
+        }
+        counted.iter().for_each(|(column, changes)| batch.count_changes(*column, changes));
+    }
+
+    /// The packed values of a field.
+    fn stream(&self, field: usize) -> &[u8] {
+        self.streams.field(field, self.first / 8 * self.fields[field].encoding.bits() as usize)
+    }
+
     /// Calls `put` with the number and meant value of a field of each record.
     #[inline(always)]
     pub(super) fn each(&self, field: usize, put: impl FnMut(usize, f64)) {
-        each(self.fields[field].encoding, self.streams.field(field), self.n, put);
+        each(self.fields[field].encoding, self.stream(field), self.n, put);
     }
 
     /// Calls `hit` with the number of each record whose state is not 0 ("valid").
@@ -121,7 +140,7 @@ impl Values<'_> {
     fn triple(&self, triple: Triple, xyz: [&mut [f64]; 3]) {
         for (field, out) in triple.into_iter().zip(xyz) {
             match field {
-                Some(field) => fill(self.fields[field].encoding, self.streams.field(field), out),
+                Some(field) => fill(self.fields[field].encoding, self.stream(field), out),
                 None => out.fill(0.0),
             }
         }
@@ -228,7 +247,7 @@ impl Values<'_> {
 
     /// A field as it is. Integers that lie outside their declared range (a fault of the file) stay within their type.
     fn plain(&self, field: usize, invalid: Option<usize>, add: i64, column: &mut Column, tally: &mut Tally<'_>) {
-        let (encoding, bytes) = (self.fields[field].encoding, self.streams.field(field));
+        let (encoding, bytes) = (self.fields[field].encoding, self.stream(field));
         macro_rules! integers {
             ($out:ident, $ty:ty) => {{
                 each_integer(encoding, bytes, self.n, |i, v| {

@@ -195,7 +195,7 @@ fn sample(source: &Source, draft: &Draft<'_>, ids: &[usize]) -> (f64, f64) {
     for cut in places.into_iter().filter_map(|i| draft.cuts.get(i)).filter(|cut| cut.lost.is_none()) {
         // a damaged piece is reported when it is decoded
         let Ok(streams) = Streams::gather(source, cut, &draft.fields, &needed, &mut raw, &mut bytes) else { continue };
-        let values = Values { fields: &draft.fields, streams, n: cut.records as usize };
+        let values = Values { fields: &draft.fields, streams: &streams, first: 0, n: cut.records as usize };
         for i in ids {
             values.each(*i, |_, v| {
                 if v.is_finite() {

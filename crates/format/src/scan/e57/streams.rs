@@ -19,9 +19,11 @@ pub(super) struct Streams<'a> {
 }
 
 impl<'a> Streams<'a> {
-    /// The packed values of a field, with [`PADDING`]; none of a field that was not needed, or has no bits.
-    pub(super) fn field(&self, field: usize) -> &'a [u8] {
-        self.places.get(field).map_or(&[], |(start, len)| &self.bytes[*start..start + len + PADDING])
+    /// The packed values of a field from byte `from` on, with [`PADDING`]; none of a field that was not needed, or has
+    /// no bits.
+    pub(super) fn field(&self, field: usize, from: usize) -> &'a [u8] {
+        let all = self.places.get(field).map_or(&[][..], |(start, len)| &self.bytes[*start..start + len + PADDING]);
+        all.get(from..).unwrap_or_default()
     }
 
     /// Reads the streams of the fields that are `needed`. `raw` and `out` are memory to use.

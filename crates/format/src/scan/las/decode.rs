@@ -9,9 +9,9 @@ use super::kernels;
 use super::laszip::LaszipRecord;
 use super::pieces::Storage;
 use super::schema::Schema;
-use crate::scan::decode::fitting_batch;
+use crate::scan::decode::{batch_points, fitting_batch, point_bytes};
 use crate::scan::source::Source;
-use crate::{Advice, Fault, MAX_BATCH_POINTS, Piece, PointBatch, ReadError, Scratch, Sink, Wanted};
+use crate::{Advice, Fault, Piece, PointBatch, ReadError, Scratch, Sink, Wanted};
 
 /// A chunk larger than this is read through a buffer instead of at once.
 const MAX_CHUNK_IN_MEMORY: u64 = 64 << 20;
@@ -36,6 +36,7 @@ pub(super) fn piece(
     let batch = fitting_batch(batch, &scan.info.attributes, true);
     let mut out = Emitter {
         record_len: scan.record_len,
+        batch_points: batch_points(scan.record_len.max(point_bytes(&scan.info.attributes, true))) as u64,
         schema: &scan.schema,
         wanted,
         next_point: piece.first_point,
@@ -57,6 +58,8 @@ pub(super) fn piece(
 /// Turns records into columns and hands them over.
 struct Emitter<'a, 's> {
     record_len: usize,
+    /// Records that become one batch.
+    batch_points: u64,
     schema: &'a Schema,
     wanted: &'a Wanted,
     next_point: u64,
@@ -65,7 +68,7 @@ struct Emitter<'a, 's> {
 }
 
 impl Emitter<'_, '_> {
-    /// `records`: whole ones, at most [`MAX_BATCH_POINTS`].
+    /// `records`: whole ones, at most [`Self::batch_points`].
     fn emit(&mut self, records: &[u8]) -> ControlFlow<()> {
         if records.is_empty() {
             return ControlFlow::Continue(());
@@ -86,7 +89,7 @@ impl Emitter<'_, '_> {
         let mut at = piece.byte_offset;
         let mut left = piece.points;
         while left > 0 {
-            let points = left.min(MAX_BATCH_POINTS as u64) as usize;
+            let points = left.min(self.batch_points) as usize;
             kernels::resize(points, &self.schema.fields, self.wanted, self.batch);
             for first in (0..points).step_by(READ_RECORDS) {
                 let len = (points - first).min(READ_RECORDS) * self.record_len;
@@ -111,7 +114,7 @@ impl Emitter<'_, '_> {
     ) -> Result<ControlFlow<()>, Stop> {
         let mut left = points;
         while left > 0 {
-            let n = left.min(MAX_BATCH_POINTS as u64);
+            let n = left.min(self.batch_points);
             let len = n as usize * self.record_len;
             if decoded.len() < len {
                 decoded.resize(len, 0);

@@ -9,18 +9,14 @@ use super::decimal_mark::{DecimalMark, NO_NUMBER};
 use super::lines;
 use super::number::Endian;
 use super::schema::Schema;
-use crate::scan::decode::fitting_batch;
+use crate::scan::decode::{batch_points, fitting_batch, point_bytes};
 use crate::scan::source::Source;
 use crate::{
-    Attribute, Column, MAX_BATCH_POINTS, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo, Scratch,
-    Sink, Wanted,
+    Attribute, Column, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo, Scratch, Sink, Wanted,
 };
 
 /// Binary rows that are read at once, so that they are still in the second-level cache when they become columns.
 const READ_BYTES: usize = 128 << 10;
-
-/// Columns of a batch take no more than this: rows of thousands of numbers come in smaller batches.
-const MAX_BATCH_BYTES: usize = 64 << 20;
 
 /// How the rows of a scan lie in its file.
 #[derive(Debug)]
@@ -443,8 +439,7 @@ fn is_beyond_the_sample(what: &str) -> bool {
 
 /// Runs of at most a batch: first point and number of points.
 fn batches(piece: &Piece, schema: &Schema) -> impl Iterator<Item = (u64, usize)> + use<> {
-    let point_bytes = 24 + schema.attributes.iter().map(crate::Attribute::size).sum::<usize>();
-    let most = (MAX_BATCH_BYTES / point_bytes).clamp(1, MAX_BATCH_POINTS);
+    let most = batch_points(point_bytes(&schema.attributes, false));
     let (first, points) = (piece.first_point, piece.points);
     (0..points).step_by(most).map(move |done| (first + done, (points - done).min(most as u64) as usize))
 }
