@@ -247,6 +247,7 @@ mod tests {
         let mut json = Json::new(&memory, "a").map_err(|_| "io")?;
         read(&mut json).and_then(|v| json.end().map(|()| v)).map_err(|fault| match fault {
             Fault::Broken(at, what) | Fault::Unsupported(at, what) => format!("{at}: {what}"),
+            Fault::Memory(at) => format!("{at}: memory"),
             Fault::Io(e) => e.to_string(),
         })
     }
