@@ -11,6 +11,9 @@ use pointmill_format::{Advice, ReadError};
 /// What the program itself takes, with its libraries and the stacks of its threads.
 const PROGRAM: u64 = 24 << 20;
 
+/// What a byte of JSON becomes in memory, at most: brackets are the shortest values.
+pub(crate) const JSON: u64 = 24;
+
 /// A mebibyte.
 const MIB: u64 = 1 << 20;
 

@@ -55,8 +55,8 @@ impl Shelf {
 pub(super) struct Look {
     pub(super) pieces: usize,
     pub(super) points: u64,
-    /// Bytes of its largest piece in the file.
-    pub(super) piece_bytes: u64,
+    /// What a thread takes to decode a piece of it, at most, bytes.
+    pub(super) decode_bytes: u64,
     /// Positions may move to the lattice of the job.
     pub(super) may_move: bool,
     pub(super) declares_16_bit_colour: bool,
@@ -71,7 +71,7 @@ pub(super) struct Gathered {
     pub(super) list: Vec<Source>,
     pub(super) pieces: Vec<(u32, u32)>,
     pub(super) points: u64,
-    pub(super) piece_bytes: u64,
+    pub(super) decode_bytes: u64,
     pub(super) may_move: bool,
     /// By attribute of the dataset, the types that fill it.
     pub(super) types: Vec<Vec<AttributeType>>,
@@ -88,7 +88,7 @@ impl Gathered {
             list: Vec::new(),
             pieces: Vec::new(),
             points: 0,
-            piece_bytes: 0,
+            decode_bytes: 0,
             may_move: false,
             types: vec![Vec::new(); rules.attributes.len()],
             names: BTreeSet::new(),
@@ -99,7 +99,7 @@ impl Gathered {
             all.pieces.extend((0..look.pieces as u32).map(|piece| (at, piece)));
             all.list.push(Source::new(path, look.pieces, look.declares_16_bit_colour));
             all.points = all.points.saturating_add(look.points);
-            all.piece_bytes = all.piece_bytes.max(look.piece_bytes);
+            all.decode_bytes = all.decode_bytes.max(look.decode_bytes);
             all.may_move |= look.may_move;
             for (types, ty) in all.types.iter_mut().zip(look.types) {
                 types.extend(ty.filter(|ty| !types.contains(ty)));

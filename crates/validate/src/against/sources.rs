@@ -69,8 +69,8 @@ pub(crate) struct Sources {
     not_in_dataset: Vec<String>,
     /// Points that differ from what is said to be one value throughout, by entry of the rules' constants; of the last pass.
     deviating: Vec<AtomicU64>,
-    /// Bytes of the largest piece in its file.
-    piece_bytes: u64,
+    /// What a thread takes to decode a piece, at most.
+    decode_bytes: u64,
 }
 
 impl Sources {
@@ -95,7 +95,7 @@ impl Sources {
             is_marked: all.may_move,
             not_in_dataset: all.names.into_iter().collect(),
             deviating: rules.constants.iter().map(|_| AtomicU64::new(0)).collect(),
-            piece_bytes: all.piece_bytes,
+            decode_bytes: all.decode_bytes,
         })
     }
 
@@ -104,11 +104,10 @@ impl Sources {
         self.not_in_dataset.clone()
     }
 
-    /// What a thread takes to decode a piece and to hold a block of it, about, bytes.
+    /// What a thread takes to decode a piece and to hold a block of it, bytes.
     pub(crate) fn thread_bytes(&self) -> u64 {
-        const READER: u64 = 8 << 20;
-        const STREAMED: u64 = 16 << 20;
-        READER + self.piece_bytes.min(STREAMED)
+        const BLOCK: u64 = 4 << 20;
+        BLOCK + self.decode_bytes
     }
 
     /// Attributes that were dropped as constant but are not: name, points that differ.
@@ -204,7 +203,7 @@ impl Opened {
         Look {
             pieces: pieces.len(),
             points: pieces.iter().map(|p| p.points).sum(),
-            piece_bytes: pieces.iter().map(|p| p.byte_len).max().unwrap_or(0),
+            decode_bytes: self.scan.decode_bytes(&self.wanted()),
             may_move: !self.exact.iter().all(|e| e.is_some_and(|e| e.is_whole())),
             declares_16_bit_colour: info.rgb_is_16_bit,
             types: feeds.collect(),

@@ -11,7 +11,7 @@ use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
 /// More JSON than this is no description.
-const MAX_BYTES: u64 = 16 << 20;
+pub(crate) const MAX_BYTES: u64 = 16 << 20;
 
 /// Of the page.
 const MAX_ATTRIBUTES: usize = 256;

@@ -45,7 +45,7 @@ use crate::accuracy::{self, Known};
 use crate::against::{Against, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::memory::Budget;
+use crate::memory::{self, Budget};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::{AgainstSummary, Outcome};
 use crate::report;
@@ -70,6 +70,9 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
     let Some(header) = header::read(&bytes, &findings)? else {
         return Ok(stopped(findings, &[Check::Header], "the header cannot be used", None));
     };
+    if header.description_bytes <= description::MAX_BYTES.min(bytes.len) {
+        budget.require(header.description_bytes * memory::JSON)?;
+    }
     let Some(description) = description::read(&bytes, &header, &findings)? else {
         let done = [Check::Header, Check::Description];
         return Ok(stopped(findings, &done, "the description cannot be used", Some(&header)));

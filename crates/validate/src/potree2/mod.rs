@@ -35,7 +35,7 @@ use crate::accuracy::{self, Known, Side};
 use crate::against::{Against, Context, Rules};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::memory::{Budget, on_threads};
+use crate::memory::{self, Budget, on_threads};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::{LevelQuality, Outcome};
 use crate::report;
@@ -62,6 +62,10 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let findings = Findings::new(DatasetKind::Potree2, options.max_problems);
     if let Some(missing) = missing(&source) {
         return Ok(incomplete(&missing, findings));
+    }
+    let metadata_bytes = tree::size_of(&source, METADATA_FILE)?;
+    if metadata_bytes <= MAX_METADATA_BYTES {
+        budget.require(metadata_bytes * memory::JSON)?;
     }
     let mut dataset = match Dataset::open(folder) {
         Ok(dataset) => dataset,
