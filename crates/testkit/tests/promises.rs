@@ -133,6 +133,10 @@ impl Scan for Fake {
         &self.pieces
     }
 
+    fn decode_bytes(&self, _: &Wanted) -> u64 {
+        u64::MAX
+    }
+
     fn decode(
         &self,
         piece: usize,

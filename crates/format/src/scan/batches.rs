@@ -9,9 +9,9 @@ use crate::{PointBatch, ReadError};
 impl dyn Scan + '_ {
     /// All points of the scan, in file order: the simple way, on the calling thread.
     ///
-    /// The iterator decodes a piece at a time and holds its points: some 50,000 as a rule, everything where the file
-    /// allows but one piece (PCD `binary_compressed`, LAZ without a chunk table). For less memory, or more threads,
-    /// there is [`Scan::decode`]. An error ends its piece; the next item is of the next piece.
+    /// The iterator decodes a piece at a time and holds its points: some 50,000 as a rule, 260,000 or more of PCD
+    /// `binary_compressed`, everything where the file allows but one piece (LAZ without a chunk table). For less memory,
+    /// or more threads, there is [`Scan::decode`]. An error ends its piece; the next item is of the next piece.
     ///
     /// ```
     /// # #[cfg(feature = "text")] {

@@ -65,6 +65,26 @@ pub(super) fn fitting_batch<'a>(
     batch
 }
 
+/// Memory of a column beside its values, and of small things for each of them in a decode.
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+const COLUMN_BYTES: u64 = 256;
+
+/// Memory of a batch of at most `points` points with the wanted columns: [`resize`] gives them no more room than they need.
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+pub(super) fn batch_bytes(attributes: &[crate::Attribute], is_quantized: bool, wanted: &Wanted, points: u64) -> u64 {
+    let sizes = attributes.iter().enumerate().filter(|(i, _)| wanted.is_wanted(*i)).map(|(_, a)| a.size() as u64);
+    let each = point_bytes(&[], is_quantized) as u64 + sizes.sum::<u64>();
+    points * each + COLUMN_BYTES * (attributes.len() as u64 + 4)
+}
+
+/// Makes a column `len` values long, without room for more. Values that it had stay, so that a column that was as long
+/// before is not written twice.
+#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+pub(super) fn resize<T: Clone + Default>(column: &mut Vec<T>, len: usize) {
+    column.reserve_exact(len.saturating_sub(column.len()));
+    column.resize(len, T::default());
+}
+
 /// A scan that is open for reading; any number of threads may decode different pieces at once.
 ///
 /// [`crate::open_scan`] opens one. Where one thread is enough, [`Scan::batches`](trait.Scan.html#method.batches) is
@@ -96,6 +116,12 @@ pub trait Scan: Send + Sync {
 
     /// The parts, in file order; their points are consecutive from 0.
     fn pieces(&self) -> &[Piece];
+
+    /// The most memory that decoding any one piece with [`Self::decode`] takes on one thread, in bytes: the batch, what is
+    /// read and decompressed at once, and the state of a decompressor. It is an upper bound, as a rule less than twice
+    /// what is taken. [`Scratch`] keeps its memory: one that serves several scans needs no more than the sum of what each
+    /// kind of scan needs at most. What the scan itself holds while it is open is not part of it.
+    fn decode_bytes(&self, wanted: &Wanted) -> u64;
 
     /// Decodes one piece and hands its points to `sink`, in file order, in batches of at most [`MAX_BATCH_POINTS`]
     /// points and [`MAX_BATCH_BYTES`] bytes.

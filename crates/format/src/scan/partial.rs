@@ -1,6 +1,7 @@
 //! A scan of which some parts are read.
 
 use super::chosen::chosen;
+use super::decode::{batch_bytes, batch_points, point_bytes};
 use super::{Piece, Scan, ScanInfo, Scratch, Sink, Wanted};
 use crate::{Fault, ReadError, ScanWarning};
 
@@ -51,6 +52,12 @@ impl Scan for PartialScan {
 
     fn pieces(&self) -> &[Piece] {
         &self.pieces
+    }
+
+    fn decode_bytes(&self, wanted: &Wanted) -> u64 {
+        let points = self.pieces.iter().map(|piece| piece.points).max().unwrap_or(0);
+        let points = points.min(batch_points(point_bytes(&self.info.attributes, false)) as u64);
+        self.inner.decode_bytes(wanted) + batch_bytes(&self.info.attributes, false, wanted, points)
     }
 
     fn decode(

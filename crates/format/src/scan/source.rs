@@ -72,6 +72,7 @@ impl Source {
             return Err(self.cut_short(offset, len).advise(Advice::CutShort));
         };
         if buf.len() < len {
+            buf.reserve_exact(len - buf.len());
             buf.resize(len, 0);
         }
         let out = &mut buf[..len];
@@ -98,7 +99,7 @@ pub(crate) struct SourceReader<'a> {
 
 /// Large enough that a read costs little beside decoding, small beside a batch.
 #[cfg(feature = "las")]
-const READER_BUFFER: u64 = 256 * 1024;
+pub(super) const READER_BUFFER: u64 = 256 * 1024;
 
 #[cfg(feature = "las")]
 impl io::Read for SourceReader<'_> {

@@ -2,4 +2,9 @@
 #![cfg(all(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 
 mod batches;
+mod counting;
+mod decode;
 mod scenes;
+
+#[global_allocator]
+static MEMORY: counting::Counting = counting::Counting;

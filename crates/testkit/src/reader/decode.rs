@@ -38,6 +38,9 @@ pub(super) fn decode(
     }
     let (raw, file_bytes) = (scratch.raw.len() as u64, scan.info().file_bytes);
     assert!(raw <= file_bytes, "{raw} bytes are read from a file of {file_bytes}");
+    let (taken, said) =
+        (scratch.raw.capacity() + scratch.decoded.capacity(), scan.decode_bytes(&Wanted::all(scan.info())));
+    assert!(taken as u64 <= said, "{taken} bytes are taken, {said} should be enough");
     result
 }
 

@@ -16,6 +16,10 @@ impl Scan for Header {
         &[]
     }
 
+    fn decode_bytes(&self, _: &Wanted) -> u64 {
+        0
+    }
+
     fn decode(&self, _: usize, _: &Wanted, _: &mut Scratch, _: &mut Sink<'_>) -> Result<(), ReadError> {
         Ok(())
     }

@@ -7,7 +7,7 @@ use super::scaling::{Scaled, Scaling};
 use super::schema::{Fill, PositionFields, Roles, Triple};
 use super::streams::Streams;
 use super::unpack::{each, each_integer, fill};
-use crate::scan::decode::{batch_points, fitting_batch, point_bytes};
+use crate::scan::decode::{batch_bytes, batch_points, fitting_batch, point_bytes, resize};
 use crate::{Changes, Column, Fault, PointBatch, Positions, ReadError, Scratch, Sink, Wanted, with_column};
 
 /// [`crate::Scan::decode`].
@@ -27,17 +27,11 @@ pub(super) fn piece(
         let what = format!("{}; {} points of scan {} are lost", fault.what, cut.records, plan.index + 1);
         return Err(ReadError::broken(scan.source.path(), fault.byte, what).advise(fault.advice.clone()));
     }
-    let is_wanted = |column: usize| wanted.is_wanted(column);
-    let mut needed = vec![false; plan.fields.len()];
-    plan.positions.mark(&mut needed);
-    for (_, fill) in plan.fills.iter().enumerate().filter(|(column, _)| is_wanted(*column)) {
-        Roles::mark(*fill, &mut needed);
-    }
+    let needed = needed(plan, wanted);
     let Scratch { raw, decoded, batch } = scratch;
     let streams = Streams::gather(&scan.source, cut, &plan.fields, &needed, raw, decoded)?;
     let records = cut.records as usize;
-    // whole bytes of every stream, so that a batch starts at a byte border
-    let step = (batch_points(point_bytes(&scan.info.attributes, false)) / 8 * 8).max(8);
+    let step = step(scan);
     let batch = fitting_batch(batch, &scan.info.attributes, false);
     for first in (0..records).step_by(step) {
         let values = Values { fields: &plan.fields, streams: &streams, first, n: (records - first).min(step) };
@@ -49,6 +43,34 @@ pub(super) fn piece(
         }
     }
     Ok(())
+}
+
+/// Records of a batch: whole bytes of every stream, so that it starts at a byte border.
+fn step(scan: &E57Scan) -> usize {
+    (batch_points(point_bytes(&scan.info.attributes, false)) / 8 * 8).max(8)
+}
+
+/// The fields that positions and wanted columns are made of.
+fn needed(plan: &ScanPlan, wanted: &Wanted) -> Vec<bool> {
+    let mut needed = vec![false; plan.fields.len()];
+    plan.positions.mark(&mut needed);
+    for (_, fill) in plan.fills.iter().enumerate().filter(|(column, _)| wanted.is_wanted(*column)) {
+        Roles::mark(*fill, &mut needed);
+    }
+    needed
+}
+
+/// [`crate::Scan::decode_bytes`].
+pub(super) fn bytes(scan: &E57Scan, wanted: &Wanted) -> u64 {
+    let mut records = vec![0; scan.scans.len()];
+    scan.cuts.iter().for_each(|cut| records[cut.scan] = cut.records.max(records[cut.scan]));
+    let streams = scan.scans.iter().zip(&records);
+    let streams = streams.map(|(plan, records)| Streams::bytes(&plan.fields, &needed(plan, wanted), *records));
+    let points = records.iter().copied().max().unwrap_or(0).min(step(scan) as u64);
+    // directions, or the other form of positions, and which of them are valid
+    let others = 3 * size_of::<f64>() as u64 + 1;
+    let batch = batch_bytes(&scan.info.attributes, false, wanted, points);
+    streams.max().unwrap_or(0) + batch + points * others
 }
 
 /// Counts what becomes of the values of a column. Points without a position do not count: they are none.
@@ -94,7 +116,7 @@ impl Values<'_> {
     /// Positions and wanted columns of the records.
     fn to_batch(&self, plan: &ScanPlan, wanted: &Wanted, batch: &mut PointBatch) {
         if let Positions::World(xyz) = &mut batch.positions {
-            xyz.iter_mut().for_each(|axis| axis.resize(self.n, 0.0));
+            xyz.iter_mut().for_each(|axis| resize(axis, self.n));
             self.positions(&plan.positions, &plan.pose, xyz.each_mut().map(Vec::as_mut_slice));
         }
         let xs: &[f64] = match &batch.positions {
@@ -105,7 +127,7 @@ impl Values<'_> {
         let mut counted = Vec::new();
         for (i, (column, elements)) in batch.columns.iter_mut().zip(elements).enumerate() {
             let len = if wanted.is_wanted(i) { self.n * elements } else { 0 };
-            with_column!(&mut *column, v => v.resize(len, Default::default()));
+            with_column!(&mut *column, v => resize(v, len));
             if len > 0 {
                 let mut tally = Tally { xs, changes: Changes::default() };
                 self.column(plan, plan.fills[i], column, &mut tally);

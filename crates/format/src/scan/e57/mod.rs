@@ -97,6 +97,10 @@ impl Scan for E57Scan {
         &self.pieces
     }
 
+    fn decode_bytes(&self, wanted: &Wanted) -> u64 {
+        decode::bytes(self, wanted)
+    }
+
     fn decode(
         &self,
         piece: usize,

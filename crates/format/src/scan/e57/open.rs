@@ -25,8 +25,8 @@ use crate::{
 
 /// Records of a piece: one batch; a multiple of 8, so that packed values start at a byte border.
 const PIECE_RECORDS: u64 = 50_000;
-/// With more columns than this a piece has fewer records, so that it needs no more memory.
-const USUAL_COLUMNS: u64 = 64;
+/// Bytes of packed values that a piece has at most, unless eight records have more: they are held while it is decoded.
+const PIECE_BYTES: u64 = 4 << 20;
 /// Records that a scan may have without a single bit of data (all fields constant).
 const MAX_FROM_NOTHING: u64 = 65_536;
 
@@ -134,8 +134,6 @@ fn cut_all(source: &Source, clouds: &[Cloud], drafts: &mut [Draft<'_>], notes: &
     let mut pages = Pages::new(source, &mut window, 1);
     let mut starts: Vec<u64> = clouds.iter().map(|cloud| logical(cloud.file_offset)).collect();
     starts.sort_unstable();
-    let columns: u64 = drafts.iter().map(|draft| draft.fields.len() as u64).max().unwrap_or(0);
-    let step = (PIECE_RECORDS * USUAL_COLUMNS / columns.max(USUAL_COLUMNS) / 8 * 8).max(8);
     let file_end = logical_len(source);
     let mut taken = HashSet::new();
     for draft in drafts {
@@ -148,6 +146,8 @@ fn cut_all(source: &Source, clouds: &[Cloud], drafts: &mut [Draft<'_>], notes: &
         let next = starts.partition_point(|start| *start <= at);
         let limit = starts.get(next).copied().unwrap_or(file_end).min(file_end);
         let section = Section::read(&mut pages, at, limit);
+        let bits: u64 = draft.fields.iter().map(|field| u64::from(field.encoding.bits())).sum();
+        let step = ((8 * PIECE_BYTES / bits.max(1)).min(PIECE_RECORDS) / 8 * 8).max(8);
         let found = cuts::cut(&mut pages, section, draft.index, &draft.fields, draft.cloud.records, step);
         draft.cuts = found.cuts;
         if found.missing > 0 {

@@ -3,13 +3,23 @@
 use super::cuts::Cut;
 use super::fields::Field;
 use super::packets::Packet;
-use super::pages::{Pages, physical};
+use super::pages::{PAGE, Pages, physical};
 use super::unpack::PADDING;
 use crate::ReadError;
+use crate::scan::decode::resize;
 use crate::scan::source::Source;
 
 /// Pages that one read fetches: four packets of the largest size.
 const WINDOW: u64 = 256;
+
+/// Memory of what is counted for each field.
+const FIELD_BYTES: u64 = 128;
+
+/// Bytes of each stream of so many records; none of those that are not needed.
+fn lengths(fields: &[Field], needed: &[bool], records: u64) -> impl Iterator<Item = u64> {
+    let bits = fields.iter().zip(needed).map(|(field, needed)| if *needed { field.encoding.bits() } else { 0 });
+    bits.map(move |bits| (records * u64::from(bits)).div_ceil(8))
+}
 
 /// The gathered bytes of each field.
 pub(super) struct Streams<'a> {
@@ -26,6 +36,12 @@ impl<'a> Streams<'a> {
         all.get(from..).unwrap_or_default()
     }
 
+    /// Memory that gathering a piece of so many records takes.
+    pub(super) fn bytes(fields: &[Field], needed: &[bool], records: u64) -> u64 {
+        let streams: u64 = lengths(fields, needed, records).map(|len| len + PADDING as u64).sum();
+        streams + WINDOW * PAGE + FIELD_BYTES * fields.len() as u64
+    }
+
     /// Reads the streams of the fields that are `needed`. `raw` and `out` are memory to use.
     pub(super) fn gather(
         source: &Source,
@@ -37,14 +53,12 @@ impl<'a> Streams<'a> {
     ) -> Result<Self, ReadError> {
         let mut places = Vec::with_capacity(fields.len());
         let mut size = 0;
-        for (field, needed) in fields.iter().zip(needed) {
-            let bits = if *needed { u64::from(field.encoding.bits()) } else { 0 };
-            let len = (cut.records * bits).div_ceil(8) as usize;
-            places.push((size, len));
-            size += len + PADDING;
+        for len in lengths(fields, needed, cut.records) {
+            places.push((size, len as usize));
+            size += len as usize + PADDING;
         }
         if out.len() < size {
-            out.resize(size, 0);
+            resize(out, size);
         }
         let mut skip = cut.skip.to_vec();
         let mut filled = vec![0; fields.len()];

@@ -9,16 +9,16 @@ use super::kernels;
 use super::laszip::LaszipRecord;
 use super::pieces::Storage;
 use super::schema::Schema;
-use crate::scan::decode::{batch_points, fitting_batch, point_bytes};
+use crate::scan::decode::{batch_points, fitting_batch, point_bytes, resize};
 use crate::scan::source::Source;
 use crate::{Advice, Fault, Piece, PointBatch, ReadError, Scratch, Sink, Wanted};
 
 /// A chunk larger than this is read through a buffer instead of at once.
-const MAX_CHUNK_IN_MEMORY: u64 = 64 << 20;
+pub(super) const MAX_CHUNK_IN_MEMORY: u64 = 64 << 20;
 
 /// Plain records that are read at once: 139 kB of format 3, so that they are still in the second-level cache when
 /// they become columns.
-const READ_RECORDS: usize = 8 * kernels::BLOCK;
+pub(super) const READ_RECORDS: usize = 8 * kernels::BLOCK;
 
 /// [`crate::Scan::decode`].
 pub(super) fn piece(
@@ -117,7 +117,7 @@ impl Emitter<'_, '_> {
             let n = left.min(self.batch_points);
             let len = n as usize * self.record_len;
             if decoded.len() < len {
-                decoded.resize(len, 0);
+                resize(decoded, len);
             }
             let (good, result) = decompressor.fill(&mut decoded[..len]);
             // what was decoded before corruption showed is not to be trusted; before the end of the bytes it is

@@ -5,6 +5,7 @@
 
 use super::compatible::Recovered;
 use super::schema::{Field, FieldKind};
+use crate::scan::decode;
 use crate::{Column, PointBatch, Positions, Wanted, with_column};
 
 /// Records whose columns are filled before the next ones are touched: 34-byte records × 512 = 17 kB, half of a
@@ -16,10 +17,10 @@ pub(super) const BLOCK: usize = 512;
 /// `resize`, not `clear`: a column that was as long before is not zeroed again.
 pub(super) fn resize(points: usize, fields: &[Field], wanted: &Wanted, batch: &mut PointBatch) {
     let Positions::Quantized(xyz) = &mut batch.positions else { return };
-    xyz.iter_mut().for_each(|axis| axis.resize(points, 0));
+    xyz.iter_mut().for_each(|axis| decode::resize(axis, points));
     for (i, (field, column)) in fields.iter().zip(&mut batch.columns).enumerate() {
         let len = if is_wanted(wanted, i) { points * field.elements } else { 0 };
-        with_column!(column, v => v.resize(len, Default::default()));
+        with_column!(column, v => decode::resize(v, len));
     }
 }
 

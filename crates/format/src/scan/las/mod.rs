@@ -44,6 +44,7 @@ mod geotiff;
 mod header;
 mod kernels;
 mod laszip;
+mod memory;
 mod mend;
 mod pieces;
 mod records;
@@ -127,6 +128,10 @@ impl Scan for LasScan {
 
     fn pieces(&self) -> &[Piece] {
         &self.plan.pieces
+    }
+
+    fn decode_bytes(&self, wanted: &Wanted) -> u64 {
+        memory::decode_bytes(self, wanted)
     }
 
     fn decode(

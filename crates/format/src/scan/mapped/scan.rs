@@ -6,6 +6,7 @@ use super::directions::Directions;
 use super::info;
 use super::map::{ScanMap, ScanMaps};
 use super::positions::PositionMap;
+use crate::scan::decode::{batch_bytes, batch_points, point_bytes};
 use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
 
 /// The scan with its points where `maps` takes them.
@@ -39,6 +40,16 @@ impl Scan for MappedScan {
 
     fn pieces(&self) -> &[Piece] {
         self.inner.pieces()
+    }
+
+    fn decode_bytes(&self, wanted: &Wanted) -> u64 {
+        let needed = self.directions.needed_for(wanted);
+        let points = self.inner.pieces().iter().map(|piece| piece.points).max().unwrap_or(0);
+        let points = points.min(batch_points(point_bytes(&self.info.attributes, true)) as u64);
+        // a copy of the batch with world coordinates, its integers before, and directions while they turn
+        let copy = batch_bytes(&self.info.attributes, false, &needed, points);
+        let before = (point_bytes(&[], true) + point_bytes(&[], false)) as u64;
+        self.inner.decode_bytes(&needed) + copy + points * before
     }
 
     fn decode(

@@ -42,6 +42,10 @@ impl Scan for Fake {
         &self.pieces
     }
 
+    fn decode_bytes(&self, _: &Wanted) -> u64 {
+        0
+    }
+
     fn decode(&self, _: usize, wanted: &Wanted, _: &mut Scratch, sink: &mut Sink<'_>) -> Result<(), ReadError> {
         let mut batch = self.batch.clone();
         let columns = batch.columns.iter_mut().enumerate();

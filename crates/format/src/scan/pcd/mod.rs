@@ -12,12 +12,13 @@
 //!
 //! Where WIDTH times HEIGHT is not POINTS, the one that fits the data is taken, with a warning.
 //!
-//! A compressed file holds each field of all points together: it is one piece, and decoding it takes memory for its
-//! compressed and decompressed bytes (each at most 4 GiB, and the latter at most 88 times the former). Blocks that were
-//! stored uncompressed are read, too.
+//! A compressed file holds each field of all points together, in one block. It is decompressed once when the file is
+//! opened, without being held, to find where pieces can begin; if it is damaged, all points are in one piece, whose decode
+//! says what is wrong. Blocks that were stored uncompressed are read, too.
 //!
 //! Sources: "The PCD (Point Cloud Data) file format", PCL documentation; M. Lehmann's LibLZF for the compression.
 
+mod compressed;
 mod header;
 mod lzf;
 mod place;
@@ -31,8 +32,8 @@ use header::{Encoding, Header};
 
 pub use header::is_pcd;
 
-/// Opens a PCD file: reads its header; ascii lines are counted, no point is decoded but a sample of those whose
-/// colours are floats.
+/// Opens a PCD file: reads its header; ascii lines are counted, a compressed block is checked, no point is decoded but a
+/// sample of those whose colours are floats.
 ///
 /// # Errors
 /// Not PCD, a header that makes no sense or is cut short, fields without x and y, a compressed block outside the file.

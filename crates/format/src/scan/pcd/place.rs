@@ -1,15 +1,16 @@
 //! Where the points lie, and how many are there.
 
+use super::compressed::{self, Compressed};
 use super::header::{Encoding, Header};
-use super::lzf;
+use super::lzf::Block;
 use crate::scan::source::Source;
 use crate::scan::tabular::header_lines::header_lines;
 use crate::scan::tabular::stream::{RowShape, Rows};
 use crate::scan::tabular::text_rows::{self, TextRows};
 use crate::scan::tabular::{
-    Endian, LineRule, Planes, Property, Storage, binary, lines, reconcile, warn_of_bytes_behind,
+    Endian, LineRule, Plane, PlaneRule, Property, Storage, binary, lines, reconcile, warn_of_bytes_behind,
 };
-use crate::{Advice, Piece, ReadError, ScanWarning};
+use crate::{Piece, ReadError, ScanWarning};
 
 /// Bytes of text in which the first row is.
 const FIRST_ROW: u64 = 64 << 10;
@@ -93,63 +94,27 @@ fn separator(source: &Source, from: u64) -> Result<Option<u8>, ReadError> {
     Ok(first.contains(&b',').then_some(b','))
 }
 
-/// One piece: two lengths, then the block, which holds the values of each field together.
+/// Two lengths, then the block, which holds the values of each field together.
 fn compressed(
     source: &Source,
     header: &Header,
     properties: &[Property],
     warnings: &mut Vec<ScanWarning>,
 ) -> Result<Placed, ReadError> {
-    let stride = header.stride();
-    let (byte_len, total) = if header.points == 0 { (0, 0) } else { block(source, header, stride as u64)? };
+    let stride = header.stride() as u64;
+    let empty = Block { at: header.end, len: 0, decompressed: 0 };
+    let block = if header.points == 0 { empty } else { compressed::block(source, header.end, header.points, stride)? };
+    let total = block.decompressed.checked_div(stride).unwrap_or(0);
     let declared = declared(header, total, warnings);
     let points = reconcile(declared, total, warnings);
     if total > points {
-        let bytes = (total - points) * stride as u64;
+        let bytes = (total - points) * stride;
         warnings.push(ScanWarning::BytesIgnored { declared, bytes });
     }
-    let per_field = properties.iter().flat_map(|p| {
-        let width = p.ty.size() * p.elements;
-        std::iter::repeat_n((p.at, width), p.elements)
-    });
-    let planes = Planes { points: total, properties: per_field.collect(), stride, decompress };
-    let piece = Piece { first_point: 0, points, byte_offset: header.end + 8, byte_len };
-    let pieces = if points > 0 { vec![piece] } else { Vec::new() };
-    Ok(Placed { declared, pieces, storage: Storage::Planes(planes) })
-}
-
-/// Bytes of the compressed block, and points in it.
-fn block(source: &Source, header: &Header, stride: u64) -> Result<(u64, u64), ReadError> {
-    let broken = |at: u64, what: String| ReadError::broken(source.path(), at, what);
-    let start = header.end + 8;
-    if source.len() < start {
-        return Err(broken(source.len(), "the compressed block is missing".to_owned()).advise(Advice::CutShort));
-    }
-    let [c0, c1, c2, c3, d0, d1, d2, d3] = source.array_at::<8>(header.end)?;
-    let byte_len = u64::from(u32::from_le_bytes([c0, c1, c2, c3]));
-    let decompressed = u64::from(u32::from_le_bytes([d0, d1, d2, d3]));
-    let there = source.len() - start;
-    if byte_len > there {
-        let what = format!("{there} of {byte_len} compressed bytes are there");
-        return Err(broken(source.len(), what).advise(Advice::CutShort));
-    }
-    if !decompressed.is_multiple_of(stride) || decompressed > lzf::most(byte_len) {
-        let points = header.points;
-        let what = format!(
-            "{points} points of {stride} bytes cannot be in a block of {byte_len} bytes that claims to become {decompressed}"
-        );
-        return Err(broken(header.end, what).advise(Advice::Damaged));
-    }
-    Ok((byte_len, decompressed / stride))
-}
-
-/// [`lzf::decompress`], and blocks that writers stored as they are because compression would not have made them smaller.
-fn decompress(block: &[u8], len: usize, out: &mut Vec<u8>) -> Result<(), String> {
-    let done = lzf::decompress(block, len, out);
-    if done.is_err() && block.len() == len {
-        out.clear();
-        out.extend_from_slice(block);
-        return Ok(());
-    }
-    done
+    let planes: Vec<_> = properties.iter().map(|p| Plane { at: p.at, width: p.ty.size() * p.elements }).collect();
+    let of_field = properties.iter().enumerate().flat_map(|(i, p)| std::iter::repeat_n(i, p.elements)).collect();
+    let compressed = Compressed::new(source, block, total, planes.clone())?;
+    let pieces = compressed.pieces(points);
+    let storage = Storage::Planes(PlaneRule { planes: Box::new(compressed), properties: planes, of_field });
+    Ok(Placed { declared, pieces, storage })
 }

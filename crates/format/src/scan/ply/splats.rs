@@ -18,6 +18,8 @@ use crate::{Advice, AttributeType, ReadError};
 
 /// Splats of a chunk.
 const CHUNK: u64 = 256;
+/// Properties of a chunk at most; there are 18 known ones.
+const MAX_CHUNK: usize = 256;
 /// What a vertex has, each of 32 bits without sign.
 const PACKED: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 /// Least and greatest values of positions, scales and colours; chunks of older files lack the last three.
@@ -111,6 +113,9 @@ impl Splats {
         }
         let find = |name: &str| header.elements.iter().position(|e| e.name.eq_ignore_ascii_case(name));
         let chunk = find("chunk").ok_or("without the element chunk")?;
+        if header.elements[chunk].properties.len() > MAX_CHUNK {
+            return Err(format!("whose chunks have more than {MAX_CHUNK} properties"));
+        }
         let bound = |name| offset(&header.elements[chunk], name, AttributeType::Float32);
         let bounds: Vec<_> = BOUNDS.iter().map_while(|(low, high)| bound(low).zip(bound(high))).collect();
         if bounds.len() < COLOURS_FROM {
@@ -207,6 +212,8 @@ impl Unpack for Splats {
         let (stride, chunk_stride) = (stride as usize, self.chunks.stride as usize);
         let rest = self.harmonics.map_or(0, |t| t.stride as usize);
         out.clear();
+        let unpacked = UNPACKED.iter().map(|(_, ty)| ty.size()).sum::<usize>() + 4 * rest;
+        out.reserve_exact(points * unpacked);
         for (i, row) in rows.chunks_exact(stride).enumerate() {
             let chunk = ((first_point + i as u64) / CHUNK - first_chunk) as usize * chunk_stride;
             self.splat(row, chunks.get(chunk..chunk + chunk_stride).unwrap_or_default(), out);
@@ -214,6 +221,14 @@ impl Unpack for Splats {
             bytes.iter().for_each(|byte| out.extend(harmonic(*byte).to_le_bytes()));
         }
         Ok(out.len() / points.max(1))
+    }
+
+    fn bytes(&self, points: u64) -> u64 {
+        let harmonics = self.harmonics.map_or(0, |table| table.stride);
+        let unpacked = UNPACKED.iter().map(|(_, ty)| ty.size() as u64).sum::<u64>() + 4 * harmonics;
+        // the first and the last chunk may be shared with other batches
+        let chunks = points / CHUNK + 2;
+        points * (self.vertices.stride + harmonics + unpacked) + chunks * self.chunks.stride
     }
 }
 

@@ -8,7 +8,9 @@ use crate::{Piece, ReadError};
 /// Bytes of a piece: large beside the cost of a task, small beside the memory of a job.
 pub(crate) const PIECE_BYTES: u64 = 8 << 20;
 /// Bytes that are read at once while counting, and the longest line.
-const WINDOW: u64 = 1 << 20;
+pub(super) const WINDOW: u64 = 1 << 20;
+/// Lines at the start of a text are held up to so many bytes together.
+const MAX_FIRST: usize = 1 << 20;
 /// Bytes that are read first: a file may have very many small headers.
 const FIRST_WINDOW: u64 = 4 << 10;
 
@@ -28,7 +30,7 @@ pub(crate) fn is_filled(line: &[u8]) -> bool {
 }
 
 /// Bytes that show how lines end.
-const END_BYTES: usize = 4 << 10;
+pub(super) const END_BYTES: usize = 4 << 10;
 
 /// The last byte of each line: CR where most of the first lines end with it alone (old Macintosh), else LF.
 pub(crate) fn line_end(bytes: &[u8]) -> u8 {
@@ -115,14 +117,15 @@ pub(crate) fn skip(source: &Source, from: u64, count: u64) -> Result<(u64, u64),
     Ok((end, left))
 }
 
-/// The first `count` lines that are not blank, with their places.
+/// The first `count` lines that are not blank, with their places; fewer if they are very long.
 pub(crate) fn first_filled(source: &Source, from: u64, count: usize) -> Result<Vec<(u64, Vec<u8>)>, ReadError> {
-    let mut lines = Vec::new();
+    let (mut lines, mut bytes) = (Vec::new(), 0);
     walk(source, from, |at, line| {
         if is_filled(line) && lines.len() < count {
             lines.push((at, line.to_vec()));
+            bytes += line.len();
         }
-        Ok(lines.len() < count)
+        Ok(lines.len() < count && bytes < MAX_FIRST)
     })?;
     Ok(lines)
 }
@@ -179,7 +182,7 @@ pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     })
 }
 
-fn endless_line(source: &Source, at: u64) -> ReadError {
+pub(super) fn endless_line(source: &Source, at: u64) -> ReadError {
     ReadError::broken(source.path(), at, format!("a line of more than {WINDOW} bytes starts here"))
         .advise("this is no text of points, or its line ends are lost; export it again")
 }
@@ -231,6 +234,12 @@ mod tests {
     fn a_line_without_end_is_refused() {
         let bytes = vec![b'1'; 3 << 20];
         assert!(index(&source(&bytes), 0, 10, is_filled).unwrap_err().what().contains("a line of more"));
+    }
+
+    #[test]
+    fn long_lines_at_the_start_are_few() {
+        let text = [b"1 ".repeat(300_000), b"\n".to_vec()].concat().repeat(5);
+        assert_eq!(first_filled(&source(&text), 0, 5).unwrap().len(), 2);
     }
 
     #[test]

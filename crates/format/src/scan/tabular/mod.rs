@@ -10,9 +10,12 @@ pub(crate) mod ascii;
 pub(crate) mod binary;
 mod decimal_mark;
 pub(crate) mod header_lines;
+mod line_reader;
 pub(crate) mod lines;
+mod lists;
 mod names;
 pub(crate) mod number;
+mod planes;
 mod probe;
 mod scan;
 mod schema;
@@ -20,10 +23,12 @@ pub(crate) mod stream;
 pub(crate) mod text_rows;
 
 pub(crate) use decimal_mark::DecimalMark;
+pub(crate) use lists::Part;
 pub(crate) use names::{Role, las_type, role};
 pub(crate) use number::Endian;
+pub(crate) use planes::{Plane, PlaneReader, PlaneRule, Planes};
 pub(crate) use probe::{ColumnRange, probe_rows, settle_float_colours};
-pub(crate) use scan::{LineRule, Part, Planes, Pose, RowScan, Storage, Unpack};
+pub(crate) use scan::{LineRule, Pose, RowScan, Storage, Unpack};
 pub(crate) use schema::{Field, MAX_FIELDS, Property, Rule, Schema, Target};
 
 use crate::scan::source::Source;

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use super::ascii::{RowParser, Separator, Tokens};
 use super::binary::{self, Misfit, Rows};
 use super::decimal_mark::{DecimalMark, NO_NUMBER};
-use super::lines;
+use super::line_reader::LineReader;
+use super::lists::{self, ListRows, Part, Window};
 use super::number::Endian;
+use super::planes::{Failure, PlaneRule};
 use super::schema::Schema;
-use crate::scan::decode::{batch_points, fitting_batch, point_bytes};
+use crate::scan::decode::{batch_bytes, batch_points, fitting_batch, point_bytes, resize};
 use crate::scan::source::Source;
 use crate::{
     Attribute, Column, Piece, PointBatch, Positions, ReadError, Resolution, Scan, ScanInfo, Scratch, Sink, Wanted,
@@ -25,8 +27,8 @@ pub(crate) enum Storage {
     Records { stride: usize, endian: Endian },
     /// Records with lists in them; without these they have `stride` bytes.
     Lists { parts: Vec<Part>, stride: usize, endian: Endian },
-    /// LZF, all values of a property together: PCD `binary_compressed`.
-    Planes(Planes),
+    /// All values of a property together: PCD `binary_compressed`.
+    Planes(PlaneRule),
     /// Lines of numbers.
     Lines(LineRule),
     /// Records that are made from what lies in the file.
@@ -46,31 +48,10 @@ pub(crate) trait Unpack: std::fmt::Debug + Send + Sync {
         raw: &mut Vec<u8>,
         out: &mut Vec<u8>,
     ) -> Result<usize, ReadError>;
-}
 
-/// A run of bytes of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    /// This number of bytes, kept.
-    Plain(usize),
-    /// A count, and that many items: skipped.
-    List { count: crate::AttributeType, item_bytes: u64 },
+    /// Bytes of memory that unpacking `points` points takes.
+    fn bytes(&self, points: u64) -> u64;
 }
-
-/// The planes of a compressed file.
-#[derive(Debug)]
-pub(crate) struct Planes {
-    /// Points of the whole file, all in one piece.
-    pub(crate) points: u64,
-    /// Of each field: offset of its property in a record, and bytes of that property.
-    pub(crate) properties: Vec<(usize, usize)>,
-    /// Bytes of a record.
-    pub(crate) stride: usize,
-    pub(crate) decompress: Decompress,
-}
-
-/// Replaces the last argument by the given number of decompressed bytes; `Err` says why the first is damaged.
-pub(crate) type Decompress = fn(&[u8], usize, &mut Vec<u8>) -> Result<(), String>;
 
 /// Which lines are rows, and what happens to their points.
 #[derive(Debug)]
@@ -185,6 +166,17 @@ impl Scan for RowScan {
             let fault = Fault::NoSuchPiece { piece, pieces: self.pieces.len() };
             return Err(ReadError::unsupported(self.source.path(), fault));
         };
+        self.decoder(wanted).piece(piece, scratch, sink)
+    }
+
+    fn decode_bytes(&self, wanted: &Wanted) -> u64 {
+        let most = |of: fn(&Piece) -> u64| self.pieces.iter().map(of).max().unwrap_or(0);
+        self.decoder(wanted).bytes(most(|piece| piece.points), most(|piece| piece.byte_len))
+    }
+}
+
+impl RowScan {
+    fn decoder<'a>(&'a self, wanted: &'a Wanted) -> Decoder<'a> {
         Decoder {
             source: &self.source,
             schema: &self.schema,
@@ -192,7 +184,6 @@ impl Scan for RowScan {
             storage: &self.storage,
             wanted,
         }
-        .piece(piece, scratch, sink)
     }
 }
 
@@ -207,6 +198,24 @@ pub(crate) struct Decoder<'a> {
 }
 
 impl Decoder<'_> {
+    /// Memory that a piece of at most `points` points in `bytes` bytes takes.
+    fn bytes(&self, points: u64, bytes: u64) -> u64 {
+        let points = points.min(batch_points(point_bytes(self.attributes, false)) as u64);
+        let batch = batch_bytes(self.attributes, false, self.wanted, points);
+        batch
+            + match self.storage {
+                Storage::Records { stride, .. } => bytes.min(READ_BYTES.max(*stride) as u64),
+                Storage::Lists { stride, .. } => bytes.min(lists::WINDOW.max(*stride as u64)) + points * *stride as u64,
+                Storage::Planes(rule) => {
+                    let needed = rule.needed(&self.schema.fields, self.wanted);
+                    points * rule.widest(&needed) as u64 + rule.planes.reader_bytes(&needed)
+                }
+                Storage::Lines(_) => LineReader::bytes(bytes),
+                Storage::Unpacked(unpack) => unpack.bytes(points),
+                Storage::Stream => bytes,
+            }
+    }
+
     pub(crate) fn piece(&self, piece: &Piece, scratch: &mut Scratch, sink: &mut Sink<'_>) -> Result<(), ReadError> {
         let Scratch { raw, decoded, batch } = scratch;
         let batch = fitting_batch(batch, self.attributes, false);
@@ -216,7 +225,7 @@ impl Decoder<'_> {
                 let rows = ListRows { parts, stride: *stride, endian: *endian };
                 self.lists(piece, &rows, raw, decoded, batch, sink)
             }
-            Storage::Planes(planes) => self.planes(piece, planes, raw, decoded, batch, sink),
+            Storage::Planes(rule) => self.planes(piece, rule, decoded, batch, sink),
             Storage::Lines(rule) => self.lines(piece, rule, raw, batch, sink),
             Storage::Unpacked(unpack) => self.unpacked(piece, unpack.as_ref(), raw, decoded, batch, sink),
             Storage::Stream => self.stream(piece, raw, batch, sink),
@@ -259,14 +268,14 @@ impl Decoder<'_> {
         batch: &mut PointBatch,
         sink: &mut Sink<'_>,
     ) -> Result<(), ReadError> {
-        let bytes = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
-        let mut at = 0;
+        let mut bytes = Window::new(self.source, piece.byte_offset + piece.byte_len, raw);
+        let mut at = piece.byte_offset;
         for (first_point, points) in batches(piece, self.schema) {
             decoded.clear();
+            decoded.reserve_exact(points * rows.stride);
             for _ in 0..points {
-                rows.compact(bytes, &mut at, decoded).ok_or_else(|| {
-                    let place = piece.byte_offset + at as u64;
-                    ReadError::broken(self.source.path(), place, "a row ends outside its piece; the file has changed")
+                at = rows.compact(&mut bytes, at, decoded)?.ok_or_else(|| {
+                    ReadError::broken(self.source.path(), at, "a row ends outside its piece; the file has changed")
                         .advise("convert it once nothing writes to it")
                 })?;
             }
@@ -306,26 +315,22 @@ impl Decoder<'_> {
     fn planes(
         &self,
         piece: &Piece,
-        planes: &Planes,
-        raw: &mut Vec<u8>,
+        rule: &PlaneRule,
         decoded: &mut Vec<u8>,
         batch: &mut PointBatch,
         sink: &mut Sink<'_>,
     ) -> Result<(), ReadError> {
-        let compressed = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
-        let total = usize::try_from(planes.points).unwrap_or(usize::MAX);
-        (planes.decompress)(compressed, total.saturating_mul(planes.stride), decoded)
-            .map_err(|what| ReadError::broken(self.source.path(), piece.byte_offset, what).advise(Advice::Damaged))?;
+        let fields = &self.schema.fields;
+        let needed = rule.needed(fields, self.wanted);
+        let mut reader = rule.planes.reader(self.source, piece.first_point, &needed)?;
         for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
-            for (field, (property_at, width)) in self.schema.fields.iter().zip(&planes.properties) {
-                let start = total * property_at + first_point as usize * width;
-                let bytes = decoded.get(start..start + points * width).unwrap_or_default();
-                let in_plane = super::Field { at: field.at - property_at, ..*field };
-                let rows = Rows { bytes, stride: *width, endian: Endian::Little };
-                binary::field_to_column(rows, &in_plane, self.wanted, 0, batch)
-                    .map_err(|m| self.misfit(piece.byte_offset, m))?;
-            }
+            rule.fill(&mut *reader, (fields, self.wanted, &needed), points, decoded, batch).map_err(|failure| {
+                match failure {
+                    Failure::Misfit(misfit) => self.misfit(piece.byte_offset, misfit),
+                    Failure::Read(error) => error,
+                }
+            })?;
             if sink(batch).is_break() {
                 break;
             }
@@ -341,24 +346,23 @@ impl Decoder<'_> {
         batch: &mut PointBatch,
         sink: &mut Sink<'_>,
     ) -> Result<(), ReadError> {
-        let bytes = self.source.slice_at(piece.byte_offset, piece.byte_len, raw)?;
         let elements: Vec<_> = self.schema.attributes.iter().map(|a| a.elements).collect();
         let Schema { fields, .. } = self.schema;
         let LineRule { separator, strict, least, .. } = *rule;
         let parser = RowParser { fields, wanted: self.wanted, separator, strict, least, elements: &elements };
         let mut points_line = Vec::new();
-        let mut lines = lines::lines(bytes).filter(|(_, line)| (rule.is_row)(line));
+        let mut lines = LineReader::new(self.source, piece.byte_offset, piece.byte_offset + piece.byte_len, raw);
         for (first_point, points) in batches(piece, self.schema) {
             self.prepare(batch, first_point, points);
             for row in 0..points {
-                let (at, line) = lines.next().ok_or_else(|| {
+                let (at, line) = lines.next_row(rule.is_row)?.ok_or_else(|| {
                     let what = format!("{row} of {points} lines are left; the file has changed");
                     ReadError::broken(self.source.path(), piece.byte_offset, what)
                         .advise("convert it once nothing writes to it")
                 })?;
                 let points = rule.decimal.to_points(line, &mut points_line);
                 parser.row(points, row, batch).map_err(|m| {
-                    let place = piece.byte_offset + (at + m.at) as u64;
+                    let place = at + m.at as u64;
                     let advice = rule.advice(line, &m.what);
                     self.misfit(place, Misfit { what: rule.in_its_marks(m.what), ..m }).advise(advice)
                 })?;
@@ -415,7 +419,7 @@ impl Decoder<'_> {
         batch.first_point = first_point;
         batch.clear_changes();
         if let Positions::World(xyz) = &mut batch.positions {
-            xyz.iter_mut().for_each(|axis| axis.resize(points, 0.0));
+            xyz.iter_mut().for_each(|axis| resize(axis, points));
             if self.schema.flat {
                 xyz[2].fill(0.0);
             }
@@ -423,7 +427,7 @@ impl Decoder<'_> {
         for (i, (column, attribute)) in batch.columns.iter_mut().zip(&self.schema.attributes).enumerate() {
             let wanted = self.wanted.is_wanted(i);
             let len = if wanted { points * attribute.elements } else { 0 };
-            crate::with_column!(column, v => v.resize(len, Default::default()));
+            crate::with_column!(column, v => resize(v, len));
         }
     }
 
@@ -442,33 +446,6 @@ fn batches(piece: &Piece, schema: &Schema) -> impl Iterator<Item = (u64, usize)>
     let most = batch_points(point_bytes(&schema.attributes, false));
     let (first, points) = (piece.first_point, piece.points);
     (0..points).step_by(most).map(move |done| (first + done, (points - done).min(most as u64) as usize))
-}
-
-/// Records with lists in them.
-struct ListRows<'a> {
-    parts: &'a [Part],
-    stride: usize,
-    endian: Endian,
-}
-
-impl ListRows<'_> {
-    /// Appends the record at `at` without its lists, and moves on; `None` where the bytes end.
-    fn compact(&self, bytes: &[u8], at: &mut usize, out: &mut Vec<u8>) -> Option<()> {
-        for part in self.parts {
-            match *part {
-                Part::Plain(len) => {
-                    out.extend_from_slice(bytes.get(*at..*at + len)?);
-                    *at += len;
-                }
-                Part::List { count, item_bytes } => {
-                    let items = binary::count(bytes.get(*at..*at + count.size())?, count, self.endian)?;
-                    let len = items.checked_mul(item_bytes)?.checked_add(count.size() as u64)?;
-                    *at = at.checked_add(usize::try_from(len).ok()?)?;
-                }
-            }
-        }
-        Some(())
-    }
 }
 
 impl Pose {

@@ -1,12 +1,15 @@
 //! Rows as a stream of numbers: a line end is a blank like others, so that a row may take several lines, or share one.
 
 use super::ascii::parse;
-use super::lines::PIECE_BYTES;
 use crate::scan::source::Source;
-use crate::{Piece, ReadError};
+use crate::{Advice, Piece, ReadError};
 
 /// Bytes that are read at once, and the longest number.
 const WINDOW: u64 = 1 << 20;
+/// Bytes of a piece, which is held in memory while it is decoded.
+const PIECE_BYTES: u64 = 1 << 20;
+/// The longest row of points.
+const MAX_ROW: u64 = 1 << 20;
 
 /// What the numbers of a row are: one for each property, `true` where it says how many numbers follow it.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,6 +115,10 @@ impl Reader<'_> {
         let mut open = Piece { first_point: 0, points: 0, byte_offset: 0, byte_len: 0 };
         for row in 0..rows.count {
             let Some((start, end)) = self.row(&rows.shape)? else { break };
+            if end - start > MAX_ROW {
+                let what = format!("a row of {} bytes starts here, more than {MAX_ROW}", end - start);
+                return Err(ReadError::broken(self.source.path(), start, what).advise(Advice::Damaged));
+            }
             if open.byte_len >= PIECE_BYTES {
                 pieces.push(open.clone());
                 open = Piece { first_point: row, points: 0, byte_offset: 0, byte_len: 0 };
@@ -221,10 +228,18 @@ mod tests {
     }
 
     #[test]
+    fn a_row_whose_list_goes_on_and_on_is_refused() {
+        let text = [b"1 1 5\n3 900000".as_slice(), &b" 7".repeat(900_000), b"\n"].concat();
+        let error = index(&source(&text), 0, &[], &rows(&[false, true], 2), &[]).unwrap_err();
+        assert!(error.to_string().contains("a row of 1800008 bytes starts here"), "{error}");
+        assert_eq!(error.offset(), Some(6));
+    }
+
+    #[test]
     fn pieces_and_windows_end_between_rows() {
         let text = "123456 1234567\n12345678\n".repeat(1_000_000);
         let found = index(&source(text.as_bytes()), 0, &[], &rows(&[false; 3], 1_000_000), &[]).unwrap().unwrap();
-        assert_eq!((found.rows, found.pieces.len(), found.is_whole), (1_000_000, 3, true));
+        assert_eq!((found.rows, found.pieces.len(), found.is_whole), (1_000_000, 23, true));
         let mut next = (0, 0);
         for p in &found.pieces {
             assert_eq!((p.first_point, p.byte_offset, p.byte_len), (next.0, next.1, p.points * 24 - 1));

@@ -13,6 +13,8 @@ use crate::{Advice, Attribute, AttributeType, Piece, ReadError, Scan, ScanPart};
 
 /// Lines of a scan before its cells.
 const HEADER_LINES: usize = 10;
+/// Scans of a file, each of which is described in memory.
+const MAX_SCANS: usize = 100_000;
 /// The columns that all PTX files have, and colour.
 const COLUMNS: [&str; 7] = ["x", "y", "z", "i:float", "r", "g", "b"];
 
@@ -33,6 +35,10 @@ pub(super) fn open(source: Source) -> Result<Box<dyn Scan>, ReadError> {
     let mut grids = Grids::default();
     let mut at = 0;
     while let Some(start) = lines::first_filled(&source, at, 1)?.first().map(|(start, _)| *start) {
+        if grids.poses.len() == MAX_SCANS {
+            let what = format!("there are more than {MAX_SCANS} scans in it");
+            return Err(ReadError::unsupported(source.path(), what).advise("export it in several files"));
+        }
         at = grids.scan(&source, start)?;
     }
     let mut warnings = Vec::new();

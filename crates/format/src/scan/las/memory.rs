@@ -1,0 +1,37 @@
+//! How much memory decoding takes.
+
+use super::decode::{MAX_CHUNK_IN_MEMORY, READ_RECORDS};
+use super::file::LasScan;
+use super::pieces::Storage;
+use crate::scan::decode::{batch_bytes, batch_points, point_bytes};
+use crate::scan::source::READER_BUFFER;
+use crate::{Piece, Wanted};
+
+/// The models of a decompressor, but for those of extra bytes.
+const MODELS: u64 = 3 << 20;
+/// What is longer in a record than this may be extra bytes.
+const SHORTEST_RECORD: u64 = 20;
+/// The models of one extra byte.
+const EXTRA_BYTE_MODELS: u64 = 16 << 10;
+
+/// [`crate::Scan::decode_bytes`].
+pub(super) fn decode_bytes(scan: &LasScan, wanted: &Wanted) -> u64 {
+    let most = |of: fn(&Piece) -> u64| scan.plan.pieces.iter().map(of).max().unwrap_or(0);
+    let (points, bytes) = (most(|piece| piece.points), most(|piece| piece.byte_len));
+    let attributes = &scan.info.attributes;
+    let record_len = scan.record_len as u64;
+    let points = points.min(batch_points(scan.record_len.max(point_bytes(attributes, true))) as u64);
+    let batch = batch_bytes(attributes, true, wanted, points);
+    if scan.laszip.is_none() {
+        return batch + points.min(READ_RECORDS as u64) * record_len;
+    }
+    let compressed = match scan.plan.storage {
+        Storage::Records => 0,
+        // a chunk, and its layers
+        Storage::Layered => 2 * bytes,
+        Storage::Chunk if bytes <= MAX_CHUNK_IN_MEMORY => bytes,
+        Storage::Chunk | Storage::Stream { .. } => bytes.min(READER_BUFFER),
+    };
+    let extra = record_len.saturating_sub(SHORTEST_RECORD);
+    batch + compressed + points * record_len + MODELS + extra * EXTRA_BYTE_MODELS
+}
