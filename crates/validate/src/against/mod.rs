@@ -11,6 +11,7 @@ mod exact;
 mod meaning;
 mod measured;
 mod narrow;
+mod opened;
 pub(crate) mod rules;
 mod selection;
 mod shelf;

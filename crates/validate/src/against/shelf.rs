@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use pointmill_format::{AttributeType, OpenOptions, ReadError, open_scan};
 
+use super::opened::{Look, Opened};
 use super::rules::Rules;
-use super::sources::{Opened, Source};
 
 /// Scans that stay open: fewer than any system allows, and enough that threads which read one file after the other open
 /// each once.
@@ -51,19 +51,19 @@ impl Shelf {
     }
 }
 
-/// What is learned of a scan when it is opened first.
-pub(super) struct Look {
+/// What is kept of every scan, however many there are; they are open only while they are read.
+pub(crate) struct Source {
+    pub(super) path: PathBuf,
+    /// Parts that are decoded alone.
     pub(super) pieces: usize,
-    pub(super) points: u64,
-    /// What a thread takes to decode a piece of it, at most, bytes.
-    pub(super) decode_bytes: u64,
-    /// Positions may move to the lattice of the job.
-    pub(super) may_move: bool,
-    pub(super) declares_16_bit_colour: bool,
-    /// By attribute of the dataset, the type of the column that fills it.
-    pub(super) types: Vec<Option<AttributeType>>,
-    /// Columns that the dataset does not have.
-    pub(super) not_in_dataset: Vec<String>,
+    /// The file says that its colours have 16 bits.
+    pub(crate) declares_16_bit_colour: bool,
+}
+
+impl Source {
+    pub(super) fn new(path: &Path, pieces: usize, declares_16_bit_colour: bool) -> Self {
+        Self { path: path.to_path_buf(), pieces, declares_16_bit_colour }
+    }
 }
 
 /// What is learned of all scans.
