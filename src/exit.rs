@@ -6,9 +6,10 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use pointmill_converter::ConvertError;
-use pointmill_format::{Advice, ErrorKind, ReadError};
+use pointmill_format::{Advice, ErrorKind, ReadError, system_reason};
 
 use crate::flags;
+use crate::printable::{json_escaped, printable, printable_lines};
 
 /// Why the program ends without success.
 #[derive(Debug)]
@@ -61,28 +62,34 @@ impl Failure {
 
     /// Prints the line on standard error.
     pub(crate) fn print(&self) {
-        print_line(self.line());
+        // to be stopped is no error
+        let word = if matches!(self, Self::Interrupted(_)) { "pointmill" } else { "error" };
+        write_line(word, self.line());
     }
 
     /// The operating system refused; `doing` names the attempt ("writing the report").
     pub(crate) fn io(path: &Path, doing: &str, error: &io::Error) -> Self {
-        Self::Io(format!("{}: {doing}: {error}", path.display()))
+        Self::Io(format!("{}: {doing}: {}", path.display(), system_reason(error)))
     }
 }
 
-/// Prints one line on standard error. Line breaks inside it (a file name may hold them) become spaces.
+/// Prints a note on standard error: one line, whatever names it holds.
 pub(crate) fn print_line(line: &str) {
-    let line = line.replace(['\n', '\r'], " ");
-    // Nothing can be reported when standard error is closed.
-    let _ = writeln!(io::stderr().lock(), "pointmill: {line}");
+    write_line("pointmill", line);
 }
 
-/// Writes a result to standard output. A closed pipe (`| head`) is not an error.
+fn write_line(word: &str, line: &str) {
+    // Nothing can be reported when standard error is closed.
+    let _ = writeln!(io::stderr().lock(), "{word}: {}", printable(line));
+}
+
+/// Writes a result to standard output, with nothing in it that a terminal obeys. A closed pipe (`| head`) is not an
+/// error.
 pub(crate) fn emit(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(printable_lines(text).as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        Err(e) => Err(Failure::Io(format!("writing to standard output: {e}"))),
+        Err(e) => Err(Failure::Io(format!("writing to standard output: {}", system_reason(&e)))),
         Ok(()) => Ok(()),
     }
 }
@@ -90,7 +97,7 @@ pub(crate) fn emit(text: &str) -> Result<(), Failure> {
 /// Pretty JSON and a line break.
 pub(crate) fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Internal(format!("internal error: {e}")))?;
-    Ok(text + "\n")
+    Ok(json_escaped(&text).into_owned() + "\n")
 }
 
 impl From<ReadError> for Failure {
@@ -162,7 +169,7 @@ mod tests {
         let io_error = || io::Error::from(io::ErrorKind::StorageFull);
         let exists = || ConvertError::Output(OutputFault::Exists("x".into()));
         let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error() };
-        let why = MemoryNeed::OnePlace { points: 1 };
+        let why = MemoryNeed::Part("nodes");
         let table: [(Failure, u8); 9] = [
             (ConvertError::Internal("x".into()).into(), 1),
             (exists().into(), 2),

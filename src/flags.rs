@@ -1,6 +1,6 @@
 //! Where settings and advice of the libraries get the names of options: nothing below `src/` knows any.
 
-use pointmill_converter::{Advice, ConvertError, DropReason, PlanError, PlanFault, Setting, Warning};
+use pointmill_converter::{Advice, ConvertError, DropReason, MemoryNeed, PlanError, PlanFault, Setting, Warning};
 use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError, ScanWarning};
 
 /// The option that a setting comes from.
@@ -69,6 +69,9 @@ fn with_advice(what: String, advised: Option<&Advice>) -> String {
 pub(crate) fn error_line(error: &ConvertError) -> String {
     match error {
         ConvertError::Plan(error) => plan_line(error),
+        ConvertError::Memory { why: MemoryNeed::Threads { threads: 2.., .. }, .. } => {
+            with_advice(error.what(), error.advice().as_ref()) + ", or fewer --threads"
+        }
         other => with_advice(other.what(), other.advice().as_ref()),
     }
 }
@@ -91,6 +94,9 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
             .to_owned(),
         Some(ReadAdvice::NameColumns) => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
+        }
+        Some(ReadAdvice::DetectSeparator) => {
+            "name the one that the rows have, or leave out --separator to have it detected".to_owned()
         }
         Some(ReadAdvice::DecimalMark) => {
             "say whether commas are decimal marks: --decimal comma or --decimal point".to_owned()
@@ -139,7 +145,7 @@ mod tests {
         let memory = ConvertError::Memory {
             ceiling: 1 << 20,
             needed: 90 << 20,
-            why: pointmill_converter::MemoryNeed::OnePlace { points: 7 },
+            why: pointmill_converter::MemoryNeed::Part("nodes"),
         };
         assert!(error_line(&memory).ends_with("; pass --memory 91MiB or more"), "{}", error_line(&memory));
     }

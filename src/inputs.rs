@@ -3,48 +3,28 @@
 //! The file type is detected from the content, or from the extension if the content is not recognised. A file that was
 //! named must be a scan; other files in a folder or a glob are skipped and reported.
 
+mod found;
+mod identity;
 mod kind;
+mod search;
 
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+#[cfg(unix)]
 use std::ffi::OsStr;
-use std::fs;
+use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{OpenOptions, supported_scans};
+use pointmill_format::OpenOptions;
 
 use crate::args::InputArgs;
 use crate::exit::Failure;
-use crate::human::quantities::plural;
-use kind::{is_other, kind_by_ending, kind_in_folder};
+use crate::{scan_choice, text_choice};
+use search::Search;
 
-use crate::scan_choice;
-pub(crate) use kind::{Kind, kind};
+pub(crate) use found::Inputs;
 
-/// The scans to read, and notes about the search for them.
-#[derive(Debug, Default)]
-pub(crate) struct Inputs {
-    /// Sorted by path, each file once.
-    pub(crate) files: Vec<PathBuf>,
-    /// Files that a folder or a glob brought along and that are no scans, in order of path.
-    pub(crate) other_files: Vec<PathBuf>,
-    /// One line each.
-    pub(crate) notes: Vec<String>,
-}
-
-impl Inputs {
-    /// The notes, and a line for the other files: for commands that write no report.
-    pub(crate) fn all_notes(&self) -> impl Iterator<Item = String> {
-        let other = (!self.other_files.is_empty()).then(|| other_files(&self.other_files));
-        self.notes.iter().cloned().chain(other)
-    }
-}
-
-/// Says which files were skipped.
-fn other_files(files: &[PathBuf]) -> String {
-    pointmill_converter::Warning::OtherFiles { files: files.to_vec() }.to_string()
-}
+/// A list of inputs is smaller: millions of paths.
+const MAX_LIST_BYTES: u64 = 1 << 30;
 
 impl InputArgs {
     /// Facts about scans that their files do not state.
@@ -61,6 +41,7 @@ impl InputArgs {
         }
         let found = expand(&typed, &options)?;
         scan_choice::check(&found.files, &options)?;
+        text_choice::check(&found.files, &options)?;
         Ok(found)
     }
 }
@@ -71,161 +52,28 @@ pub(crate) fn expand(typed: &[PathBuf], options: &OpenOptions) -> Result<Inputs,
     if typed.is_empty() {
         return Err(Failure::Usage("no input: pass scans, folders or globs, or --files-from LIST".to_owned()));
     }
-    let mut search = Search { options: options.clone(), ..Search::default() };
+    let mut search = Search::new(options);
     for path in typed {
         search.add_typed(path)?;
     }
     search.finish(typed)
 }
 
-#[derive(Default)]
-struct Search {
-    /// By canonical path, so that a file counts once however it is spelt.
-    found: BTreeMap<PathBuf, PathBuf>,
-    repeated: Vec<PathBuf>,
-    no_scans: Vec<PathBuf>,
-    options: OpenOptions,
-}
-
-impl Search {
-    fn add_typed(&mut self, path: &Path) -> Result<(), Failure> {
-        match fs::metadata(path) {
-            Ok(meta) if meta.is_dir() => self.add_folder(path),
-            Ok(_) => self.add_named_file(path),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => self.add_glob(path),
-            Err(e) => Err(Failure::io(path, "reading the input", &e)),
-        }
-    }
-
-    /// A file that was named must be a scan.
-    fn add_named_file(&mut self, path: &Path) -> Result<(), Failure> {
-        let kind = kind(path).map_err(|e| Failure::io(path, "reading the input", &e))?;
-        if kind == Kind::NoScan || is_other(path, self.options.columns.is_some()).unwrap_or(false) {
-            // the readers report why, unless the named columns make it a text scan
-            pointmill_format::open_scan(path, &self.options)?;
-        }
-        self.add_scan(path);
-        Ok(())
-    }
-
-    /// A file that a folder or a glob brought along.
-    fn add_met_file(&mut self, path: &Path, kind: fn(&Path) -> io::Result<Kind>) {
-        // A file that cannot be opened but has the extension of a scan is kept: its reader reports why, and --unreadable
-        // decides.
-        let is_other = || is_other(path, self.options.columns.is_some()).unwrap_or(false);
-        match kind(path).unwrap_or_else(|_| kind_by_ending(path)) {
-            Kind::Scan if !is_other() => self.add_scan(path),
-            _ => self.no_scans.push(path.to_path_buf()),
-        }
-    }
-
-    fn add_folder(&mut self, folder: &Path) -> Result<(), Failure> {
-        for entry in walkdir::WalkDir::new(folder).follow_links(true).sort_by_file_name() {
-            match entry {
-                Ok(entry) if entry.file_type().is_dir() => {}
-                Ok(entry) => self.add_met_file(entry.path(), kind_in_folder),
-                Err(e) => match (e.path(), e.io_error()) {
-                    (Some(path), Some(error)) if error.kind() == io::ErrorKind::NotFound => {
-                        self.add_met_file(path, kind_in_folder);
-                    }
-                    (Some(path), Some(error)) if is_of_the_system(path, error) => {
-                        self.no_scans.push(path.to_path_buf());
-                    }
-                    (Some(path), Some(error)) => return Err(Failure::io(path, "searching the folder", error)),
-                    // A link that leads back to a folder above it: what is there is found anyway.
-                    _ => {}
-                },
-            }
-        }
-        Ok(())
-    }
-
-    fn add_glob(&mut self, path: &Path) -> Result<(), Failure> {
-        let pattern = path.to_str().filter(|p| p.contains(['*', '?', '[']));
-        let Some(pattern) = pattern else {
-            return Err(Failure::Usage(format!("{}: no such file or folder", path.display())));
-        };
-        let matches = glob::glob(pattern).map_err(|e| Failure::Usage(format!("{pattern}: {e}")))?;
-        let mut any = false;
-        for found in matches {
-            let found = found.map_err(|e| Failure::io(e.path(), "searching the folder", e.error()))?;
-            any = true;
-            if found.is_dir() { self.add_folder(&found)? } else { self.add_met_file(&found, kind) }
-        }
-        if any { Ok(()) } else { Err(Failure::Usage(format!("{pattern}: no file matches"))) }
-    }
-
-    fn add_scan(&mut self, path: &Path) {
-        match self.found.entry(identity(path)) {
-            Entry::Vacant(entry) => drop(entry.insert(path.to_path_buf())),
-            Entry::Occupied(mut kept) => {
-                self.repeated.push(path.to_path_buf());
-                // The least spelling stands for the file, so that the order of typing does not show.
-                if path < kept.get() {
-                    kept.insert(path.to_path_buf());
-                }
-            }
-        }
-    }
-
-    fn finish(self, typed: &[PathBuf]) -> Result<Inputs, Failure> {
-        let mut notes = Vec::new();
-        let mut note = |count: usize, noun: &str, what: &str, examples: Vec<String>| {
-            if count > 0 {
-                let more = if count > examples.len() { ", …" } else { "" };
-                notes.push(format!("{} {what} ({}{more})", plural(count as u64, noun), examples.join(", ")));
-            }
-        };
-        let name = |path: &PathBuf| path.display().to_string();
-        let examples = |paths: &[PathBuf]| paths.iter().take(3).map(name).collect();
-        note(self.repeated.len(), "input", "named more than once, read once", examples(&self.repeated));
-
-        let mut files: Vec<PathBuf> = self.found.into_values().collect();
-        files.sort();
-        if files.is_empty() {
-            let places: Vec<String> = typed.iter().take(3).map(name).collect();
-            let others = self.no_scans.first().map(|_| format!("; {}", other_files(&self.no_scans)));
-            let skipped = others.unwrap_or_default();
-            return Err(Failure::Input(format!(
-                "{}: no scan found (supported: {}){skipped}",
-                places.join(", "),
-                supported_scans()
-            )));
-        }
-        let mut other_files = self.no_scans;
-        other_files.sort();
-        other_files.dedup();
-        Ok(Inputs { files, other_files, notes })
-    }
-}
-
-/// True for a folder that the operating system keeps on a disk and does not open.
-fn is_of_the_system(path: &Path, error: &io::Error) -> bool {
-    let names = ["lost+found", "System Volume Information", "$RECYCLE.BIN"];
-    error.kind() == io::ErrorKind::PermissionDenied
-        && path.file_name().is_some_and(|name| names.iter().any(|system| name == *system))
-}
-
-/// One path for all spellings of a file; for a broken link its own place in its folder's.
-fn identity(path: &Path) -> PathBuf {
-    let in_folder = || Some(fs::canonicalize(path.parent()?).ok()?.join(path.file_name()?));
-    fs::canonicalize(path).ok().or_else(in_folder).unwrap_or_else(|| path.to_path_buf())
-}
-
 /// The paths in `list`, one per line; `-` is standard input.
 fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut bytes = Vec::new();
     let read = if list.as_os_str() == "-" {
-        io::stdin().lock().read_to_end(&mut bytes).map(|_| ())
+        io::stdin().lock().take(MAX_LIST_BYTES).read_to_end(&mut bytes)
     } else {
-        fs::read(list).map(|b| bytes = b)
+        File::open(list).and_then(|file| file.take(MAX_LIST_BYTES).read_to_end(&mut bytes))
     };
+    let refuse = |what: &str| Err(Failure::Usage(format!("{}: {what}", list.display())));
     match read {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            return Err(Failure::Usage(format!("{}: no such list", list.display())));
-        }
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return refuse("no such list"),
         Err(e) => return Err(Failure::io(list, "reading the list of inputs", &e)),
-        Ok(()) => {}
+        Ok(_) if bytes.len() as u64 == MAX_LIST_BYTES => return refuse("a list of inputs is not as long as that"),
+        Ok(_) if bytes.contains(&0) => return refuse("no list of inputs: it holds NUL bytes; write one path per line"),
+        Ok(_) => {}
     }
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
     let lines = bytes.split(|b| *b == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line));
@@ -246,6 +94,8 @@ fn path_from_bytes(bytes: &[u8]) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     /// A folder with three scans (one of them by ending alone) and other files, some of which hold lines of numbers.
@@ -377,12 +227,11 @@ mod tests {
         assert_eq!(names(&args.expand().unwrap()), ["b.dat"]);
     }
 
-    #[cfg(unix)]
     #[test]
-    fn a_broken_link_called_a_scan_is_not_lost() {
+    fn what_is_no_list_is_refused() {
         let dir = folder();
-        std::os::unix::fs::symlink("nowhere", dir.path().join("süd/z.las")).unwrap();
-        std::os::unix::fs::symlink(".", dir.path().join("süd/loop")).unwrap();
-        assert_eq!(names(&find(&[dir.path().join("süd")]).unwrap()), ["a.LAZ", "z.las"]);
+        fs::write(dir.path().join("list"), "b.dat\0c.ply\0").unwrap();
+        let code = |name: &str| read_list(&dir.path().join(name)).unwrap_err().code();
+        assert_eq!([code("list"), code("nowhere"), code("süd")], [2, 2, 5]);
     }
 }

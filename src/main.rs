@@ -3,28 +3,33 @@
 //! Results go to standard output, everything else to standard error; a failure is one line there. `README.md` has the
 //! table of exit codes, `exit.rs` is where they come from.
 
+mod allocator;
 mod args;
 mod commands;
+mod crs_choice;
 mod datasets;
 mod exit;
 mod flags;
 mod human;
 mod inputs;
 mod interrupt;
+mod printable;
 mod scan_choice;
+mod text_choice;
 
 use std::process::ExitCode;
 
-use args::{Args, Command};
+use args::{Args, Command, mistake};
 use clap::Parser as _;
+use clap::error::ErrorKind;
 use commands::{convert, extract, info, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {
+    allocator::give_back_early();
     exit::remember_panics();
     interrupt::watch();
-    let args = Args::parse(); // a usage error ends the process here, with exit code 2
-    let result = std::panic::catch_unwind(|| run(&args)).unwrap_or_else(|_| Err(exit::last_panic()));
+    let result = std::panic::catch_unwind(|| run(&args()?)).unwrap_or_else(|_| Err(exit::last_panic()));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -32,6 +37,17 @@ fn main() -> ExitCode {
             ExitCode::from(failure.code())
         }
     }
+}
+
+/// The command line; help and version are printed here, and end the process.
+fn args() -> Result<Args, Failure> {
+    let typed: Vec<_> = std::env::args_os().collect();
+    Args::try_parse_from(&typed).map_err(|error| {
+        if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+            error.exit();
+        }
+        Failure::Usage(mistake::line(&error, &typed))
+    })
 }
 
 fn run(args: &Args) -> Result<(), Failure> {

@@ -60,6 +60,27 @@ pub(crate) struct ReadingArgs {
 }
 
 impl ReadingArgs {
+    /// Where no scan is read, an option about reading scans is a mistake.
+    pub(crate) fn refuse_without_scans(&self) -> Result<(), Failure> {
+        let placing = &self.placing;
+        let given = [
+            ("--columns", self.columns.is_some()),
+            ("--separator", self.separator.is_some()),
+            ("--decimal", self.decimal != DecimalArg::Auto),
+            ("--scan", !self.scans.is_empty()),
+            ("--row-column", self.row_column),
+            ("--crs", placing.crs.is_some()),
+            ("--units", placing.units.is_some()),
+            ("--axes", placing.axes.is_some()),
+            ("--transform", placing.transform.is_some()),
+            ("--reproject", placing.reproject.is_some()),
+        ];
+        match given.iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => Err(Failure::Usage(format!("{option} requires --against"))),
+            None => Ok(()),
+        }
+    }
+
     /// The options for the readers; invalid columns are reported before any file is opened.
     pub(crate) fn options(&self) -> Result<OpenOptions, Failure> {
         if let Some(columns) = &self.columns {

@@ -4,13 +4,13 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use pointmill_converter::{BatchesSettings, BintreeSettings};
+use pointmill_converter::{BatchesSettings, BintreeSettings, Potree2Settings};
 use pointmill_format::Aabb;
 
 use super::common::{InputArgs, TalkArgs};
 use super::values::{
-    Attributes, Planes, Scale, ZSTD_LEVEL, or_auto, parse_attributes, parse_bounds, parse_bytes, parse_compress,
-    parse_planes, parse_scale,
+    Attributes, Planes, Scale, ZSTD_LEVEL, or_auto, parse_attributes, parse_bounds, parse_bytes, parse_class,
+    parse_compress, parse_planes, parse_scale, parse_threads, whole,
 };
 
 /// The Brotli quality for node payloads; above it the time grows several times over for a few per cent.
@@ -36,30 +36,32 @@ pub(crate) struct ConvertArgs {
     /// Name of the point cloud in the metadata [default: name of the first input]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     pub(crate) name: Option<String>,
-    /// Encoding of node payloads
-    #[arg(long, value_enum, default_value = "default", help_heading = "Output")]
-    pub(crate) encoding: EncodingArg,
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=11), help_heading = "Output",
+    /// Encoding of node payloads [default: default]
+    #[arg(long, value_enum, help_heading = "Output")]
+    pub(crate) encoding: Option<EncodingArg>,
+    #[arg(long, value_name = "N", value_parser = whole::<u8>(0..=11), allow_negative_numbers = true, help_heading = "Output",
           help = format!("Brotli quality, 0 (fast) to 11 (small), for --encoding brotli [default: {BROTLI_QUALITY}]"))]
     pub(crate) brotli_quality: Option<u8>,
     /// How inner nodes select their points: poisson (maximal Poisson-disk sample), grid (the point nearest to the
-    /// centre of each cell of a 128³ grid), or random (one pseudo-random point per cell)
-    #[arg(long, value_enum, default_value = "poisson", help_heading = "Output")]
-    pub(crate) sampling: SamplingArg,
-    #[arg(long, value_name = "N", help_heading = "Output",
+    /// centre of each cell of a 128³ grid), or random (one pseudo-random point per cell) [default: poisson]
+    #[arg(long, value_enum, help_heading = "Output")]
+    pub(crate) sampling: Option<SamplingArg>,
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true,
+          help_heading = "Output",
           help = format!("Seed for --sampling random; the same seed gives the same bytes [default: {SEED}]"))]
     pub(crate) seed: Option<u64>,
-    /// Maximum points per leaf node
-    #[arg(long, value_name = "POINTS", default_value = "10000",
-          value_parser = clap::value_parser!(u32).range(1..=1_000_000), help_heading = "Output")]
-    pub(crate) leaf_capacity: u32,
+    #[arg(long, value_name = "POINTS", value_parser = whole::<u32>(1..=1_000_000), allow_negative_numbers = true,
+          help_heading = "Output",
+          help = format!("Maximum points per leaf node [default: {}]", Potree2Settings::default().leaf_capacity))]
+    pub(crate) leaf_capacity: Option<u32>,
     #[command(flatten)]
     pub(crate) bintree: BintreeArgs,
     #[command(flatten)]
     pub(crate) batches: BatchesArgs,
     /// Coordinate step in units of the CRS; auto uses the step of the scans, so that no coordinate changes, or, for
     /// scans without a step, one chosen from their extent and precision
-    #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale, help_heading = "Output")]
+    #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale,
+          allow_negative_numbers = true, help_heading = "Output")]
     pub(crate) scale: Scale,
 
     /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
@@ -75,13 +77,14 @@ pub(crate) struct ConvertArgs {
         long,
         value_name = "LIST",
         value_delimiter = ',',
+        value_parser = parse_class,
         allow_negative_numbers = true,
         help_heading = "Selecting data"
     )]
     pub(crate) class: Option<Vec<i64>>,
     /// Keeps every Nth point, by index in the file
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..),
-          help_heading = "Selecting data")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole::<u64>(1..=u64::MAX),
+          allow_negative_numbers = true, help_heading = "Selecting data")]
     pub(crate) every: u64,
     /// What to do with points whose position and attributes all repeat those of another point
     #[arg(long, value_enum, default_value = "keep", help_heading = "Selecting data")]
@@ -104,10 +107,12 @@ pub(crate) struct ConvertArgs {
     pub(crate) rgb_depth: RgbDepthArg,
 
     /// Memory limit of the whole process, for example 2GiB [default: 60 % of the available memory]
-    #[arg(long, value_name = "SIZE", value_parser = parse_bytes, help_heading = "Resources")]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes, allow_negative_numbers = true,
+          help_heading = "Resources")]
     pub(crate) memory: Option<u64>,
     /// Number of worker threads [default: all cores]
-    #[arg(long, value_name = "N", help_heading = "Resources")]
+    #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true,
+          help_heading = "Resources")]
     pub(crate) threads: Option<NonZero<u16>>,
     /// Folder for temporary files, used when the points do not fit in memory [default: beside OUT]
     #[arg(long, value_name = "DIR", help_heading = "Resources")]
@@ -129,8 +134,8 @@ pub(crate) struct ConvertArgs {
 /// Settings of a mean-split binary tree.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BintreeArgs {
-    #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(1..),
-          help_heading = "Output: bintree",
+    #[arg(long, value_name = "POINTS", value_parser = whole::<u32>(1..=u64::from(u32::MAX)),
+          allow_negative_numbers = true, help_heading = "Output: bintree",
           help = format!("Maximum points per leaf [default: {}]", BintreeSettings::default().capacity))]
     pub(crate) capacity: Option<u32>,
     #[arg(long, value_enum, value_name = "RULE", help_heading = "Output: bintree",
@@ -146,7 +151,8 @@ pub(crate) struct BintreeArgs {
 /// Settings of quantised batches.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BatchesArgs {
-    #[arg(long, value_name = "STEP|auto", value_parser = parse_scale, help_heading = "Output: batches",
+    #[arg(long, value_name = "STEP|auto", value_parser = parse_scale, allow_negative_numbers = true,
+          help_heading = "Output: batches",
           help = format!("Cell size of the coarsest level of detail, in units of the CRS; auto derives it from extent \
                           and density [default: {}]", or_auto(BatchesSettings::default().lod_cell)))]
     pub(crate) lod_cell: Option<Scale>,
@@ -189,6 +195,18 @@ pub(crate) enum TargetArg {
     Bintree,
     /// Morton-sorted quantised batches with continuous levels of detail, for compute-shader renderers
     Batches,
+}
+
+impl TargetArg {
+    /// The value of `--to`.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Potree2 => "potree2",
+            Self::Potree1 => "potree1",
+            Self::Bintree => "bintree",
+            Self::Batches => "batches",
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

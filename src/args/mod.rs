@@ -2,6 +2,7 @@
 
 mod common;
 mod convert;
+pub(crate) mod mistake;
 mod placing;
 mod values;
 
@@ -58,7 +59,7 @@ pub(crate) struct ValidateArgs {
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     pub(crate) memory: Option<u64>,
     /// Number of worker threads [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<NonZero<u16>>,
     /// Prints one JSON object on standard output
     #[arg(long)]

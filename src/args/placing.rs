@@ -2,16 +2,21 @@
 
 use std::fs::File;
 use std::io::Read as _;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use clap::{Args as ClapArgs, ValueEnum};
 use pointmill_crs::{CrsError, Placing, Units};
-use pointmill_format::Affine;
+use pointmill_format::{Affine, Lattice};
 
+use crate::crs_choice;
 use crate::exit::Failure;
 
 /// Numbers of a matrix.
 const NUMBERS: usize = 16;
+
+/// The largest factor of a row: with less or more, no step of a scan stays one that coordinates can have.
+const FACTORS: RangeInclusive<f64> = Lattice::FINEST_STEP..=1e15;
 
 /// A file of a matrix is smaller.
 const MAX_MATRIX_BYTES: u64 = 64 << 10;
@@ -64,6 +69,9 @@ pub(crate) enum AxesArg {
 impl PlacingArgs {
     /// What to do with the points of every scan; `None`: nothing.
     pub(super) fn placing(&self) -> Result<Option<Placing>, Failure> {
+        for (option, text) in [("--crs", &self.crs), ("--reproject", &self.reproject)] {
+            text.iter().try_for_each(|text| crs_choice::check(option, text))?;
+        }
         let mut placing = Placing::default();
         if let Some(units) = self.units {
             placing = placing.with_units(units.units());
@@ -130,7 +138,16 @@ fn matrix(text: &str) -> Result<Affine, Failure> {
     let Ok(rows) = <[f64; NUMBERS]>::try_from(found.as_slice()) else {
         return Err(refuse(format!("{} numbers; a 4 × 4 matrix has {NUMBERS}", found.len())));
     };
-    Affine::from_matrix(&rows).map_err(|fault| refuse(fault.to_string()))
+    let map = Affine::from_matrix(&rows).map_err(|fault| refuse(fault.to_string()))?;
+    for row in rows[..12].chunks_exact(4) {
+        let largest = row[..3].iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
+        if !FACTORS.contains(&largest) || !Lattice::is_sound_offset(row[3]) {
+            let short = |v: &f64| if v.abs() < 1e15 { v.to_string() } else { format!("{v:e}") };
+            let shown = row.iter().map(short).collect::<Vec<_>>().join(" ");
+            return Err(refuse(format!("the row {shown} places no point where coordinates can be")));
+        }
+    }
+    Ok(map)
 }
 
 fn numbers_of_file(path: &Path) -> Result<Vec<f64>, Failure> {
@@ -182,6 +199,10 @@ mod tests {
             ("0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 1", "singular"),
             ("1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1", "row by row"),
             ("1 0 0 9 0 1 0 0 0 0 1 0 5 6 7 1", "the last row is 5 6 7 1"),
+            ("1e300 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", "the row 1e300 0 0 0 places no point"),
+            ("5e-310 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", "places no point"),
+            ("1 0 0 1e31 0 1 0 0 0 0 1 0 0 0 0 1", "places no point"),
+            ("1e-20 0 0 0 0 1e-20 0 0 0 0 1e-20 0 0 0 0 1", "places no point"),
             ("1 0 0 nan 0 1 0 0 0 0 1 0 0 0 0 1", "not finite"),
             ("no-such-file.txt", "neither 16 numbers nor a file"),
         ];

@@ -1,17 +1,52 @@
 //! Values of options: parsed here and checked against each other in the commands.
 
-use pointmill_format::Aabb;
+use std::num::NonZero;
+use std::ops::RangeInclusive;
 
+use pointmill_format::{Aabb, Lattice};
+
+/// More than the cores of any machine with one memory; a thread needs tens of MiB.
+const MAX_THREADS: u64 = 1024;
+
+/// A whole number within a range, written with digits alone.
+pub(super) fn whole<T: TryFrom<u64>>(
+    range: RangeInclusive<u64>,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync {
+    move |text| {
+        let number = text.parse::<u64>().ok().filter(|n| range.contains(n) && !text.starts_with('+'));
+        number.and_then(|n| T::try_from(n).ok()).ok_or_else(|| match (range.start(), range.end()) {
+            (least, &u64::MAX) => format!("expected a whole number from {least} on"),
+            (least, most) => format!("expected a whole number from {least} to {most}"),
+        })
+    }
+}
+
+/// A number of threads.
+pub(super) fn parse_threads(text: &str) -> Result<NonZero<u16>, String> {
+    let threads: u16 = whole(1..=MAX_THREADS)(text)?;
+    NonZero::new(threads).ok_or_else(String::new) // the range begins at 1
+}
+
+/// A class; scans of some kinds have negative ones.
+pub(super) fn parse_class(text: &str) -> Result<i64, String> {
+    text.trim().parse().map_err(|_| "expected whole numbers separated by commas, such as 2,6".to_owned())
+}
+
+/// A character that may stand between two numbers.
 pub(super) fn parse_separator(text: &str) -> Result<char, String> {
-    match text {
-        "tab" | "\\t" => Ok('\t'),
-        "space" | "blank" => Ok(' '),
-        "comma" => Ok(','),
-        "semicolon" => Ok(';'),
-        _ => {
-            let mut chars = text.chars();
-            chars.next().filter(|_| chars.next().is_none()).ok_or_else(|| "expected one character".to_owned())
+    let advice = || Err("expected one character, or tab, space, comma, semicolon".to_owned());
+    let mut chars = text.chars();
+    match (text, chars.next(), chars.next()) {
+        ("tab" | "\\t", ..) => Ok('\t'),
+        ("space" | "blank", ..) => Ok(' '),
+        ("comma", ..) => Ok(','),
+        ("semicolon", ..) => Ok(';'),
+        (_, Some(c), None) if c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.') => {
+            Err("this can be a part of a number and separates none".to_owned())
         }
+        (_, Some(c @ ('\t' | ' '..='~')), None) => Ok(c),
+        (_, Some(_), None) => Err("expected a character of ASCII".to_owned()),
+        _ => advice(),
     }
 }
 
@@ -35,9 +70,7 @@ pub(super) const ZSTD_LEVEL: i32 = 3;
 pub(super) fn parse_compress(text: &str) -> Result<i32, String> {
     match text.split_once(':').unwrap_or((text, "")) {
         ("zstd", "") => Ok(ZSTD_LEVEL),
-        ("zstd", level) => {
-            level.parse().ok().filter(|l| (1..=19).contains(l)).ok_or("expected a level from 1 to 19".to_owned())
-        }
+        ("zstd", level) => whole(1..=19)(level).map_err(|_| "expected a level from 1 to 19, as in zstd:3".to_owned()),
         _ => Err("expected zstd or zstd:LEVEL".to_owned()),
     }
 }
@@ -49,7 +82,12 @@ pub(crate) struct Scale(pub(crate) Option<f64>);
 pub(super) fn parse_scale(text: &str) -> Result<Scale, String> {
     match (text, text.parse::<f64>()) {
         ("auto", _) => Ok(Scale(None)),
-        (_, Ok(step)) if step.is_finite() && step > 0.0 => Ok(Scale(Some(step))),
+        (_, Ok(step)) if Lattice::is_sound_step(step) => Ok(Scale(Some(step))),
+        (_, Ok(step)) if step.is_finite() && step > 0.0 => Err(format!(
+            "no coordinate has such a step; expected {:e} to {:e}, or auto",
+            Lattice::FINEST_STEP,
+            Lattice::COARSEST_STEP
+        )),
         _ => Err("expected a number above 0, for example 0.001, or auto".to_owned()),
     }
 }
@@ -72,7 +110,8 @@ pub(super) fn parse_attributes(text: &str) -> Result<Attributes, String> {
     match text {
         "all" => Ok(Attributes::All),
         "scene" => Ok(Attributes::Scene),
-        _ if names.iter().any(String::is_empty) => Err("an attribute name is empty".to_owned()),
+        "" => Err("expected all, scene, or names such as intensity,rgb".to_owned()),
+        _ if names.iter().any(String::is_empty) => Err("an attribute has no name between its commas".to_owned()),
         _ => Ok(Attributes::List(names)),
     }
 }
@@ -80,7 +119,7 @@ pub(super) fn parse_attributes(text: &str) -> Result<Attributes, String> {
 /// Parses `1GiB`, `512MB`, `1.5g`, `4096`: bytes. `K`, `M`, `G`, `T` alone and with `iB` are powers of 1024, with `B`
 /// powers of 1000.
 pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
-    let advice = || format!("`{text}` is not a size; use a form like 2GiB, 512MiB or 1500MB");
+    let advice = || "expected a size such as 2GiB, 512MiB or 1500MB".to_owned();
     let text = text.trim();
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
     let number: f64 = text[..digits].parse().map_err(|_| advice())?;
@@ -104,7 +143,7 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
 
 /// Parses `xmin,ymin,zmin..xmax,ymax,zmax`, world coordinates.
 pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
-    let advice = || format!("`{text}` is not a box; use the form xmin,ymin,zmin..xmax,ymax,zmax");
+    let advice = || "expected two corners, xmin,ymin,zmin..xmax,ymax,zmax".to_owned();
     let (min, max) = text.split_once("..").ok_or_else(advice)?;
     let corner = |text: &str| {
         let numbers: Option<Vec<f64>> =
@@ -113,7 +152,7 @@ pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
     };
     let bounds = Aabb { min: corner(min).ok_or_else(advice)?, max: corner(max).ok_or_else(advice)? };
     if bounds.is_empty() {
-        return Err(format!("`{text}` is empty: a minimum is above its maximum"));
+        return Err("the box is empty: a minimum is above its maximum".to_owned());
     }
     Ok(bounds)
 }
@@ -121,6 +160,38 @@ pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_digits_within_a_range() {
+        assert_eq!(
+            (whole::<u8>(0..=11)("11"), whole::<u64>(0..=u64::MAX)("18446744073709551615")),
+            (Ok(11), Ok(u64::MAX))
+        );
+        for text in ["", "x", "1.5", "+1", "-1", "0", "1025", "99999999999999999999999", "1_000", " 1"] {
+            assert_eq!(parse_threads(text), Err("expected a whole number from 1 to 1024".to_owned()), "{text}");
+        }
+        assert_eq!(parse_threads("1024").map(u16::from), Ok(1024));
+        assert_eq!((parse_class("-1"), parse_class(" 6")), (Ok(-1), Ok(6)));
+        assert!(["", "x", "2.5", "99999999999999999999"].iter().all(|text| parse_class(text).is_err()));
+    }
+
+    #[test]
+    fn separators_are_no_part_of_a_number() {
+        let table = [("tab", '\t'), ("\\t", '\t'), ("space", ' '), (";", ';'), ("|", '|'), ("/", '/')];
+        assert!(table.iter().all(|(text, c)| parse_separator(text) == Ok(*c)));
+        for text in ["", "ab", "5", "-", ".", "e", "→", "é", "\n", "\u{1b}"] {
+            assert!(parse_separator(text).is_err(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn steps_are_lengths_that_coordinates_can_have() {
+        let step = |text: &str| parse_scale(text).map(|s| s.0);
+        assert_eq!((step("auto"), step("0.001"), step("1e-15")), (Ok(None), Ok(Some(0.001)), Ok(Some(1e-15))));
+        for text in ["0", "-1", "nan", "inf", "5e-310", "1e-300", "1e300", "x", ""] {
+            assert!(step(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn sizes_take_binary_and_decimal_units() {

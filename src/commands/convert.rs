@@ -22,6 +22,11 @@ use crate::interrupt::stop_flag;
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let targets = targets(args)?;
     let inputs = args.inputs.expand()?;
+    if args.unreadable == FaultArg::Fail
+        && let Some(failure) = inputs.unread_failure("; pass --unreadable skip to convert the rest")
+    {
+        return Err(failure);
+    }
     if !args.talk.quiet {
         inputs.notes.iter().for_each(|note| print_line(note));
     }
@@ -53,10 +58,10 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
 
 /// The formats with their settings; an option of a format that was not requested is a usage error.
 fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
-    if args.seed.is_some() && args.sampling != SamplingArg::Random {
+    if args.seed.is_some() && args.sampling != Some(SamplingArg::Random) {
         return Err(Failure::Usage("--seed requires --sampling random".to_owned()));
     }
-    if args.brotli_quality.is_some() && args.encoding != EncodingArg::Brotli {
+    if args.brotli_quality.is_some() && args.encoding != Some(EncodingArg::Brotli) {
         return Err(Failure::Usage("--brotli-quality requires --encoding brotli".to_owned()));
     }
     let mut targets = Vec::new();
@@ -75,6 +80,9 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
     }
     let (tree, batches) = (&args.bintree, &args.batches);
     let given = [
+        ("--sampling", TargetArg::Potree2, args.sampling.is_some()),
+        ("--encoding", TargetArg::Potree2, args.encoding.is_some()),
+        ("--leaf-capacity", TargetArg::Potree2, args.leaf_capacity.is_some()),
         ("--capacity", TargetArg::Bintree, tree.capacity.is_some()),
         ("--split", TargetArg::Bintree, tree.split.is_some()),
         ("--layout", TargetArg::Bintree, tree.layout.is_some()),
@@ -84,22 +92,25 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
         ("--no-originals", TargetArg::Batches, batches.no_originals),
     ];
     if let Some((option, to, _)) = given.iter().find(|(_, to, given)| *given && !args.to.contains(to)) {
-        return Err(Failure::Usage(format!("{option} requires --to {}", format!("{to:?}").to_lowercase())));
+        return Err(Failure::Usage(format!("{option} requires --to {}", to.name())));
     }
     Ok(targets)
 }
 
 fn potree2_settings(args: &ConvertArgs) -> Potree2Settings {
-    let sampling = match args.sampling {
-        SamplingArg::Random => Sampling::Random { seed: args.seed.unwrap_or(SEED) },
-        SamplingArg::Poisson => Sampling::Poisson,
-        SamplingArg::Grid => Sampling::Grid,
-    };
-    let encoding = match args.encoding {
-        EncodingArg::Brotli => Encoding::Brotli { quality: args.brotli_quality.unwrap_or(BROTLI_QUALITY) },
-        EncodingArg::Default => Encoding::Default,
-    };
-    Potree2Settings { sampling, encoding, leaf_capacity: args.leaf_capacity }
+    let default = Potree2Settings::default();
+    Potree2Settings {
+        sampling: args.sampling.map_or(default.sampling, |s| match s {
+            SamplingArg::Random => Sampling::Random { seed: args.seed.unwrap_or(SEED) },
+            SamplingArg::Poisson => Sampling::Poisson,
+            SamplingArg::Grid => Sampling::Grid,
+        }),
+        encoding: args.encoding.map_or(default.encoding, |e| match e {
+            EncodingArg::Brotli => Encoding::Brotli { quality: args.brotli_quality.unwrap_or(BROTLI_QUALITY) },
+            EncodingArg::Default => Encoding::Default,
+        }),
+        leaf_capacity: args.leaf_capacity.unwrap_or(default.leaf_capacity),
+    }
 }
 
 fn bintree_settings(args: &BintreeArgs) -> BintreeSettings {
@@ -132,6 +143,7 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_from(&args.inputs.inputs, &inputs.files));
     let mut plan = Plan::new(inputs.files, args.output.clone());
     plan.other_files = inputs.other_files;
+    plan.skipped_inputs = inputs.unread.into_iter().map(|unread| (unread.path, unread.why)).collect();
     plan.open = args.inputs.options()?;
     plan.name = name;
     plan.attributes = match &args.attributes {

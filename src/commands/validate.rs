@@ -11,10 +11,10 @@ use crate::args::ValidateArgs;
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::progress::Progress;
 use crate::human::quantities::plural;
-use crate::human::text::printable;
 use crate::human::validation;
 use crate::inputs;
-use crate::scan_choice;
+use crate::printable::printable;
+use crate::{scan_choice, text_choice};
 
 /// A folder with the outputs of one conversion to several formats is validated one after the other, and held against its
 /// report; all are reported, and the first failure gives the exit code.
@@ -30,6 +30,9 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<(), Failure> {
 
 fn checked(args: &ValidateArgs, objects: &mut Objects) -> Result<(), Failure> {
     args.reading.placing.refuse_idle_crs()?;
+    if args.against.is_empty() {
+        args.reading.refuse_without_scans()?;
+    }
     let folder = &args.dataset;
     let several = match locate(folder) {
         Ok(_) => None,
@@ -102,7 +105,13 @@ fn several_verdict(folder: &Path, several: &Several, args: &ValidateArgs) -> Res
         return Ok(Ok(()));
     }
     if !args.json {
-        emit(&several.problems.iter().map(|problem| printable(&problem.to_string()) + "\n").collect::<String>())?;
+        emit(
+            &several
+                .problems
+                .iter()
+                .map(|problem| printable(&problem.to_string()).into_owned() + "\n")
+                .collect::<String>(),
+        )?;
     }
     let names: Vec<&str> = several.problems.iter().map(|problem| problem.subject.as_ref()).collect();
     let line = format!("{}: report.json names other outputs than are there: {}", folder.display(), names.join(", "));
@@ -120,8 +129,9 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(Outcome, Result<(), Failu
     if !args.against.is_empty() {
         let found = inputs::expand(&args.against, &options.open)?;
         scan_choice::check(&found.files, &options.open)?;
+        text_choice::check(&found.files, &options.open)?;
         if !args.talk.quiet {
-            found.all_notes().for_each(|note| print_line(&note));
+            found.all_notes().chain(found.unread_notes()).for_each(|note| print_line(&note));
         }
         options.against = found.files;
     }

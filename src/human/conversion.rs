@@ -1,8 +1,13 @@
 //! Reports of runs and estimates as text. No figure is computed here.
 
+use std::fs;
+use std::path::Path;
+
 use pointmill_converter::{DropReason, Estimate, OutputReport, Plan, Report};
+use pointmill_format::DatasetKind;
 use serde_json::Value;
 
+use crate::datasets;
 use crate::flags;
 
 use super::accuracy;
@@ -116,15 +121,34 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
     t.row("cube side", number(estimate.grid.cube_side));
     t.row("attributes", estimate.attributes.join(", "));
     t.row("bytes/point", estimate.bytes_per_point.to_string());
-    t.row("memory", format!("{}, limit {}", bytes(estimate.memory_bytes), bytes(plan.memory_bytes)));
+    let memory = format!(
+        "{}, limit {}, at least {} needed",
+        bytes(estimate.memory_bytes),
+        bytes(plan.memory_bytes),
+        bytes(estimate.least_memory_bytes)
+    );
+    t.row("memory", memory);
     t.row("temporary", bytes(estimate.temp_bytes));
     t.row("output", format!("{} in {}", bytes(estimate.output_bytes), plan.output.display()));
-    if plan.output.exists() {
-        let advice = if plan.overwrite { "will be replaced" } else { "requires --overwrite" };
-        t.row("exists", advice);
+    if let Some(standing) = standing(&plan.output, plan.overwrite) {
+        t.row("exists", standing);
     }
     estimate.warnings.iter().for_each(|w| t.row("warning", flags::warning_line(w)));
     t.0
+}
+
+/// What becomes of an output that is there already; `None`: nothing is there, or an empty folder.
+fn standing(output: &Path, overwrite: bool) -> Option<&'static str> {
+    let is_empty = || fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none());
+    if fs::symlink_metadata(output).is_err() || is_empty() {
+        return None;
+    }
+    let is_dataset = DatasetKind::detect(output).is_some() || !datasets::inside(output).is_empty();
+    Some(match (is_dataset, overwrite) {
+        (false, _) => "it is no dataset and is not replaced; choose another output",
+        (true, true) => "it will be replaced",
+        (true, false) => "requires --overwrite",
+    })
 }
 
 /// Points read that are not in the dataset.

@@ -13,6 +13,7 @@ use super::quantities::{count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
+use crate::printable::json_escaped;
 
 /// Interval of JSON lines; one per batch would be thousands.
 const JSON_INTERVAL: Duration = Duration::from_millis(500);
@@ -188,7 +189,7 @@ impl Events for Progress {
 
 fn write_line(object: &serde_json::Value) {
     // Nothing can be reported when standard error is closed.
-    let _ = writeln!(io::stderr().lock(), "{object}");
+    let _ = writeln!(io::stderr().lock(), "{}", json_escaped(&object.to_string()));
 }
 
 fn style(total: u64) -> ProgressStyle {

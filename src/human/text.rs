@@ -7,6 +7,7 @@ use pointmill_converter::ResolvedCrs;
 use pointmill_format::{Attribute, Unit};
 
 use super::quantities::{count, number, numbers};
+use crate::printable::printable;
 
 /// "1 batch", "7 batches".
 pub(crate) fn batches(n: u64) -> String {
@@ -56,16 +57,11 @@ pub(crate) struct Table(pub(crate) String);
 impl Table {
     /// A table about a file or folder.
     pub(crate) fn about(path: &Path) -> Self {
-        Self(printable(&path.to_string_lossy()) + "\n")
+        Self(printable(&path.to_string_lossy()).into_owned() + "\n")
     }
 
     /// Adds a line.
     pub(crate) fn row(&mut self, word: &str, text: impl AsRef<str>) {
         let _ = writeln!(self.0, "  {word:<13} {}", printable(text.as_ref()));
     }
-}
-
-/// Replaces control characters from a file (a CRS, an attribute name), so that they never reach the terminal.
-pub(crate) fn printable(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -6,11 +6,11 @@ use std::path::Path;
 use pointmill_validate::{Accuracy, DatasetKind, LeafQuality, LevelQuality, Outcome};
 
 use super::quantities::{at_most, count, plural, three_digits};
-use super::text::printable;
+use crate::printable::printable;
 
 /// What a validation found: checks, quality by level, problems.
 pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> String {
-    let mut out = printable(&dataset.to_string_lossy());
+    let mut out = printable(&dataset.to_string_lossy()).into_owned();
     let nodes = match (outcome.format, outcome.nodes) {
         (DatasetKind::Batches, 1) => "1 batch".to_owned(),
         (DatasetKind::Batches, n) => format!("{} batches", count(n)),
@@ -26,7 +26,7 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
             (true, None) => "ok",
         };
         let detail = match (&check.skipped, check.ok) {
-            (Some(why), _) => why.clone(),
+            (Some(why), _) => printable(why).into_owned(),
             (None, true) => format!("{} checked", count(check.checked)),
             (None, false) => format!("{} checked, {} found", count(check.checked), count(check.found)),
         };
@@ -119,7 +119,7 @@ fn leaves(leaves: &LeafQuality) -> String {
 /// One problem per line.
 pub(crate) fn problems(outcome: &Outcome) -> String {
     let mut out = String::new();
-    outcome.problems.iter().for_each(|problem| out += &(printable(&problem.to_string()) + "\n"));
+    outcome.problems.iter().for_each(|problem| out.extend([&*printable(&problem.to_string()), "\n"]));
     let errors: u64 = outcome.checks.iter().map(|check| check.found + check.warnings).sum();
     let hidden = errors.saturating_sub(outcome.problems.len() as u64);
     if hidden > 0 {

@@ -10,7 +10,7 @@ use pointmill_format::{ErrorKind, OtherKind, ScanKind};
 
 /// Whether a file is a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(super) enum Kind {
     /// A scan, or a file with the extension of one: its reader decides.
     Scan,
     /// Anything else.
@@ -18,7 +18,7 @@ pub(crate) enum Kind {
 }
 
 /// Says what a file is, by its first bytes, else by its ending.
-pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
+pub(super) fn kind(path: &Path) -> io::Result<Kind> {
     match content(path)? {
         Some(_) => Ok(Kind::Scan),
         None if fs::metadata(path)?.is_file() => Ok(kind_by_ending(path)),
@@ -28,7 +28,7 @@ pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
 
 /// [`kind`] of a file that a folder brought along. Lines of numbers are many things (matrices, tracks, logs): they count
 /// as a scan if the ending says so too.
-pub(crate) fn kind_in_folder(path: &Path) -> io::Result<Kind> {
+pub(super) fn kind_in_folder(path: &Path) -> io::Result<Kind> {
     match content(path)? {
         Some(ScanKind::Text(TextKind::Xyz | TextKind::Pts)) if !ends_with(path, &TEXT_ENDINGS) => Ok(Kind::NoScan),
         _ => kind(path),
@@ -37,7 +37,7 @@ pub(crate) fn kind_in_folder(path: &Path) -> io::Result<Kind> {
 
 /// True for a file that is called like a scan, or has rows of numbers, and is something else: a raster, a well log, a
 /// table (unless its columns are named), prose under the extension of a text scan.
-pub(crate) fn is_other(path: &Path, columns_named: bool) -> io::Result<bool> {
+pub(super) fn is_other(path: &Path, columns_named: bool) -> io::Result<bool> {
     let mut first = Vec::new();
     fs::File::open(path)?.take(OTHER_BYTES).read_to_end(&mut first)?;
     let is_text = matches!(ScanKind::of(&first), None | Some(ScanKind::Text(_))) && !ends_with(path, &BINARY_ENDINGS);
@@ -66,7 +66,7 @@ const OTHER_BYTES: u64 = 4 << 10;
 /// Extensions with which lines of numbers count as a scan. `txt` is not among them: name such files, or use a glob.
 const TEXT_ENDINGS: [&str; 7] = ["xyz", "asc", "csv", "xyzi", "xyzrgb", "pts", "ptx"];
 
-pub(crate) fn kind_by_ending(path: &Path) -> Kind {
+pub(super) fn kind_by_ending(path: &Path) -> Kind {
     // macOS leaves `._tile.laz` beside `tile.laz` on foreign disks: metadata of the Finder, no points.
     if path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.starts_with("._")) {
         return Kind::NoScan;

@@ -21,10 +21,10 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
     (
         "pointmill",
         &[
-            &["flags"],
+            &["flags", "printable"],
             &["exit", "datasets"],
-            &["args", "interrupt"],
-            &["human", "scan_choice"],
+            &["args", "allocator", "crs_choice", "interrupt"],
+            &["human", "scan_choice", "text_choice"],
             &["inputs"],
             &["commands"],
         ],

@@ -91,7 +91,7 @@ impl Ended {
         let stderr = self.stderr();
         assert_eq!(self.code(), code, "{stderr}");
         let line = stderr.lines().last().unwrap_or_default();
-        assert!(line.starts_with("pointmill: "), "{stderr}");
+        assert!(line.starts_with("error: "), "{stderr}");
         assert!(!stderr.contains("panicked"), "{stderr}");
         for word in words {
             assert!(line.contains(word), "`{word}` is not in: {line}");

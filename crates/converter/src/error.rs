@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{Aabb, DatasetKind, ReadError};
+use pointmill_format::{Aabb, DatasetKind, ReadError, system_reason};
 
 use crate::advice::Advice;
 use crate::plan::PlanError;
@@ -169,16 +169,13 @@ pub enum MemoryNeed {
         /// Points that each of them must have in memory.
         points: u64,
     },
-    /// Points that share one place and must be written as one node.
-    OnePlace {
-        /// Points in that place.
-        points: u64,
+    /// What is known of the inputs.
+    Inputs {
+        /// Bytes for all of them.
+        bytes: u64,
     },
-    /// Points that share one cell of the order and must be sorted together.
-    OneCell {
-        /// Points in that cell.
-        points: u64,
-    },
+    /// A part of the run whose size only the points tell, such as "the lists of nodes".
+    Part(&'static str),
 }
 
 impl ConvertError {
@@ -195,9 +192,9 @@ impl ConvertError {
             Self::Unsupported(e) => e.to_string(),
             Self::Input(e) => e.to_string(),
             Self::Output(e) => e.to_string(),
-            Self::Io { path, doing, error } => format!("{}: {doing}: {error}", path.display()),
+            Self::Io { path, doing, error } => format!("{}: {doing}: {}", path.display(), system_reason(error)),
             Self::Memory { ceiling, why, .. } => {
-                format!("the memory ceiling of {} MiB is too small: {why}", ceiling >> 20)
+                format!("the memory ceiling of {} is too small: {why}", amount(*ceiling))
             }
             Self::Interrupted => "interrupted; nothing was written".to_owned(),
             Self::Internal(what) => {
@@ -219,6 +216,16 @@ impl ConvertError {
             Self::Memory { needed, .. } => Some(Advice::RaiseMemory { mib: (needed >> 20) + 1 }),
             Self::Read(_) | Self::Plan(_) | Self::Interrupted | Self::Internal(_) => None,
         }
+    }
+}
+
+/// A size as it was meant: a ceiling below a mebibyte is a slip of the unit, which MiB would show as 0.
+fn amount(bytes: u64) -> String {
+    match bytes {
+        1 => "1 byte".to_owned(),
+        0..1024 => format!("{bytes} bytes"),
+        1024..1_048_576 => format!("{} KiB", bytes >> 10),
+        _ => format!("{} MiB", bytes >> 20),
     }
 }
 
@@ -381,12 +388,8 @@ impl fmt::Display for MemoryNeed {
             Self::Threads { threads, points } => {
                 write!(f, "{threads} worker threads need {points} points each in memory")
             }
-            Self::OnePlace { points } => {
-                write!(f, "{points} points share one place and must be written as one node")
-            }
-            Self::OneCell { points } => {
-                write!(f, "{points} points share one cell of the order and must be sorted together")
-            }
+            Self::Inputs { bytes } => write!(f, "what is known of the inputs takes {} MiB", bytes.div_ceil(1 << 20)),
+            Self::Part(what) => write!(f, "{what} need more"),
         }
     }
 }

@@ -115,7 +115,13 @@ impl fmt::Display for AxisReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.basis.fmt(f)?;
         let Some(Coarser { factor, cause }) = self.coarser else { return Ok(()) };
-        write!(f, "; made {factor} times coarser, because ")?;
+        // a step that was absurdly fine would give hundreds of digits
+        if factor < 1e9 {
+            write!(f, "; made {factor}")?
+        } else {
+            write!(f, "; made {factor:e}")?
+        }
+        f.write_str(" times coarser, because ")?;
         match cause {
             CoarserCause::Extent => f.write_str("31 bits do not hold the extent"),
             CoarserCause::Doubles => f.write_str("doubles as large as the coordinates are further apart"),

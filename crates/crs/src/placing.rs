@@ -50,6 +50,12 @@ impl Placing {
         Ok(self)
     }
 
+    /// True for `EPSG:n` or `EPSG:n+m` with a number that the tables of this crate do not know.
+    #[must_use]
+    pub fn is_unknown_code(text: &str) -> bool {
+        System::is_unknown_code(text)
+    }
+
     /// The system to reproject to.
     ///
     /// # Errors

@@ -9,6 +9,9 @@ use proj_wkt::parse_crs;
 /// Longest text of a definition that is quoted in a message, characters.
 const MAX_QUOTED: usize = 60;
 
+/// What the parser puts before a reason.
+const PREFIXES: [&str; 3] = ["failed to parse CRS string: ", "unsupported CRS semantics: ", "unknown CRS: "];
+
 /// EPSG codes of all geographic systems whose prime meridian is not Greenwich.
 const OTHER_MERIDIANS: [std::ops::RangeInclusive<u32>; 4] = [4801..=4821, 4901..=4904, 5229..=5229, 8042..=8043];
 
@@ -61,6 +64,13 @@ pub(crate) struct System {
 }
 
 impl System {
+    /// True for `EPSG:n` or `EPSG:n+m` with a number that the tables here do not know.
+    pub(crate) fn is_unknown_code(text: &str) -> bool {
+        let text = text.trim();
+        let is_code = text.get(..5).is_some_and(|p| p.eq_ignore_ascii_case("EPSG:")) && is_definition(text);
+        is_code && parse_crs(text).is_err_and(|error| error.to_string().contains("unknown EPSG"))
+    }
+
     /// The system of that text: `EPSG:n`, `EPSG:n+m`, a proj4 definition, or WKT.
     pub(crate) fn parse(text: &str) -> Result<Self, CrsError> {
         let text = text.trim();
@@ -192,7 +202,9 @@ fn by_keys(crs: &Crs) -> Option<Result<System, CrsError>> {
 }
 
 fn unsupported(text: &str, error: &proj_wkt::ParseError) -> CrsError {
-    CrsError::Unsupported { definition: quoted(text), why: error.to_string() }
+    let why = error.to_string();
+    let bare = PREFIXES.iter().fold(why.as_str(), |why, prefix| why.strip_prefix(prefix).unwrap_or(why));
+    CrsError::Unsupported { definition: quoted(text), why: bare.to_owned() }
 }
 
 fn is_definition(text: &str) -> bool {
@@ -246,6 +258,11 @@ mod tests {
     fn what_is_no_definition_is_told_from_what_is_not_supported() {
         for text in ["", "25832", "EPSG:x", "UTM 32", "proj=utm", "a\nb"] {
             assert!(matches!(System::parse(text), Err(CrsError::NotACrs(_))), "{text}");
+        }
+        assert!(System::is_unknown_code("EPSG:999999") && System::is_unknown_code(" epsg:25832+99999"));
+        for text in ["EPSG:25832", "EPSG:25832+5783", "EPSG:x", "+proj=utm +zone=99", "EPSG:25832+25833"] {
+            let known = !System::is_unknown_code(text) || text == "EPSG:25832+25833";
+            assert!(known, "{text}");
         }
         for text in ["EPSG:999999", "LOCAL_CS[\"site\"]", "+proj=nonsense", "EPSG:25832+25833"] {
             assert!(matches!(System::parse(text), Err(CrsError::Unsupported { .. })), "{text}");

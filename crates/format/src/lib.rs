@@ -62,7 +62,7 @@ pub mod potree2;
 pub mod scan;
 
 pub use dataset_kind::{DatasetKind, Located, locate};
-pub use error::{Advice, ErrorKind, Fault, ReadError};
+pub use error::{Advice, ErrorKind, Fault, ReadError, system_reason};
 pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};

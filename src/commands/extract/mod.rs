@@ -25,11 +25,15 @@ const POSES: &str = "poses.csv";
 /// Writes everything or nothing: files appear in the folder once all of them are complete.
 pub(crate) fn run(args: &ExtractArgs) -> Result<(), Failure> {
     let file = args.file.as_path();
-    if let Err(e) = fs::metadata(file) {
-        return Err(match e.kind() {
-            std::io::ErrorKind::NotFound => Failure::Usage(format!("{}: no such file", file.display())),
-            _ => Failure::io(file, "reading the input", &e),
-        });
+    match fs::metadata(file) {
+        Ok(meta) if meta.is_dir() => {
+            return Err(Failure::Io(format!("{}: this is a folder; name one scan in it", file.display())));
+        }
+        Ok(_) => {}
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            return Err(Failure::Usage(format!("{}: no such file", file.display())));
+        }
+        Err(e) => return Err(Failure::io(file, "reading the input", &e)),
     }
     let mut options = OpenOptions::default();
     options.scans = (!args.scans.is_empty()).then(|| args.scans.clone());

@@ -16,9 +16,9 @@ use serde_json::Value;
 
 use crate::args::InfoArgs;
 use crate::datasets;
-use crate::exit::{Failure, emit, print_line};
+use crate::exit::{Failure, emit, print_line, to_json};
 use crate::inputs;
-use crate::scan_choice;
+use crate::{scan_choice, text_choice};
 
 /// Describes a dataset; each kind has a file here.
 fn describe_dataset(dataset: &Located) -> Result<Description, Failure> {
@@ -64,6 +64,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
             Err(failure) => out.fail(failure),
             Ok(found) => {
                 found.all_notes().for_each(|note| print_line(&note));
+                found.unread_failure("").into_iter().for_each(|failure| out.fail(failure));
                 for file in &found.files {
                     out.show(scan::describe(file, &options, args.deep))?;
                 }
@@ -71,20 +72,21 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         }
     }
     if args.json {
-        emit(&format!("{:#}\n", Value::Array(out.objects)))?;
+        emit(&to_json(&Value::Array(out.objects))?)?;
     }
     out.first_failure.map_or(Ok(()), Err)
 }
 
 /// Checks that the scans that were chosen are in one of all inputs.
 fn check_choice(paths: &[PathBuf], options: &OpenOptions) -> Result<(), Failure> {
-    if options.scans.is_none() {
+    if options.scans.is_none() && !text_choice::is_given(options) {
         return Ok(());
     }
     // what cannot be found is reported in its turn
     let expanded = paths.iter().filter_map(|path| inputs::expand(std::slice::from_ref(path), options).ok());
     let files: Vec<PathBuf> = expanded.flat_map(|found| found.files).collect();
-    scan_choice::check(&files, options)
+    scan_choice::check(&files, options)?;
+    if files.is_empty() { Ok(()) } else { text_choice::check(&files, options) }
 }
 
 /// The output so far.

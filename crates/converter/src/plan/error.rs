@@ -117,6 +117,17 @@ pub enum PlanFault {
     /// WKT that ends too early.
     #[error("the WKT \"{0}\" ends before its brackets are closed")]
     CutWkt(String),
+    /// WKT with text behind its last bracket.
+    #[error("the WKT \"{0}\" goes on after its last bracket")]
+    LongWkt(String),
+    /// A proj4 definition that means nothing.
+    #[error("\"{text}\" {what}")]
+    Definition {
+        /// The definition.
+        text: String,
+        /// What is wrong with it: "has no +zone".
+        what: String,
+    },
     /// WKT of a system without a name.
     #[error("the WKT \"{0}\" has no name")]
     EmptyWkt(String),

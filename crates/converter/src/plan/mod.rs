@@ -16,6 +16,8 @@ pub struct Plan {
     pub inputs: Vec<PathBuf>,
     /// Files that were found with the scans and are none: they are told and counted, not read.
     pub other_files: Vec<PathBuf>,
+    /// Places where scans may be that could not be looked into, and why: listed in the report.
+    pub skipped_inputs: Vec<(PathBuf, String)>,
     /// What text and E57 files do not say of themselves.
     pub open: OpenOptions,
     /// The folder to make.
@@ -32,6 +34,9 @@ pub struct Plan {
     pub threads: usize,
     /// Maximum points of a unit of work; `None`: what the memory allows. Changes nothing in the output.
     pub task_points: Option<u64>,
+    /// Maximum bytes of points that wait in memory between being read and being built; `None`: what the ceiling leaves. More
+    /// go through temporary files. Changes nothing in the output.
+    pub waiting_bytes: Option<u64>,
     /// Where temporary files go; `None`: beside the output.
     pub temp_dir: Option<PathBuf>,
     /// Which points go in.
@@ -178,6 +183,7 @@ impl Plan {
         Self {
             inputs,
             other_files: Vec::new(),
+            skipped_inputs: Vec::new(),
             open: OpenOptions::default(),
             output,
             name: String::new(),
@@ -186,6 +192,7 @@ impl Plan {
             memory_bytes: crate::memory::default_ceiling_bytes(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             task_points: None,
+            waiting_bytes: None,
             temp_dir: None,
             filter: Filter::default(),
             duplicates: Duplicates::Keep,

@@ -6,6 +6,7 @@
 //! the scan declares goes before the one of its code. Nothing is guessed: a system without a code, with one that the
 //! table lacks, or in a unit that proj4 cannot name, leaves `projection` empty and says why.
 
+mod definition;
 mod printable;
 mod proj4;
 mod records;
@@ -97,6 +98,10 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
         return Ok(out);
     }
     if text.starts_with('+') && text.split_whitespace().any(|t| t.starts_with("+proj=")) {
+        if let Some(what) = definition::fault(text) {
+            let fault = PlanFault::Definition { text: printable(text), what: printable(&what) };
+            return Err(PlanError::new(Setting::Crs, fault));
+        }
         let unit = proj4::unit(text);
         let (projection, notes) = unzip(proj4::for_viewers(text, unit), None);
         let (unit, vertical_unit) = (Some(unit), proj4::vertical_unit(text));
@@ -104,6 +109,7 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
     }
     match wkt::is_wkt(text) {
         true if !wkt::is_whole(text) => fault(PlanFault::CutWkt),
+        true if wkt::is_followed(text) => fault(PlanFault::LongWkt),
         true if wkt::read(text).is_some_and(|system| system.name.trim().is_empty()) => fault(PlanFault::EmptyWkt),
         true => Ok(resolve_crs(&Crs::new(Some(text.to_owned()), None, None))),
         false => fault(PlanFault::NotACrs),

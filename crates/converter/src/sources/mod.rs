@@ -61,6 +61,10 @@ impl Sources {
         if !plan.other_files.is_empty() {
             warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
         }
+        warnings.extend(plan.skipped_inputs.iter().map(|(path, why)| Warning::InputSkipped {
+            path: path.clone(),
+            error: format!("{}: {why}", path.display()),
+        }));
         let mut scans: Vec<Box<dyn Scan>> = Vec::new();
         let mut points_missing = 0u64;
         let mut options = plan.open.clone();

@@ -3,16 +3,13 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{Aabb, AxisGrid, PointBatch, Positions, Resolution, Scan, Scratch, Wanted};
+use pointmill_format::{Aabb, AxisGrid, Lattice, PointBatch, Positions, Resolution, Scan, Scratch, Wanted};
 
 use super::decimals::Decimals;
 use super::divisor::Divisors;
 
 /// Points looked at in each of three places of a scan without a lattice.
 const SAMPLE_POINTS: usize = 131_072;
-
-/// No renderer's single precision holds coordinates beyond this, and no scanner gives them.
-const FARTHEST: f64 = 1e30;
 
 /// The step of single precision at `far` ≥ 0; `None` at 0, where it has none.
 pub(crate) fn single_step(far: f64) -> Option<f64> {
@@ -21,7 +18,7 @@ pub(crate) fn single_step(far: f64) -> Option<f64> {
 
 /// True for bounds that cannot be coordinates.
 pub(crate) fn far_out(bounds: &Aabb) -> bool {
-    bounds.min.iter().chain(&bounds.max).any(|v| v.abs() > FARTHEST)
+    bounds.min.iter().chain(&bounds.max).any(|v| !Lattice::is_sound_offset(*v))
 }
 
 /// Where the points of a source are, as far as is known before they are read.

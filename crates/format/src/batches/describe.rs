@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::json_reason;
 use crate::names::named;
 use crate::{Attribute, AttributeType, Lattice, ReadError};
 
@@ -240,7 +241,7 @@ impl Description {
     /// What is no JSON, of the wrong type, or missing.
     pub fn from_json(bytes: &[u8], path: &Path, offset: u64) -> Result<Self, ReadError> {
         let description: Self = serde_json::from_slice(bytes).map_err(|e| {
-            let what = format!("the description, JSON from byte {offset}: {e}");
+            let what = format!("the description, JSON from byte {offset}: {}", json_reason(&e));
             ReadError::broken(path, offset, what).advise(super::header::CORRUPT)
         })?;
         if !Lattice::from(description.lattice).is_valid() {

@@ -22,6 +22,8 @@ pub enum Advice {
     WidenColumn,
     /// Rows of two numbers: cut short, or x and y alone, which [`crate::OpenOptions::columns`] can say.
     NameColumns,
+    /// A separator that no row has: it can be detected, or another one named.
+    DetectSeparator,
     /// An archive: the scans are in it.
     Unpack,
     /// A comma that may be a decimal mark or a separator, which [`crate::OpenOptions::decimal`] can say.
@@ -60,6 +62,7 @@ impl fmt::Display for Advice {
             Self::NameColumns => {
                 f.write_str("if it was cut short, copy it again; if its columns are x,y alone, name them")
             }
+            Self::DetectSeparator => f.write_str("name the one that the rows have, or none to have it detected"),
             Self::Unpack => f.write_str("unpack it and name the scans in it"),
             Self::DecimalMark => f.write_str("say whether commas are decimal marks"),
             Self::Supported(kinds) if kinds.is_empty() => f.write_str("this build reads no scans; enable a feature"),

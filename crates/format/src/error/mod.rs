@@ -128,7 +128,7 @@ impl ReadError {
     /// What is wrong, on one line: without path, byte and advice.
     pub fn what(&self) -> String {
         one_line(match &self.0.kind {
-            ErrorKind::Io(error) => format!("{}: {error}", self.0.fault),
+            ErrorKind::Io(error) => format!("{}: {}", self.0.fault, system_reason(error)),
             _ => self.0.fault.to_string(),
         })
     }
@@ -138,6 +138,39 @@ impl ReadError {
         let place = self.0.offset.map_or_else(String::new, |at| format!(" (byte {at})"));
         format!("{}: {}{place}", self.0.path.display(), self.what())
     }
+}
+
+/// What the operating system says, for people: without its number, which is for programmers.
+///
+/// ```
+/// let error = std::io::Error::from_raw_os_error(2);
+/// assert!(!pointmill_format::system_reason(&error).contains("os error"));
+/// ```
+#[must_use]
+pub fn system_reason(error: &io::Error) -> String {
+    if error.kind() == io::ErrorKind::UnexpectedEof && error.raw_os_error().is_none() {
+        return "the file ends before".to_owned();
+    }
+    let text = error.to_string();
+    match text.rsplit_once(" (os error ") {
+        Some((reason, number)) if number.ends_with(')') => reason.to_owned(),
+        _ => text,
+    }
+}
+
+/// Why a text is not the JSON that it should be, for people: without the place, which is said as a byte, and without the
+/// types of a program.
+pub(crate) fn json_reason(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let reason = text.rsplit_once(" at line ").map_or(text.as_str(), |(reason, _)| reason);
+    let words = [("f64", "a number"), ("u64", "a whole number"), ("u32", "a whole number"), ("u8", "a whole number")];
+    let reason = words.iter().fold(reason.to_owned(), |reason, (word, plain)| {
+        reason.replace(&format!("expected {word}"), &format!("expected {plain}"))
+    });
+    reason
+        .replace('`', "\"")
+        .replace("expected struct ", "expected the object ")
+        .replace("EOF while parsing", "it ends within")
 }
 
 /// Text for people that may quote a file: control characters become blanks, so that it stays one line and no terminal
@@ -176,6 +209,21 @@ mod tests {
         assert_eq!(e.what_and_where(), "a.las: 3 of 10 records are there (byte 227)");
         let e = ReadError::io("a.las", "opening", io::Error::other("no")).advise(Advice::CutShort);
         assert_eq!(e.to_string(), "a.las: opening: no; it was cut short; copy or export it again");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn numbers_of_the_system_are_not_printed() {
+        let e = ReadError::io("a.las", "opening", io::Error::from_raw_os_error(2));
+        assert_eq!(e.to_string(), "a.las: opening: No such file or directory");
+        assert_eq!(system_reason(&io::ErrorKind::UnexpectedEof.into()), "the file ends before");
+    }
+
+    #[test]
+    fn json_is_explained_in_plain_words() {
+        let of = |text: &str| json_reason(&serde_json::from_str::<Vec<f64>>(text).unwrap_err());
+        assert_eq!(of("[1, \"x\"]"), "invalid type: string \"x\", expected a number");
+        assert_eq!(of("[1,"), "it ends within a value");
     }
 
     #[test]

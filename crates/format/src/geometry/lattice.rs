@@ -31,6 +31,29 @@ impl Lattice {
         ((world - self.offset[axis]) / self.scale[axis]).round_ties_even() as i64
     }
 
+    /// The finest step that a scan or a request may have. A femtometre is the size of a proton: no instrument measures
+    /// it, and 2³² steps of it span 4 µm. The square of a finer step soon is nothing in single precision, in which
+    /// renderers (and the boxes of batches) compute.
+    pub const FINEST_STEP: f64 = 1e-15;
+
+    /// No renderer's single precision holds coordinates beyond this, and no scanner gives them.
+    pub const FARTHEST: f64 = 1e30;
+
+    /// The coarsest step that a scan or a request may have: 2³¹ of it reach [`Self::FARTHEST`].
+    pub const COARSEST_STEP: f64 = Self::FARTHEST / (1u64 << 31) as f64;
+
+    /// True for a step that coordinates can have.
+    #[must_use]
+    pub fn is_sound_step(step: f64) -> bool {
+        (Self::FINEST_STEP..=Self::COARSEST_STEP).contains(&step)
+    }
+
+    /// True for a coordinate at which single precision does not end.
+    #[must_use]
+    pub fn is_sound_offset(offset: f64) -> bool {
+        offset.abs() <= Self::FARTHEST
+    }
+
     /// True if every scale is finite and > 0 and every offset finite.
     pub fn is_valid(&self) -> bool {
         self.scale.iter().all(|s| s.is_finite() && *s > 0.0) && self.offset.iter().all(|o| o.is_finite())
@@ -40,6 +63,18 @@ impl Lattice {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn steps_and_offsets_end_where_computing_with_them_does() {
+        for step in [1e-15, 1e-12, 0.001, 1.0, 1e20] {
+            assert!(Lattice::is_sound_step(step), "{step}");
+        }
+        for step in [0.0, -0.001, 5e-310, f64::MIN_POSITIVE, 9e-16, 1e21, 1e300, f64::INFINITY, f64::NAN] {
+            assert!(!Lattice::is_sound_step(step), "{step}");
+        }
+        assert!([0.0, -5e6, 1e30].into_iter().all(Lattice::is_sound_offset));
+        assert!(![2e30, -1e300, f64::NEG_INFINITY, f64::NAN].into_iter().any(Lattice::is_sound_offset));
+    }
 
     #[test]
     fn quantize_undoes_world_far_from_the_origin() {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
+use crate::error::json_reason;
 use crate::{Aabb, Attribute, AttributeType, Lattice, ReadError};
 
 use super::{AttributeStats, Encoding, Metadata};
@@ -259,5 +260,5 @@ fn syntax_error(bytes: &[u8], path: &Path, error: &serde_json::Error) -> ReadErr
         return ReadError::broken(path, offset as u64, what)
             .advise("PotreeConverter does so for attributes that it leaves empty; replace the word by 0");
     }
-    ReadError::broken(path, offset as u64, format!("is not valid JSON: {error}"))
+    ReadError::broken(path, offset as u64, format!("is not valid JSON: {}", json_reason(error)))
 }

@@ -6,14 +6,14 @@ use super::printable::printable;
 use crate::warning::Proj4Fault;
 
 /// What proj4js 2.6.2 can project. Of the table, `webmerc`, `eqearth` and `labrd` are not among these.
-const VIEWER_PROJECTIONS: [&str; 28] = [
+pub(super) const VIEWER_PROJECTIONS: [&str; 28] = [
     "aea", "aeqd", "cass", "cea", "eqc", "eqdc", "etmerc", "geocent", "gnom", "krovak", "laea", "lcc", "longlat",
     "merc", "mill", "moll", "nzmg", "omerc", "ortho", "poly", "qsc", "robin", "sinu", "somerc", "stere", "sterea",
     "tmerc", "utm",
 ];
 
 /// The names that PROJ has for units of length. proj4js knows the first three; the others are given to it as numbers.
-const UNITS: [(&str, Unit); 21] = [
+pub(super) const UNITS: [(&str, Unit); 21] = [
     ("m", Unit::METRE),
     ("ft", Unit::FOOT),
     ("us-ft", Unit::US_SURVEY_FOOT),
@@ -70,7 +70,7 @@ pub(super) fn false_easting(proj4: &str) -> Option<f64> {
     }
 }
 
-fn value<'a>(proj4: &'a str, key: &str) -> Option<&'a str> {
+pub(super) fn value<'a>(proj4: &'a str, key: &str) -> Option<&'a str> {
     proj4.split_whitespace().find_map(|p| p.strip_prefix('+')?.strip_prefix(key)?.strip_prefix('='))
 }
 

@@ -73,9 +73,14 @@ pub(super) fn is_whole(text: &str) -> bool {
     elements(text).is_whole
 }
 
+/// True if text follows behind the last system.
+pub(super) fn is_followed(text: &str) -> bool {
+    !text[elements(text).end..].trim().is_empty()
+}
+
 /// Finds name, code and units of the horizontal system; `None` if the text has no such system.
 pub(super) fn read(text: &str) -> Option<WktSystem> {
-    let Elements { found: elements, is_whole } = elements(text);
+    let Elements { found: elements, is_whole, .. } = elements(text);
     let mut at = 0;
     let mut compound = None;
     // Every step goes to a child, so to a higher index: the loop ends.
@@ -167,6 +172,8 @@ struct Elements<'a> {
     found: Vec<Element<'a>>,
     /// All that were opened are closed.
     is_whole: bool,
+    /// The first byte behind them.
+    end: usize,
 }
 
 /// Ends where the first element is closed and no other follows behind a comma (as ESRI puts the vertical system), or
@@ -201,6 +208,7 @@ fn elements(text: &str) -> Elements<'_> {
                     open.pop();
                     if open.is_empty() && !text[i + 1..].trim_start().starts_with(',') {
                         is_whole = true;
+                        i += 1;
                         break;
                     }
                 }
@@ -220,7 +228,7 @@ fn elements(text: &str) -> Elements<'_> {
         }
         i += 1;
     }
-    Elements { found, is_whole }
+    Elements { found, is_whole, end: i.min(bytes.len()) }
 }
 
 /// Bytes before the closing quote; a doubled quote stands for one and closes nothing.

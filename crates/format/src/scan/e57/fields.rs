@@ -2,6 +2,10 @@
 
 use super::xml::element::Element;
 use super::xml::numbers::Numbers;
+use crate::Lattice;
+
+/// The finest step of an angle: 64 bits of a turn are 3e-19, and doubles hold it well.
+const FINEST_ANGLE: f64 = 1e-30;
 
 /// How the values of a field are stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -150,6 +154,19 @@ impl Field {
         Self { name, encoding, range }
     }
 
+    /// What is wrong with the scale or offset of a field of positions, if they place no point. `is_length`: it is not an
+    /// angle, which 64 bits may hold in finer steps than a length.
+    pub(super) fn misplaced(&self, is_length: bool) -> Option<String> {
+        let Encoding::Scaled { min, max, scale, offset } = self.encoding else { return None };
+        let least = if is_length { Lattice::FINEST_STEP } else { FINEST_ANGLE };
+        let is_sound_step = (least..=Lattice::FARTHEST).contains(&scale.abs()) || (scale == 0.0 && min == max);
+        let ends = self.range.map_or([offset; 2], |(a, b)| [a, b]);
+        if is_sound_step && ends.into_iter().all(Lattice::is_sound_offset) {
+            return None;
+        }
+        Some(format!("{} has the scale {scale:e} and the offset {offset:e}, which place no point", self.tag()))
+    }
+
     /// The name as it stands in the file, without the prefix of an extension.
     pub(super) fn tag(&self) -> &str {
         match &self.name {
@@ -173,6 +190,26 @@ mod tests {
         let bits = |min, max| Encoding::Integer { min, max }.bits();
         assert_eq!([bits(0, 0), bits(7, 8), bits(0, 2), bits(-128, 127), bits(0, 256)], [0, 1, 2, 8, 9]);
         assert_eq!(bits(i64::MIN, i64::MAX), 64);
+    }
+
+    #[test]
+    fn scales_that_place_no_point_are_named() {
+        let misplaced = |scale, offset, is_length| {
+            Field::new(Name::CartesianX, Encoding::Scaled { min: -9, max: 9, scale, offset }, None).misplaced(is_length)
+        };
+        for (scale, offset) in [(0.001, 0.0), (-0.001, 5e6), (1e-15, 0.0), (1.0, -1e30)] {
+            assert_eq!(misplaced(scale, offset, true), None);
+        }
+        for scale in [0.0, 5e-310, 1e-16, 1e300, f64::INFINITY, f64::NAN, -5e-310] {
+            assert!(
+                misplaced(scale, 0.0, true).is_some_and(|what| what.starts_with("cartesianX has the scale")),
+                "{scale}"
+            );
+        }
+        assert!(misplaced(1.0, 2e30, true).is_some() && misplaced(1.0, f64::NAN, true).is_some());
+        assert!(misplaced(1e-19, 0.0, false).is_none() && misplaced(5e-310, 0.0, false).is_some());
+        let constant = Encoding::Scaled { min: 3, max: 3, scale: 0.0, offset: 7.0 };
+        assert_eq!(Field::new(Name::CartesianZ, constant, None).misplaced(true), None);
     }
 
     #[test]

@@ -117,6 +117,10 @@ fn drafts<'a>(
         let refuse = |what: &str| ReadError::unsupported(source.path(), format!("scan {}: {what}", index + 1));
         let fields = cloud.fields.clone();
         let roles = Roles::new(&fields, index, options, notes).map_err(refuse)?;
+        if let Some(what) = roles.positions.misplaced(&fields) {
+            let fault = Fault::Header(format!("scan {}: {what}", index + 1));
+            return Err(ReadError::broken(source.path(), 24, fault).advise(Advice::ExportAgain));
+        }
         if fields.iter().all(|f| f.encoding.bits() == 0) && cloud.records > MAX_FROM_NOTHING {
             return Err(refuse(&format!("{} points without a bit of data", cloud.records)));
         }

@@ -140,6 +140,14 @@ impl Roles {
 }
 
 impl PositionFields {
+    /// The first field of positions whose scale and offset place no point: what is wrong with it.
+    pub(super) fn misplaced(&self, fields: &[Field]) -> Option<String> {
+        let [x, y, z] = self.cartesian.unwrap_or_default();
+        let [range, azimuth, elevation] = self.spherical.unwrap_or_default();
+        let lengths = [x, y, z, range].into_iter().flatten().find_map(|i| fields[i].misplaced(true));
+        lengths.or_else(|| [azimuth, elevation].into_iter().flatten().find_map(|i| fields[i].misplaced(false)))
+    }
+
     /// How finely the coordinates are stored, per axis, before the pose. `farthest`: the largest value of a field, of a
     /// sample: what the file declares may be wrong by orders of magnitude.
     pub(super) fn resolution(&self, fields: &[Field], farthest: impl Fn(usize) -> f64) -> [Resolution; 3] {

@@ -164,7 +164,7 @@ fn attribute(name: String, descriptor: &[u8], warnings: &mut Vec<ScanWarning>) -
     }
     if has(3) {
         let scale = doubles(112);
-        if scale.iter().all(|s| s.is_finite() && *s != 0.0) {
+        if scale.iter().all(|s| s.is_normal()) {
             out.scale = scale;
         } else {
             warnings.push(ScanWarning::ExtraBytesScale { name: out.name.clone(), scale });
@@ -272,9 +272,13 @@ mod tests {
     }
 
     #[test]
-    fn a_scale_of_zero_is_replaced_and_told() {
-        let mut warnings = Vec::new();
-        let a = attribute("a".to_owned(), &descriptor(5, 1 << 3, b"a"), &mut warnings).unwrap();
-        assert_eq!((a.scale, warnings.len()), (vec![1.0], 1));
+    fn a_scale_that_means_nothing_is_replaced_and_told() {
+        for scale in [0.0, 5e-310, f64::NAN, f64::INFINITY] {
+            let mut warnings = Vec::new();
+            let mut d = descriptor(5, 1 << 3, b"a");
+            d[112..120].copy_from_slice(&scale.to_le_bytes());
+            let a = attribute("a".to_owned(), &d, &mut warnings).unwrap();
+            assert_eq!((a.scale, warnings.len()), (vec![1.0], 1), "{scale}");
+        }
     }
 }

@@ -6,6 +6,9 @@ use crate::{Aabb, Advice, Fault, Lattice, ReadError, ScanWarning};
 
 /// Bytes of the LAS 1.0–1.2 header; every later one starts with these.
 const MIN_HEADER: u64 = 227;
+/// The first of three doubles.
+const SCALES: u64 = 131;
+const OFFSETS: u64 = 155;
 /// Bytes of the LAS 1.4 header.
 const HEADER_1_4: u64 = 375;
 
@@ -92,7 +95,7 @@ impl Header {
             compressed_bit: bytes[104] & 0xc0 != 0,
             record_len: usize::from(u16_at(&bytes, 105)),
             point_count: u64::from(u32_at(&bytes, 107)),
-            lattice: Lattice { scale: f64x3_at(&bytes, 131), offset: f64x3_at(&bytes, 155) },
+            lattice: Lattice { scale: f64x3_at(&bytes, SCALES as usize), offset: f64x3_at(&bytes, OFFSETS as usize) },
             bounds: bounds(&bytes),
             evlr_start: 0,
             evlr_count: 0,
@@ -136,15 +139,32 @@ impl Header {
             let fault = Fault::OutsideFile { part: "the points", offset, bytes: None, file_bytes };
             return Err(ReadError::broken(path, source.len(), fault).advise(Advice::CutShort));
         }
-        if !self.lattice.is_valid() && self.point_count > 0 {
-            let Lattice { scale, offset } = self.lattice;
-            let what = format!("scale {scale:?} or offset {offset:?} cannot place a point (scales must be > 0)");
-            return Err(ReadError::broken(path, 131, Fault::Header(what)).advise(Advice::ExportAgain));
+        if let Some((at, what)) = self.misplaced().filter(|_| self.point_count > 0) {
+            return Err(ReadError::broken(path, at, Fault::Header(what)).advise(Advice::ExportAgain));
         }
         if self.bounds.is_none() && self.point_count > 0 {
             warnings.push(ScanWarning::Bounds);
         }
         Ok(self)
+    }
+
+    /// The first scale or offset that cannot place a point: its byte, and what is wrong with it.
+    fn misplaced(&self) -> Option<(u64, String)> {
+        let Lattice { scale, offset } = self.lattice;
+        let each = (0..3u64).zip(["x", "y", "z"]).zip(scale.into_iter().zip(offset));
+        each.flat_map(|((axis, name), (scale, offset))| {
+            let (least, most) = (Lattice::FINEST_STEP, Lattice::COARSEST_STEP);
+            let step = format!(
+                "the scale of {name} is {scale:e}, no step that coordinates can have ({least:e} to {most:.1e})"
+            );
+            let place = format!("the offset of {name} is {offset:e}, no place that coordinates can have");
+            [
+                (!Lattice::is_sound_step(scale)).then_some((SCALES + 8 * axis, step)),
+                (!Lattice::is_sound_offset(offset)).then_some((OFFSETS + 8 * axis, place)),
+            ]
+        })
+        .flatten()
+        .min_by_key(|(at, _)| *at)
     }
 }
 
@@ -163,4 +183,42 @@ fn bounds(bytes: &[u8]) -> Option<Aabb> {
     let min = [187, 203, 219].map(|at| f64_at(bytes, at));
     let aabb = Aabb { min, max };
     (!aabb.is_empty() && min.iter().chain(&max).all(|v| v.is_finite())).then_some(aabb)
+}
+
+#[cfg(test)]
+mod tests {
+    use pointmill_testkit::las::Las;
+
+    use super::super::open;
+    use crate::ErrorKind;
+
+    /// The byte at which a file with one odd number is refused; `None`: it is read.
+    fn refused_at(at: usize, value: f64) -> Option<u64> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.las");
+        let mut bytes = Las { offset: [0.0; 3], ..Las::terrain(5, 1) }.bytes();
+        bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        let error = open(&path).err()?;
+        assert!(matches!(error.kind(), ErrorKind::Broken), "{error}");
+        error.offset()
+    }
+
+    #[test]
+    fn scales_and_offsets_that_place_no_point_are_refused_with_their_byte() {
+        for at in [131, 139, 147] {
+            for scale in [0.0, -0.0, -0.001, 5e-310, 1e-300, 9e-16, 5e20, 1e300, f64::NAN, f64::INFINITY] {
+                assert_eq!(refused_at(at, scale), Some(at as u64), "{scale:e}");
+            }
+            for scale in [1e-15, 1e-12, 1e-7, 0.3048, 1000.0, 4e20] {
+                assert_eq!(refused_at(at, scale), None, "{scale:e}");
+            }
+        }
+        for at in [155, 163, 171] {
+            for offset in [1.1e30, -1e300, f64::NAN, f64::NEG_INFINITY] {
+                assert_eq!(refused_at(at, offset), Some(at as u64), "{offset:e}");
+            }
+            assert_eq!((refused_at(at, -1e30), refused_at(at, 5e-310)), (None, None));
+        }
+    }
 }

@@ -108,7 +108,7 @@ impl Header {
                     Some("ascii") => Encoding::Ascii,
                     Some("binary") => Encoding::Binary,
                     Some("binary_compressed") => Encoding::Compressed,
-                    other => return Err(broken(format!("the encoding {:?} is not known", other.unwrap_or("")))),
+                    other => return Err(broken(format!("the encoding \"{}\" is not known", other.unwrap_or("")))),
                 };
                 let mut header = found.header(encoding).map_err(broken)?;
                 header.end = header.data_start(source, &line, all_cr);
@@ -207,7 +207,7 @@ impl Lines {
         for (i, name) in self.names.iter().enumerate() {
             let (size, ty) = (&self.sizes[i], &self.types[i]);
             let ty = field_type(size, ty)
-                .ok_or_else(|| format!("field {name} has TYPE {ty:?} and SIZE {size:?}, which is no number"))?;
+                .ok_or_else(|| format!("field {name} has TYPE {ty} and SIZE {size}, which is no number"))?;
             let declared = self.counts.get(i).map_or("1", String::as_str);
             match declared.parse::<u32>().map_err(|_| format!("field {name} has COUNT {declared:?}"))? {
                 0 if name == "_" => {}

@@ -46,6 +46,9 @@ impl Column {
 /// [`super::check_columns`].
 pub(super) fn check(names: &[String]) -> Result<(), String> {
     let columns: Vec<Column> = names.iter().map(|n| Column::named(n)).collect::<Result<_, _>>()?;
+    if let Some(nameless) = columns.iter().position(|c| c.name.is_empty()) {
+        return Err(format!("column {} has no name; write - for columns to leave out", nameless + 1));
+    }
     let count = |role: &Role| columns.iter().filter(|c| c.role == *role).count();
     for (axis, name) in ["x", "y"].into_iter().enumerate() {
         if count(&Role::Axis(axis)) == 0 {

@@ -68,6 +68,10 @@ impl Head {
         let mut sample: Vec<Vec<u8>> = rows.iter().map(|(_, line)| line.to_vec()).collect();
         let in_head = sample.len();
         sample.extend(elsewhere(source, last, counted)?);
+        if let Some(named) = options.separator.filter(|named| !sample.iter().any(|row| has_separator(row, *named))) {
+            let what = format!("no row has the separator {named:?} that was named");
+            return Err(ReadError::broken(source.path(), start, Fault::Row(what)).advise(Advice::DetectSeparator));
+        }
         let (dialect, warning) = detect(&sample, options)
             .map_err(|what| ReadError::broken(source.path(), start, Fault::Row(what)).advise(Advice::DecimalMark))?;
         let numeric = numeric(dialect, &sample);
@@ -232,6 +236,15 @@ fn numeric(dialect: Dialect, sample: &[Vec<u8>]) -> Vec<bool> {
     let has_words =
         |i: usize| count(i, |k| *k == FieldKind::Words) > count(i, |k| matches!(k, FieldKind::Number | FieldKind::Odd));
     (0..width).map(|i| !has_words(i)).collect()
+}
+
+/// True if the row has the separator; blanks of any kind are one.
+fn has_separator(row: &[u8], separator: char) -> bool {
+    match u8::try_from(separator) {
+        Ok(b'\t' | b' ') => row.trim_ascii().iter().any(|b| matches!(b, b'\t' | b' ')),
+        Ok(separator) => row.contains(&separator),
+        Err(_) => false,
+    }
 }
 
 fn shown(line: &[u8]) -> String {
