@@ -117,9 +117,9 @@ impl fmt::Display for AxisReason {
         let Some(Coarser { factor, cause }) = self.coarser else { return Ok(()) };
         // a step that was absurdly fine would give hundreds of digits
         if factor < 1e9 {
-            write!(f, "; made {factor}")?
+            write!(f, "; made {factor}")?;
         } else {
-            write!(f, "; made {factor:e}")?
+            write!(f, "; made {factor:e}")?;
         }
         f.write_str(" times coarser, because ")?;
         match cause {

@@ -1,5 +1,6 @@
 //! What every reader of scans offers: pieces that decode alone, in batches of points.
 
+use std::any::Any;
 use std::ops::ControlFlow;
 
 use super::{Piece, ScanInfo, Wanted};
@@ -39,6 +40,8 @@ pub struct Scratch {
     pub decoded: Vec<u8>,
     /// The batch that is handed to the sink; its columns fit the scan that was decoded last.
     pub batch: Option<PointBatch>,
+    /// What else the reader that decoded last wants to find again.
+    pub(super) kept: Option<Box<dyn Any + Send + Sync>>,
 }
 
 /// The batch of the scratch memory with these columns and, if `is_quantized`, integer positions; its memory is kept
@@ -129,8 +132,7 @@ pub trait Scan: Send + Sync {
     /// A sink that breaks ends the decode early, without an error.
     ///
     /// # Errors
-    /// A piece that cannot be decoded to its end; batches handed over before stay valid. A panic inside a
-    /// decompressor comes out as an error too.
+    /// A piece that cannot be decoded to its end; batches handed over before stay valid.
     fn decode(
         &self,
         piece: usize,
