@@ -47,8 +47,8 @@ impl Failure {
         }
     }
 
-    /// Prints the line on standard error.
-    pub(crate) fn print(&self) {
+    /// The line that reports it.
+    pub(crate) fn line(&self) -> &str {
         let (Self::Internal(line)
         | Self::Usage(line)
         | Self::Input(line)
@@ -57,9 +57,14 @@ impl Failure {
         | Self::Memory(line)
         | Self::Faults(line)
         | Self::Interrupted(line)) = self;
+        line
+    }
+
+    /// Prints the line on standard error.
+    pub(crate) fn print(&self) {
         // to be stopped is no error
         let word = if matches!(self, Self::Interrupted(_)) { "pointmill" } else { "error" };
-        write_line(word, line);
+        write_line(word, self.line());
     }
 
     /// The operating system refused; `doing` names the attempt ("writing the report").

@@ -31,3 +31,4 @@ mod stops;
 mod support;
 mod text_inputs;
 mod units;
+mod validating;

@@ -36,6 +36,12 @@ fn datasets(path: &Path) -> Vec<Located> {
     locate(path).map_or_else(|_| datasets::inside(path), |one| vec![one])
 }
 
+/// What is named like the first file of a dataset and cannot be read: a pipe, or what may not be looked at.
+fn unreadable_marker(path: &Path) -> Option<Failure> {
+    let error = locate(path).err().filter(|error| error.is_io() && error.path() != path)?;
+    Some(error.into())
+}
+
 /// Describes every path; the exit code is that of the first failure.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     args.reading.placing.refuse_idle_crs()?;
@@ -43,6 +49,10 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     check_choice(&args.paths, &options)?;
     let mut out = Output { json: args.json, objects: 0, first_failure: None };
     for path in &args.paths {
+        if let Some(failure) = unreadable_marker(path) {
+            out.fail(failure);
+            continue;
+        }
         let datasets = datasets(path);
         for dataset in &datasets {
             out.show(describe_dataset(dataset))?;

@@ -6,6 +6,7 @@ use brotlic::{
 };
 
 use crate::WriteError;
+use crate::bytes::try_resize;
 
 /// Input given to the encoder at once, bytes: the next question whether to go on comes after it.
 const PIECE: usize = 64 << 10;
@@ -89,6 +90,8 @@ pub(super) enum Fault {
     Short(usize),
     /// The stream would give more than requested, or more bytes follow its end.
     Long,
+    /// There is no memory for what it gives.
+    Memory,
 }
 
 /// Decompresses `input`, which must be one complete stream of exactly `len` bytes, into `out` (contents replaced).
@@ -101,8 +104,8 @@ pub(super) fn decompress(input: &[u8], len: usize, out: &mut Vec<u8>) -> Result<
     out.clear();
     loop {
         if written == out.len() {
-            let guess = (2 * out.len()).max(input.len().saturating_mul(8)).max(1 << 16);
-            out.resize(guess.min(len), 0);
+            let guess = out.len().saturating_mul(2).max(input.len().saturating_mul(8)).max(1 << 16);
+            try_resize(out, guess.min(len) as u64).map_err(|_| Fault::Memory)?;
         }
         let step = decoder.decompress(&input[read..], &mut out[written..]).map_err(|_| Fault::Corrupt)?;
         read += step.bytes_read;
@@ -113,6 +116,26 @@ pub(super) fn decompress(input: &[u8], len: usize, out: &mut Vec<u8>) -> Result<
             DecoderInfo::Finished => return Ok(()),
             DecoderInfo::NeedsMoreInput => return Err(Fault::Short(written)),
             DecoderInfo::NeedsMoreOutput if written == len => return Err(Fault::Long),
+            DecoderInfo::NeedsMoreOutput => {}
+        }
+    }
+}
+
+/// Finds out whether `input` is one complete stream of exactly `len` bytes, and keeps nothing of it.
+pub(super) fn count(input: &[u8], len: usize) -> Result<(), Fault> {
+    let mut decoder = BrotliDecoder::new();
+    let mut window = vec![0; 1 << 16];
+    let (mut read, mut written) = (0, 0);
+    loop {
+        let step = decoder.decompress(&input[read..], &mut window).map_err(|_| Fault::Corrupt)?;
+        read += step.bytes_read;
+        written += step.bytes_written;
+        match step.info {
+            _ if written > len => return Err(Fault::Long),
+            DecoderInfo::Finished if read < input.len() => return Err(Fault::Long),
+            DecoderInfo::Finished if written < len => return Err(Fault::Short(written)),
+            DecoderInfo::Finished => return Ok(()),
+            DecoderInfo::NeedsMoreInput => return Err(Fault::Short(written)),
             DecoderInfo::NeedsMoreOutput => {}
         }
     }
@@ -161,5 +184,22 @@ mod tests {
         let mut out = vec![7];
         assert!(matches!(compress(&payload(1 << 20), 11, &goes_on, &mut out), Err(WriteError::Stopped)));
         assert_eq!((out, asked.get()), (vec![7], 4));
+    }
+
+    #[test]
+    fn counting_a_stream_finds_what_decompressing_it_finds() {
+        let (mut stream, mut out) = (Vec::new(), Vec::new());
+        compress(&vec![7; 200_000], 6, &|| true, &mut stream).unwrap();
+        let mut both = |input: &[u8], len| {
+            let found = (count(input, len), decompress(input, len, &mut out));
+            assert_eq!(found.0, found.1, "{len}");
+            found.0
+        };
+        assert_eq!(both(&stream, 200_000), Ok(()));
+        assert_eq!(both(&stream, 199_999), Err(Fault::Long));
+        assert_eq!(both(&stream, 200_001), Err(Fault::Short(200_000)));
+        assert_eq!(both(&[&stream[..], &[0]].concat(), 200_000), Err(Fault::Long));
+        assert_eq!(both(&[0xff; 100], 200_000), Err(Fault::Corrupt));
+        assert_eq!(both(&[], 10), Err(Fault::Short(0)));
     }
 }

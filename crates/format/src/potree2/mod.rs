@@ -38,6 +38,7 @@ mod metadata_json;
 mod metadata_parse;
 mod morton;
 mod node_points;
+mod payload;
 mod record;
 
 pub use dataset::Dataset;
