@@ -23,14 +23,12 @@ use crate::warning::Warning;
 pub(crate) use dataset::StagedDataset;
 pub use files::StagedFiles;
 use hidden::HiddenFolder;
+pub(crate) use ours::REPORT_FILE;
 use ours::Standing;
 use place::parent_of;
 pub use place::resolve_path;
 use replace::Replace;
 use room::Place;
-
-/// The account of a run, beside the datasets or in the one that there is.
-pub(crate) const REPORT_FILE: &str = "report.json";
 
 /// A folder that becomes the output when all is well, and vanishes when not.
 pub(crate) struct StagedFolder {

@@ -8,7 +8,8 @@ use pointmill_format::DatasetKind;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use super::REPORT_FILE;
+/// The account of a run, beside the datasets or in the one that there is.
+pub(crate) const REPORT_FILE: &str = "report.json";
 
 /// JSON files of ours are smaller.
 const JSON_BYTES: u64 = 1 << 30;
