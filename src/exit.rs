@@ -164,7 +164,7 @@ mod tests {
         let io_error = || io::Error::from(io::ErrorKind::StorageFull);
         let exists = || ConvertError::Output(OutputFault::Exists("x".into()));
         let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error() };
-        let why = MemoryNeed::OnePlace { points: 1 };
+        let why = MemoryNeed::Part("nodes");
         let table: [(Failure, u8); 9] = [
             (ConvertError::Internal("x".into()).into(), 1),
             (exists().into(), 2),

@@ -148,7 +148,7 @@ mod tests {
         let memory = ConvertError::Memory {
             ceiling: 1 << 20,
             needed: 90 << 20,
-            why: pointmill_converter::MemoryNeed::OnePlace { points: 7 },
+            why: pointmill_converter::MemoryNeed::Part("nodes"),
         };
         assert!(error_line(&memory).ends_with("; pass --memory 91MiB or more"), "{}", error_line(&memory));
     }

@@ -3,6 +3,7 @@
 //! Results go to standard output, everything else to standard error; a failure is one line there. `README.md` has the
 //! table of exit codes, `exit.rs` is where they come from.
 
+mod allocator;
 mod args;
 mod commands;
 mod crs_choice;
@@ -25,6 +26,7 @@ use commands::{convert, extract, info, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {
+    allocator::give_back_early();
     exit::remember_panics();
     interrupt::watch();
     let result = std::panic::catch_unwind(|| run(&args()?)).unwrap_or_else(|_| Err(exit::last_panic()));

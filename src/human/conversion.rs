@@ -121,7 +121,13 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
     t.row("cube side", number(estimate.grid.cube_side));
     t.row("attributes", estimate.attributes.join(", "));
     t.row("bytes/point", estimate.bytes_per_point.to_string());
-    t.row("memory", format!("{}, limit {}", bytes(estimate.memory_bytes), bytes(plan.memory_bytes)));
+    let memory = format!(
+        "{}, limit {}, at least {} needed",
+        bytes(estimate.memory_bytes),
+        bytes(plan.memory_bytes),
+        bytes(estimate.least_memory_bytes)
+    );
+    t.row("memory", memory);
     t.row("temporary", bytes(estimate.temp_bytes));
     t.row("output", format!("{} in {}", bytes(estimate.output_bytes), plan.output.display()));
     if let Some(standing) = standing(&plan.output, plan.overwrite) {

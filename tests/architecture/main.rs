@@ -23,7 +23,7 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
         &[
             &["flags", "printable"],
             &["exit", "datasets"],
-            &["args", "crs_choice", "interrupt"],
+            &["args", "allocator", "crs_choice", "interrupt"],
             &["human", "scan_choice", "text_choice"],
             &["inputs"],
             &["commands"],

@@ -24,7 +24,7 @@ fn bytes(dir: &Dir, options: &[&str]) -> Vec<u8> {
 
 #[test]
 fn one_thread_or_four_in_memory_or_through_temporary_files_in_any_order() {
-    let dir = two_scans(400_000);
+    let dir = two_scans(900_000);
     let one = bytes(&dir, &["scans", "--threads", "1", "--memory", "4GiB"]);
     assert!(one.starts_with(b"QBATCHES"));
     for options in [
@@ -34,7 +34,7 @@ fn one_thread_or_four_in_memory_or_through_temporary_files_in_any_order() {
     ] {
         assert!(bytes(&dir, options) == one, "{options:?} changed the bytes");
     }
-    assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "92 MiB hold 600,000 points?");
+    assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "92 MiB hold 1,350,000 points?");
     if let Some(peak) = dir.report("out")["peak_memory_bytes"].as_u64() {
         assert!(peak <= 92 << 20, "the resident set rose to {} MiB", peak >> 20);
     }

@@ -13,6 +13,7 @@ mod formats;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod memory;
 mod mistakes;
 mod odd_places;
 mod placing;

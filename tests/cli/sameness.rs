@@ -33,11 +33,11 @@ fn one_thread_or_four() {
 
 #[test]
 fn in_memory_or_through_temporary_files() {
-    let dir = two_scans(400_000);
+    let dir = two_scans(900_000);
     let ample = bytes(&dir, &["scans", "--memory", "4GiB"]);
     assert_eq!(dir.report("out")["temp_bytes"], 0);
     let scarce = bytes(&dir, &["scans", "--memory", "92MiB", "--threads", "1"]);
-    assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "92 MiB hold 600,000 points?");
+    assert!(dir.report("out")["temp_bytes"].as_u64().unwrap() > 0, "92 MiB hold 1,350,000 points?");
     assert!(ample == scarce, "the datasets differ");
     if let Some(peak) = dir.report("out")["peak_memory_bytes"].as_u64() {
         assert!(peak <= 92 << 20, "the resident set rose to {} MiB", peak >> 20);

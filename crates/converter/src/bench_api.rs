@@ -66,8 +66,8 @@ impl Sample {
 
     /// The number of candidates that the node takes.
     pub fn choose(&mut self, level: u8, candidates: &[[u32; 3]]) -> usize {
-        self.0.begin();
+        self.0.begin(NodeKey { level, ..NodeKey::ROOT });
         self.0.offer(candidates.iter().copied().map(TreePoint));
-        self.0.choose(NodeKey { level, ..NodeKey::ROOT }).iter().filter(|taken| **taken).count()
+        self.0.choose().iter().filter(|taken| **taken).count()
     }
 }

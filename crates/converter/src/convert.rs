@@ -6,11 +6,13 @@ use std::time::Instant;
 use crate::cloud::Intake;
 use crate::error::ConvertError;
 use crate::gather::{Demand, gather, is_coarse};
+use crate::memory::peak_resident_bytes;
 use crate::outputs::{self, StagedFolder, Target};
 use crate::plan::Plan;
 use crate::report::{self, Account, OtherFilesReport, Report};
 use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemDisk, TempFiles};
 use crate::sources::{Sources, resolve_crs_of_all};
+use crate::warning::Warning;
 
 /// Converts the inputs of `plan` to one dataset for each target. One goes into the output folder itself, several into
 /// folders of their names below it.
@@ -32,25 +34,30 @@ pub fn convert_on(
     events: &dyn Events,
 ) -> Result<Report, ConvertError> {
     let mut clock = Clock::start(events);
+    let peak_before = peak_resident_bytes();
     clock.begin(Phase::Probe, 0);
     outputs::check(plan, targets)?;
     let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk))?;
     let sources = Sources::open(plan, events)?;
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
-    let budget = Budget::new(plan, intake.schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
+    let least = least(targets, &sources, &intake);
+    let budget = Budget::new(plan, intake.schema.stride, least)?;
     resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, disk), events)?;
 
     let demand = Demand { moments: wants.moments, uses: targets.len() as u32 };
+    let reading = rt.budget.reading(&rt.memory)?;
     let cloud = gather(plan, &sources, &intake, demand, &rt, &mut clock)?;
+    drop(reading);
 
     let mut outputs = Vec::new();
     for target in targets {
         clock.begin(Phase::Build, cloud.points());
         let start = Instant::now();
         let dataset = staged.dataset(target.kind(), targets.len() == 1)?;
+        let _building = rt.budget.building(&rt.memory, cloud.points())?;
         let mut output = target.output().write(&cloud, &rt, &dataset)?;
         dataset.sync()?;
         output.warnings.iter().for_each(|w| events.warning(w));
@@ -65,15 +72,33 @@ pub fn convert_on(
         settings: settings(plan, targets),
         other_files: OtherFilesReport::new(&plan.other_files),
         outputs,
+        temp_bytes: rt.temp.written_bytes(),
         phases: clock.finish(),
         seconds: clock.seconds(),
     };
-    let report = report::report(&cloud, account)?;
+    let mut report = report::report(&cloud, account)?;
+    if let Some(warning) = above_ceiling(plan, peak_before) {
+        events.warning(&warning);
+        report.warnings.push(warning);
+    }
     let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
     staged.write_report(&text)?;
     rt.check_stop()?;
     staged.finish()?;
     Ok(report)
+}
+
+/// What the inputs and outputs need at least.
+pub(crate) fn least(targets: &[Target], sources: &Sources, intake: &Intake) -> Least {
+    let decoding = sources.all.iter().zip(&intake.sources).map(|(s, intake)| s.scan.decode_bytes(&intake.wanted));
+    Least::of(targets.iter().map(|t| t.output().least_points()), decoding.max().unwrap_or(0), 0)
+}
+
+/// What there is to say if the process grew beyond the ceiling during this run.
+fn above_ceiling(plan: &Plan, peak_before: Option<u64>) -> Option<Warning> {
+    let (peak, ceiling) = (peak_resident_bytes()?, plan.memory_bytes);
+    (peak > ceiling && peak_before.is_some_and(|before| before < ceiling))
+        .then_some(Warning::AboveCeiling { peak, ceiling })
 }
 
 fn settings(plan: &Plan, targets: &[Target]) -> serde_json::Map<String, serde_json::Value> {

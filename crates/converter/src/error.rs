@@ -169,16 +169,13 @@ pub enum MemoryNeed {
         /// Points that each of them must have in memory.
         points: u64,
     },
-    /// Points that share one place and must be written as one node.
-    OnePlace {
-        /// Points in that place.
-        points: u64,
+    /// What is known of the inputs.
+    Inputs {
+        /// Bytes for all of them.
+        bytes: u64,
     },
-    /// Points that share one cell of the order and must be sorted together.
-    OneCell {
-        /// Points in that cell.
-        points: u64,
-    },
+    /// A part of the run whose size only the points tell, such as "the lists of nodes".
+    Part(&'static str),
 }
 
 impl ConvertError {
@@ -391,12 +388,8 @@ impl fmt::Display for MemoryNeed {
             Self::Threads { threads, points } => {
                 write!(f, "{threads} worker threads need {points} points each in memory")
             }
-            Self::OnePlace { points } => {
-                write!(f, "{points} points share one place and must be written as one node")
-            }
-            Self::OneCell { points } => {
-                write!(f, "{points} points share one cell of the order and must be sorted together")
-            }
+            Self::Inputs { bytes } => write!(f, "what is known of the inputs takes {} MiB", bytes.div_ceil(1 << 20)),
+            Self::Part(what) => write!(f, "{what} need more"),
         }
     }
 }

@@ -1,12 +1,13 @@
 //! What a run would do, from the headers alone.
 
 use crate::cloud::{Cube, Intake, Range, tidy_world};
+use crate::convert::least;
 use crate::error::ConvertError;
 use crate::gather::{from_headers, is_coarse, is_lossless, quantized};
 use crate::outputs::{self, DiskSize, Target, choose_attributes};
 use crate::plan::Plan;
 use crate::report::{Estimate, grid_report, input_reports};
-use crate::runtime::{Budget, Least, Silent};
+use crate::runtime::{Budget, Silent};
 use crate::sources::{Sources, resolve_crs_of_all};
 
 /// Bytes of metadata and report together.
@@ -22,7 +23,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let schema = &intake.schema;
-    let budget = Budget::new(plan, schema.stride, Least::of(targets.iter().map(|t| t.output().least_points())))?;
+    let budget = Budget::new(plan, schema.stride, least(targets, &sources, &intake))?;
     let mut warnings = sources.warnings.clone();
     let crs = resolve_crs_of_all(plan, &sources.all, &mut warnings)?;
     let lattice = from_headers(plan, &sources)?;
@@ -48,8 +49,9 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
         grid: cube.map(|c| grid_report(&lattice, lossless, &c)).unwrap_or_default(),
         attributes: std::iter::once("position".to_owned()).chain(names).collect(),
         bytes_per_point,
+        least_memory_bytes: budget.least_ceiling,
         memory_bytes: budget.estimate_peak(points, schema.stride),
-        temp_bytes: (points * stride).saturating_sub(budget.store_bytes),
+        temp_bytes: (points * stride).saturating_sub(budget.record_bytes(points)),
         output_bytes: points * bytes_per_point + of_nodes + JSON_BYTES,
         warnings,
     })

@@ -45,6 +45,13 @@ pub enum Warning {
     },
     /// The declared bounds, or the coordinate step chosen from them, do not fit the points: they are read again.
     ReadAgain,
+    /// The process took more memory than it was allowed.
+    AboveCeiling {
+        /// Resident set at its highest, bytes.
+        peak: u64,
+        /// The ceiling, bytes.
+        ceiling: u64,
+    },
     /// Bounds that were declared, or decimals of a sample, made the coordinate step too coarse: the points are read
     /// again.
     FinerStep {
@@ -262,6 +269,7 @@ impl Warning {
             Self::InputSkipped { .. } => "input_skipped",
             Self::PointsSkipped { .. } => "points_skipped",
             Self::ReadAgain => "read_again",
+            Self::AboveCeiling { .. } => "above_ceiling",
             Self::FinerStep { .. } => "finer_step",
             Self::CoarserStep { .. } => "coarser_step",
             Self::OutliersDropped { .. } => "outliers_dropped",
@@ -308,6 +316,11 @@ impl Warning {
             Self::ReadAgain => "the points lie outside the bounds that were declared or sampled, or their extent does \
                                 not fit the chosen step; reading again with the measured bounds"
                 .to_owned(),
+            Self::AboveCeiling { peak, ceiling } => format!(
+                "the run took {} MiB of memory, more than the ceiling of {} MiB; please report this scene",
+                peak.div_ceil(1 << 20),
+                ceiling >> 20
+            ),
             Self::FinerStep { scale, reason } => format!(
                 "the coordinates are finer than bounds or a sample showed; reading again with the step {}: {reason}",
                 steps(*scale)

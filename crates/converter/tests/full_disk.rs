@@ -145,7 +145,7 @@ fn a_cloud_that_is_spilled() {
             else {
                 panic!("one byte is enough?")
             };
-            plan.memory_bytes = needed;
+            (plan.memory_bytes, plan.waiting_bytes) = (needed, Some(0));
             let report = convert_on(FailingDisk::never(), plan, targets, &Silent).unwrap();
             assert!(report.temp_bytes > 0, "{what}: nothing was spilled");
         });

@@ -1,4 +1,6 @@
-//! The points of one cell of the partition.
+//! Where points are: cells of the octree as they are stored, and how many points there are in each.
+
+use std::collections::HashMap;
 
 use pointmill_format::NodeKey;
 
@@ -6,7 +8,8 @@ use super::frames::JobBounds;
 use super::moments::Moments;
 use super::segments::Segments;
 
-/// The points of one octree cell, wherever they are stored.
+/// The points of one octree cell, wherever they are stored. Which cells these are depends on memory and on the order of
+/// the points; what must not depend on them is in the [`CensusCell`]s.
 #[derive(Debug, Clone)]
 pub(crate) struct Cell {
     pub(crate) key: NodeKey,
@@ -14,12 +17,40 @@ pub(crate) struct Cell {
     pub(crate) segments: Segments,
     /// All points share one place (known only for cells that had to be looked into).
     pub(crate) is_one_place: bool,
-    /// Points known to repeat the place of another of the cell: those of places that very many share.
-    pub(crate) repeats: u64,
-    /// Extremes of the positions, known for the fullest cells.
-    pub(crate) bounds: Option<JobBounds>,
     /// Sums and extremes of the positions, if some output needs them.
     pub(crate) moments: Moments,
+}
+
+impl Cell {
+    /// A cell of which no more is known than where its records are.
+    pub(crate) fn new(key: NodeKey, segments: Segments, moments: Moments) -> Self {
+        Self { key, points: segments.points(), segments, is_one_place: false, moments }
+    }
+}
+
+/// How many points there are in an occupied cell of the octree: the same for the same points, in whatever order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CensusCell {
+    pub(crate) key: NodeKey,
+    pub(crate) points: u64,
+    /// Points known to repeat the place of another of the cell: those of places that very many share.
+    pub(crate) repeats: u64,
+}
+
+impl CensusCell {
+    /// Points, those of a place that very many share counted once.
+    pub(crate) fn distinct(&self) -> u64 {
+        self.points - self.repeats
+    }
+}
+
+/// How many points there are where.
+#[derive(Debug, Default)]
+pub(crate) struct Census {
+    /// Every occupied cell of one level of the octree, in Morton order.
+    pub(crate) cells: Vec<CensusCell>,
+    /// Extremes of the positions in the fullest of them.
+    pub(crate) bounds: HashMap<NodeKey, JobBounds>,
 }
 
 /// A place that very many points share.
@@ -30,14 +61,7 @@ pub(crate) struct SharedPlace {
     pub(crate) points: u64,
 }
 
-impl Cell {
-    /// Points, those of a place that very many share counted once.
-    pub(crate) fn distinct(&self) -> u64 {
-        self.points - self.repeats
-    }
-
-    /// Where the cell is among those of its level.
-    pub(crate) fn xyz(&self) -> [u32; 3] {
-        [self.key.x, self.key.y, self.key.z]
-    }
+/// Where a node is among those of its level.
+pub(crate) fn xyz(key: NodeKey) -> [u32; 3] {
+    [key.x, key.y, key.z]
 }

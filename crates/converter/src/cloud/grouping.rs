@@ -35,14 +35,22 @@ pub(crate) struct Grouping {
     local: HashMap<u64, u32, CellHash>,
     ids: Vec<u32>,
     seen: Vec<(u64, u32)>,
+    by_cell: Vec<(u64, u32)>,
     starts: Vec<u32>,
 }
 
 impl Grouping {
     /// Groups points, given the cell of each; cells come in ascending order of `rank`.
     pub(crate) fn group(&mut self, cells: &[u64], rank: impl Fn(u64) -> u64) {
+        self.count(cells);
+        self.arrange(rank);
+    }
+
+    /// Counts the points of each cell: `groups` are known then, in order of appearance. [`Self::arrange`] or
+    /// [`Self::leave`] must follow.
+    pub(crate) fn count(&mut self, cells: &[u64]) {
         self.local.clear();
-        self.seen.clear();
+        self.groups.clear();
         self.ids.clear();
         let (mut last, mut id) = (None, 0);
         for &cell in cells {
@@ -50,32 +58,45 @@ impl Grouping {
             if last != Some(cell) {
                 last = Some(cell);
                 id = *self.local.entry(cell).or_insert_with(|| {
-                    self.seen.push((cell, 0));
-                    (self.seen.len() - 1) as u32
+                    self.groups.push((cell, 0));
+                    (self.groups.len() - 1) as u32
                 });
             }
             self.ids.push(id);
-            self.seen[id as usize].1 += 1;
+            self.groups[id as usize].1 += 1;
         }
+    }
+
+    /// Puts the counted points in order: cell by cell, cells in ascending order of `rank`.
+    pub(crate) fn arrange(&mut self, rank: impl Fn(u64) -> u64) {
         // Cells next to each other in space lie next to each other in the block.
-        let mut by_cell: Vec<u32> = (0..self.seen.len() as u32).collect();
-        by_cell.sort_unstable_by_key(|&id| rank(self.seen[id as usize].0));
+        self.by_cell.clear();
+        self.by_cell.extend(self.groups.iter().zip(0..).map(|((cell, _), id)| (rank(*cell), id)));
+        self.by_cell.sort_unstable();
         self.starts.clear();
-        self.starts.resize(self.seen.len(), 0);
-        self.groups.clear();
+        self.starts.resize(self.groups.len(), 0);
+        self.seen.clear();
         let mut start = 0;
-        for &id in &by_cell {
-            self.starts[id as usize] = start;
-            self.groups.push(self.seen[id as usize]);
-            start += self.seen[id as usize].1;
+        for (_, id) in &self.by_cell {
+            let group = self.groups[*id as usize];
+            self.starts[*id as usize] = start;
+            self.seen.push(group);
+            start += group.1;
         }
+        std::mem::swap(&mut self.groups, &mut self.seen);
         self.order.clear();
-        self.order.resize(cells.len(), 0);
+        self.order.resize(self.ids.len(), 0);
         for (i, &id) in self.ids.iter().enumerate() {
             let at = &mut self.starts[id as usize];
             self.order[*at as usize] = i as u32;
             *at += 1;
         }
+    }
+
+    /// Leaves the counted points in the order in which they came.
+    pub(crate) fn leave(&mut self) {
+        self.order.clear();
+        self.order.extend(0..self.ids.len() as u32);
     }
 }
 
@@ -96,5 +117,8 @@ mod tests {
         }
         assert_eq!(seen, 6);
         assert_eq!(g.groups, [(1, 1), (3, 2), (7, 3)]);
+        g.count(&[4, 4, 2]);
+        g.leave();
+        assert_eq!((&g.groups[..], &g.order[..]), (&[(4, 2), (2, 1)][..], &[0, 1, 2][..]));
     }
 }

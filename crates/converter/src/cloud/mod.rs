@@ -1,6 +1,7 @@
 //! All points, once they are read: records grouped by cell in the store, and everything that an output may ask about
 //! them. Made by `gather`; afterwards facts do not change, and each output takes every record out of the store once.
 
+mod big_sort;
 mod cell;
 mod checksum;
 mod cube;
@@ -20,7 +21,8 @@ mod shortfall;
 mod stats;
 mod store;
 
-pub(crate) use cell::{Cell, SharedPlace};
+pub(crate) use big_sort::BigSort;
+pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, xyz};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
@@ -38,10 +40,13 @@ pub(crate) use shortfall::Shortfall;
 pub(crate) use stats::{Change, Range, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
 
+use std::sync::Arc;
+
 use pointmill_format::Aabb;
 
 use crate::error::ConvertError;
 use crate::plan::{Filter, Plan};
+use crate::runtime::Reservation;
 use crate::sources::{Fineness, Schema, Sources, intersection};
 use crate::warning::Warning;
 
@@ -55,9 +60,13 @@ pub(crate) struct Cloud<'a> {
     pub(crate) is_lossless: bool,
     /// How stored records are read; the root cube.
     pub(crate) frame: RecordFrame,
-    pub(crate) store: Store,
-    /// Every occupied cell of the partition's octree level, in Morton order.
+    pub(crate) store: Arc<Store>,
+    /// Where the records are: cells of the octree that do not overlap, in Morton order.
     pub(crate) cells: Vec<Cell>,
+    /// How many points there are where.
+    pub(crate) census: Census,
+    /// What the cells take of the run's memory.
+    _room: Reservation,
     pub(crate) stats: Stats,
     pub(crate) facts: Facts,
     /// Points outside were dropped as outliers.
@@ -73,8 +82,11 @@ pub(crate) struct Gathered {
     pub(crate) lattice: JobLattice,
     pub(crate) is_lossless: bool,
     pub(crate) frame: RecordFrame,
-    pub(crate) store: Store,
+    pub(crate) store: Arc<Store>,
     pub(crate) cells: Vec<Cell>,
+    pub(crate) census: Census,
+    /// What the cells take.
+    pub(crate) room: Reservation,
     pub(crate) stats: Stats,
     pub(crate) shared_places: Vec<SharedPlace>,
 }
@@ -92,7 +104,7 @@ impl<'a> Cloud<'a> {
         far_cut: Option<Aabb>,
         mut warnings: Vec<Warning>,
     ) -> Result<Self, ConvertError> {
-        let Gathered { lattice, is_lossless, frame, store, cells, stats, shared_places } = gathered;
+        let Gathered { lattice, is_lossless, frame, store, cells, census, room, stats, shared_places } = gathered;
         warnings.extend_from_slice(&stats.warnings);
         let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
         Ok(Self {
@@ -104,6 +116,8 @@ impl<'a> Cloud<'a> {
             frame,
             store,
             cells,
+            census,
+            _room: room,
             stats,
             facts,
             far_cut,

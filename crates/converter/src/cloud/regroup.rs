@@ -9,10 +9,17 @@ use crate::error::ConvertError;
 /// Records looked at together: many, so that the groups come in long segments.
 const POINTS: usize = 65_536;
 
+/// Bytes of wide records that are looked at together.
+const BYTES: usize = 4 << 20;
+
 /// Regroups records; keeps its memory from one use to the next.
 pub(crate) struct Regrouper<'a> {
     store: &'a Store,
     stride: usize,
+    /// Records that are looked at together.
+    points: usize,
+    /// For all outputs, not for one.
+    is_for_all: bool,
     grouping: Grouping,
     records: Vec<u8>,
     codes: Vec<u64>,
@@ -20,9 +27,16 @@ pub(crate) struct Regrouper<'a> {
 }
 
 impl<'a> Regrouper<'a> {
+    /// For an output, which takes each record once.
     pub(crate) fn new(store: &'a Store, stride: usize) -> Self {
         let (records, codes, sorted) = (Vec::new(), Vec::new(), Vec::new());
-        Self { store, stride, grouping: Grouping::default(), records, codes, sorted }
+        let points = (BYTES / stride).clamp(1, POINTS);
+        Self { store, stride, points, is_for_all: false, grouping: Grouping::default(), records, codes, sorted }
+    }
+
+    /// For all outputs, before the first of them takes a record.
+    pub(crate) fn for_all(store: &'a Store, stride: usize) -> Self {
+        Self { is_for_all: true, ..Self::new(store, stride) }
     }
 
     /// Takes the records of `segments` and puts them back grouped by `code` (a Morton code: groups that are near in space
@@ -38,11 +52,14 @@ impl<'a> Regrouper<'a> {
             let mut start = 0;
             while start < segment.count {
                 let before = self.records.len();
-                let room = POINTS - before / self.stride;
+                let room = self.points - before / self.stride;
                 let count = (segment.count - start).min(room as u32);
                 let part = Segment { block: segment.block, start: segment.start + start, count };
                 start += count;
-                let from = self.store.take(part, &mut self.records)?;
+                let from = match self.is_for_all {
+                    true => self.store.take_for_all(part, &mut self.records)?,
+                    false => self.store.take(part, &mut self.records)?,
+                };
                 if let Some(source) = source.filter(|s| *s != from) {
                     // A block holds records of one source.
                     let rest = self.records.split_off(before);
@@ -50,7 +67,7 @@ impl<'a> Regrouper<'a> {
                     self.records = rest;
                 }
                 source = Some(from);
-                if self.records.len() >= POINTS * self.stride {
+                if self.records.len() >= self.points * self.stride {
                     self.put_back(from, &mut code, &mut found)?;
                 }
             }
@@ -84,6 +101,9 @@ impl<'a> Regrouper<'a> {
             start += count;
         }
         self.records.clear();
-        self.store.refill(block, &mut self.sorted)
+        match self.is_for_all {
+            true => self.store.fill(block, &mut self.sorted),
+            false => self.store.refill(block, &mut self.sorted),
+        }
     }
 }

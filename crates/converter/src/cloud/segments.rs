@@ -1,5 +1,7 @@
 //! Where records are: runs of consecutive records of one block.
 
+use std::sync::Arc;
+
 /// A run of records of one block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Segment {
@@ -21,28 +23,39 @@ impl Segment {
     }
 }
 
-/// The records of a cell, a chunk or any other part of the cloud.
+/// The records of a cell, a chunk or any other part of the cloud. Copies share their memory until one changes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Segments(Vec<Segment>);
+pub(crate) struct Segments(Arc<Vec<Segment>>);
 
 impl Segments {
     /// Adds a segment; one that continues the last is joined to it.
     pub(crate) fn push(&mut self, segment: Segment) {
-        match self.0.last_mut() {
+        let all = Arc::make_mut(&mut self.0);
+        match all.last_mut() {
             Some(last) if last.is_followed_by(&segment) => last.count += segment.count,
-            _ => self.0.push(segment),
+            _ => all.push(segment),
         }
     }
 
     /// Adds all of `other`.
-    pub(crate) fn append(&mut self, other: &mut Self) {
-        self.0.append(&mut other.0);
+    pub(crate) fn append(&mut self, other: Self) {
+        if self.is_empty() {
+            *self = other;
+        } else {
+            Arc::make_mut(&mut self.0).extend_from_slice(&other.0);
+        }
+    }
+
+    /// Memory that they take, bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        (self.0.capacity() * size_of::<Segment>()) as u64
     }
 
     /// Puts the segments in order of block and joins those that follow each other.
     pub(crate) fn sort(&mut self) {
-        self.0.sort_unstable_by_key(|s| (s.block, s.start));
-        self.0.dedup_by(|next, previous| {
+        let all = Arc::make_mut(&mut self.0);
+        all.sort_unstable_by_key(|s| (s.block, s.start));
+        all.dedup_by(|next, previous| {
             let joins = previous.is_followed_by(next);
             if joins {
                 previous.count += next.count;

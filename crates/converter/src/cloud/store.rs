@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use super::segments::Segment;
 use crate::error::ConvertError;
-use crate::runtime::{DiskFile, TempFiles, os_hints};
+use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
 
 /// Blocks grow to this size: a few large pages, and one long write when they go to disk.
 pub(crate) const BLOCK_BYTES: usize = 8 << 20;
@@ -15,7 +15,7 @@ pub(crate) struct Store {
     stride: usize,
     /// How often each record is taken.
     uses: u32,
-    memory_limit: u64,
+    memory: Arc<Pool>,
     in_memory: AtomicU64,
     blocks: Mutex<Vec<Block>>,
     temp: TempFiles,
@@ -38,29 +38,25 @@ enum Place {
 }
 
 impl Store {
-    /// An empty store that keeps up to `memory_limit` bytes in memory and puts the rest into a temporary file, for `uses`
-    /// outputs that each take every record once.
-    pub(crate) fn new(temp: TempFiles, stride: usize, uses: u32, memory_limit: u64) -> Self {
-        Self {
+    /// An empty store for `uses` outputs that each take every record once. What finds no room in `memory` goes into a
+    /// temporary file.
+    pub(crate) fn new(temp: TempFiles, stride: usize, uses: u32, memory: &Arc<Pool>) -> Arc<Self> {
+        Arc::new(Self {
             stride,
             uses,
-            memory_limit,
+            memory: Arc::clone(memory),
             in_memory: AtomicU64::new(0),
             blocks: Mutex::default(),
             temp,
             spill: Mutex::default(),
             spilled: AtomicU64::new(0),
-        }
+        })
     }
 
     /// Bytes that went to the spill file.
-    pub(crate) fn spilled_bytes(&self) -> u64 {
+    #[cfg(test)]
+    fn spilled_bytes(&self) -> u64 {
         self.spilled.load(Ordering::Relaxed)
-    }
-
-    /// Bytes of the memory limit that no block takes up now.
-    pub(crate) fn unused_bytes(&self) -> u64 {
-        self.memory_limit.saturating_sub(self.in_memory.load(Ordering::Relaxed))
     }
 
     /// The index that the next block will have; it must be added with [`Self::fill`].
@@ -84,15 +80,12 @@ impl Store {
         let bytes = records.len() as u64;
         let keeps_buffer = records.len() * 2 > records.capacity();
         let cost = if keeps_buffer { records.capacity() as u64 } else { bytes };
-        let before = self.in_memory.fetch_add(cost, Ordering::Relaxed);
-        let place = if before + cost <= self.memory_limit {
+        let place = if self.memory.try_take(Consumer::Records, cost) {
+            self.in_memory.fetch_add(cost, Ordering::Relaxed);
             let kept = if keeps_buffer { std::mem::take(records) } else { records.as_slice().to_vec() };
             Place::Memory(Arc::new(kept))
         } else {
-            self.in_memory.fetch_sub(cost, Ordering::Relaxed);
-            let offset = self.spilled.fetch_add(bytes, Ordering::Relaxed);
-            self.spill_file()?.write_at(records, offset, "writing the spill file")?;
-            Place::Disk { offset }
+            self.spill(records)?
         };
         records.clear();
         let remaining = bytes / self.stride as u64 * u64::from(uses);
@@ -104,16 +97,25 @@ impl Store {
 
     /// Appends the records of a segment to `out` and returns its source. Each output may take each record once.
     pub(crate) fn take(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        self.take_uses(segment, 1, out)
+    }
+
+    fn take_uses(&self, segment: Segment, uses: u32, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
         let source = self.read(segment, out)?;
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let block = &mut blocks[segment.block as usize];
-        block.remaining = block.remaining.saturating_sub(u64::from(segment.count));
+        block.remaining = block.remaining.saturating_sub(u64::from(segment.count) * u64::from(uses));
         if block.remaining == 0
             && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
         {
-            self.in_memory.fetch_sub(bytes.capacity() as u64, Ordering::Relaxed);
+            self.give(bytes.capacity() as u64);
         }
         Ok(source)
+    }
+
+    /// [`Self::take`] for all outputs at once: the records must be put back by [`Self::fill`].
+    pub(crate) fn take_for_all(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+        self.take_uses(segment, self.uses, out)
     }
 
     /// [`Self::take`], but the records can be taken still.
@@ -138,6 +140,18 @@ impl Store {
         Ok(source)
     }
 
+    /// Puts records behind those that are in the spill file.
+    fn spill(&self, records: &[u8]) -> Result<Place, ConvertError> {
+        let offset = self.spilled.fetch_add(records.len() as u64, Ordering::Relaxed);
+        self.spill_file()?.write_at(records, offset, "writing the spill file")?;
+        Ok(Place::Disk { offset })
+    }
+
+    fn give(&self, bytes: u64) {
+        self.in_memory.fetch_sub(bytes, Ordering::Relaxed);
+        self.memory.give(Consumer::Records, bytes);
+    }
+
     /// The spill file, made when first needed.
     fn spill_file(&self) -> Result<Arc<DiskFile>, ConvertError> {
         let mut spill = self.spill.lock().map_err(|_| poisoned())?;
@@ -145,6 +159,42 @@ impl Store {
             return Ok(Arc::clone(file));
         }
         Ok(Arc::clone(spill.insert(Arc::new(self.temp.make()?))))
+    }
+}
+
+impl Evict for Store {
+    /// The last blocks go first: they are needed last.
+    fn evict(&self, bytes: u64) -> Result<(), ConvertError> {
+        let (mut freed, mut next) = (0, usize::MAX);
+        while freed < bytes {
+            let found = {
+                let blocks = self.blocks.lock().map_err(|_| poisoned())?;
+                let in_memory = |block: &Block| matches!(block.place, Place::Memory(_));
+                let last = blocks.iter().take(next).rposition(in_memory);
+                last.and_then(|i| {
+                    if let Place::Memory(bytes) = &blocks[i].place { Some((i, Arc::clone(bytes))) } else { None }
+                })
+            };
+            let Some((index, records)) = found else { break };
+            next = index;
+            let place = self.spill(&records)?;
+            let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+            let block = &mut blocks[index];
+            // another thread may have been faster, or all of it was taken meanwhile
+            if matches!(&block.place, Place::Memory(bytes) if Arc::ptr_eq(bytes, &records)) {
+                block.place = place;
+                drop(blocks);
+                freed += records.capacity() as u64;
+                self.give(records.capacity() as u64);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        self.memory.give(Consumer::Records, self.in_memory.load(Ordering::Relaxed));
     }
 }
 
@@ -157,10 +207,29 @@ mod tests {
     use super::*;
     use crate::runtime::SystemDisk;
 
-    fn store(uses: u32) -> (tempfile::TempDir, Store) {
+    fn store(uses: u32) -> (tempfile::TempDir, Arc<Store>) {
         let dir = tempfile::tempdir().unwrap();
         let temp = TempFiles::new(dir.path().to_path_buf(), Arc::new(SystemDisk));
-        (dir, Store::new(temp, 4, uses, 40))
+        (dir, Store::new(temp, 4, uses, &Arc::new(Pool::new(40, 40))))
+    }
+
+    #[test]
+    fn records_that_must_leave_memory_are_found_on_the_disk() {
+        let (_dir, store) = store(1);
+        let blocks = [0, 1].map(|_| store.open(0).unwrap());
+        let mut out = Vec::new();
+        for (block, n) in blocks.into_iter().zip([0u8, 16]) {
+            store.fill(block, &mut (n..n + 16).collect()).unwrap();
+        }
+        assert_eq!((store.memory.free(), store.spilled_bytes()), (8, 0));
+        store.evict(10).unwrap();
+        assert_eq!((store.memory.free(), store.spilled_bytes()), (24, 16));
+        store.evict(100).unwrap();
+        assert_eq!((store.memory.free(), store.spilled_bytes()), (40, 32));
+        for block in blocks {
+            store.take(Segment { block, start: 0, count: 4 }, &mut out).unwrap();
+        }
+        assert_eq!(out, (0..32).collect::<Vec<u8>>());
     }
 
     #[test]

@@ -7,11 +7,11 @@ use pointmill_format::{Column, PointBatch, Positions};
 
 use super::axis::{Moved, SourceMap};
 use super::columns::Part;
-use super::context::{CellParts, Context};
+use super::context::{Collected, Context};
 use super::{exact, moved, partition, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
-use crate::runtime::os_hints;
+use crate::runtime::{Consumer, Reservation, os_hints};
 use crate::sources::{MARK_BYTES, POSITION_BYTES, Recast};
 
 /// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
@@ -25,11 +25,18 @@ const SLICE_POINTS: usize = 8_192;
 /// grow as large as the points.
 const MIN_POINTS_PER_SEGMENT: usize = 64;
 
+/// Whole batches with fewer points in a cell stay as they are, until all records are in and can be grouped together.
+const LOOSE_POINTS_PER_SEGMENT: usize = 32;
+
+/// A thread lists the records of that many cells; those of others stay as they are, too.
+const MOST_CELLS: usize = 1 << 16;
+
 /// One thread's part of the pass.
 pub(super) struct Worker<'a> {
     pass: &'a Context<'a>,
     pub(super) stats: Stats,
-    parts: CellParts,
+    collected: Collected,
+    room: Reservation,
     q: JobColumns,
     /// See [`exact::marks`]; empty if they are not needed.
     marks: Vec<u64>,
@@ -52,7 +59,8 @@ impl<'a> Worker<'a> {
         Self {
             pass,
             stats: Stats::new(&pass.intake.schema, pass.sources.all.len()),
-            parts: CellParts::default(),
+            collected: Collected::default(),
+            room: Reservation::new(pass.memory, Consumer::Cells),
             q: JobColumns::default(),
             marks: Vec::new(),
             change: Default::default(),
@@ -65,9 +73,9 @@ impl<'a> Worker<'a> {
     }
 
     /// Hands over the last block and everything that was measured.
-    pub(super) fn finish(mut self) -> Result<(Stats, CellParts), ConvertError> {
+    pub(super) fn finish(mut self) -> Result<(Stats, Collected, Reservation), ConvertError> {
         self.close_block()?;
-        Ok((self.stats, self.parts))
+        Ok((self.stats, self.collected, self.room))
     }
 
     /// Takes one batch of `source`: filter, lattice, ranges, cells, records.
@@ -93,7 +101,7 @@ impl<'a> Worker<'a> {
             let range = start..if is_scattered { kept } else { (start + SLICE_POINTS).min(kept) };
             start = range.end;
             let rows = if filtered { Rows::Selected(&selection[range]) } else { Rows::Consecutive(range) };
-            outcome = self.take_slice(source, batch, &columns, &rows);
+            outcome = self.take_slice(source, batch, &columns, &rows, is_scattered);
             if outcome.is_err() {
                 break;
             }
@@ -134,6 +142,7 @@ impl<'a> Worker<'a> {
         batch: &PointBatch,
         columns: &[&Column],
         rows: &Rows<'_>,
+        is_scattered: bool,
     ) -> Result<(), ConvertError> {
         let bounds = self.quantize(source, batch, rows);
         self.stats.bounds.union(&bounds);
@@ -159,10 +168,22 @@ impl<'a> Worker<'a> {
         self.stats.points += points as u64;
         self.stats.sources[source].kept += points as u64;
         self.pass.partition.cells(&self.q, &mut self.cells);
-        self.grouping.group(&self.cells, partition::morton_of);
+        self.grouping.count(&self.cells);
+        let is_loose = is_scattered && self.grouping.groups.len() * LOOSE_POINTS_PER_SEGMENT > points;
+        if is_loose {
+            self.grouping.leave();
+        } else {
+            self.grouping.arrange(partition::morton_of);
+        }
         let (block, start) = self.room_for(source, points)?;
         self.assemble(source, columns, rows);
-        self.note_segments(block, start);
+        if is_loose {
+            self.collected.loose.push(Segment { block, start, count: points as u32 });
+            let census = &mut self.collected.census;
+            self.grouping.groups.iter().for_each(|(cell, count)| census.add(*cell, u64::from(*count)));
+        } else {
+            self.note_segments(block, start);
+        }
         Ok(())
     }
 
@@ -188,6 +209,7 @@ impl<'a> Worker<'a> {
     }
 
     fn close_block(&mut self) -> Result<(), ConvertError> {
+        self.room.resize(self.collected.bytes())?;
         match self.open.take() {
             Some(block) => self.pass.store.fill(block.index, &mut self.records),
             None => Ok(()),
@@ -270,11 +292,21 @@ impl<'a> Worker<'a> {
 
     fn note_segments(&mut self, block: u32, mut start: u32) {
         let mut first = 0;
+        let Collected { cells, loose, census, segments } = &mut self.collected;
+        *segments += self.grouping.groups.len() as u64;
         for &(cell, count) in &self.grouping.groups {
-            let part = self.parts.entry(cell).or_default();
-            part.segments.push(Segment { block, start, count });
-            if self.pass.wants_moments {
-                part.moments.add_rows(&self.q, &self.grouping.order[first..first + count as usize]);
+            let segment = Segment { block, start, count };
+            census.add(cell, u64::from(count));
+            let is_full = cells.len() >= MOST_CELLS;
+            let part = if is_full { cells.get_mut(&cell) } else { Some(cells.entry(cell).or_default()) };
+            match part {
+                Some(part) => {
+                    part.segments.push(segment);
+                    if self.pass.wants_moments {
+                        part.moments.add_rows(&self.q, &self.grouping.order[first..first + count as usize]);
+                    }
+                }
+                None => loose.push(segment),
             }
             first += count as usize;
             start += count;

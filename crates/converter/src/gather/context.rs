@@ -1,18 +1,24 @@
 //! What all threads of a pass share.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use pointmill_format::Lattice;
 
 use super::axis::SourceMap;
+use super::census::Counts;
 use super::cut::Cut;
 use super::lattice::ulp;
 use super::origins::Origins;
 use super::partition::Partition;
-use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segments, Store};
+use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segment, Segments, Store};
 use crate::plan::Plan;
+use crate::runtime::Pool;
 use crate::sources::Sources;
+
+/// Bytes of a list of segments beside the segments themselves.
+const SEGMENTS_BYTES: usize = 64;
 
 /// What the outputs need of the cloud beside attributes.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +47,8 @@ pub(super) struct Context<'a> {
     /// The lattice of the pass.
     pub(super) lattice: Lattice,
     pub(super) partition: Partition,
-    pub(super) store: Store,
+    pub(super) store: Arc<Store>,
+    pub(super) memory: &'a Arc<Pool>,
     pub(super) wants_moments: bool,
     /// True once a point did not fit the partition: from then on only bounds are wanted.
     pub(super) misled: AtomicBool,
@@ -67,4 +74,40 @@ pub(super) type CellParts = HashMap<u64, CellPart, CellHash>;
 pub(super) struct CellPart {
     pub(super) segments: Segments,
     pub(super) moments: Moments,
+}
+
+impl CellPart {
+    /// Adds what another thread has of the cell.
+    pub(super) fn merge(&mut self, other: Self) {
+        self.segments.append(other.segments);
+        self.moments.merge(&other.moments);
+    }
+}
+
+/// Where the records of a pass are.
+#[derive(Debug, Default)]
+pub(super) struct Collected {
+    pub(super) cells: CellParts,
+    /// Records in no order of space, to be grouped once all are in.
+    pub(super) loose: Segments,
+    pub(super) census: Counts,
+    /// Segments that were added to the cells.
+    pub(super) segments: u64,
+}
+
+impl Collected {
+    /// Memory that all of it takes, bytes, about.
+    pub(super) fn bytes(&self) -> u64 {
+        // a table is up to half empty, and so is a list that grows
+        let cells = self.cells.capacity() * (size_of::<(u64, CellPart)>() + 1 + SEGMENTS_BYTES);
+        cells as u64 + 2 * self.segments * size_of::<Segment>() as u64 + self.loose.bytes() + self.census.bytes()
+    }
+
+    /// Adds what another thread has collected.
+    pub(super) fn merge(&mut self, other: Self) {
+        other.cells.into_iter().for_each(|(cell, part)| self.cells.entry(cell).or_default().merge(part));
+        self.loose.append(other.loose);
+        self.census.merge(other.census);
+        self.segments += other.segments;
+    }
 }

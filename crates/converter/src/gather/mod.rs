@@ -7,6 +7,7 @@
 
 mod axis;
 mod batch;
+mod census;
 mod columns;
 mod context;
 mod cut;
@@ -14,6 +15,7 @@ mod exact;
 mod fallen;
 mod far;
 mod lattice;
+mod loose;
 mod moved;
 mod origins;
 mod outliers;
@@ -213,7 +215,7 @@ impl Read<'_> {
     ) -> Result<Option<(FarPoints, JobLattice, usize)>, ConvertError> {
         let next = self.settled.unwrap_or(self.lattice);
         let losses = lattice::losses(plan, sources, self.lattice, next, self.stats);
-        let is_crowded = || self.complete.is_some_and(|g| g.cells.iter().any(|c| 2 * c.points > g.stats.points));
+        let is_crowded = || self.complete.is_some_and(|g| g.census.cells.iter().any(|c| 2 * c.points > g.stats.points));
         let is_suspect = |loss: &Loss| match loss {
             Loss::Nothing => false,
             Loss::Of(_) => true,

@@ -2,7 +2,7 @@
 
 use pointmill_format::Aabb;
 
-use crate::cloud::{Cell, Gathered};
+use crate::cloud::{CensusCell, Gathered};
 use crate::warning::Warning;
 
 /// This many points, or one in a million, are a handful.
@@ -40,9 +40,9 @@ impl Outliers {
 /// Looks at the cells of the partition, not at the points. What counts is how many places there are on either side: a
 /// hundred thousand points in one place are one, or the advice would leave out all that was measured.
 pub(super) fn find(gathered: &Gathered) -> Option<Outliers> {
-    let handful = handful(gathered.cells.iter().map(Cell::distinct).sum());
-    let cells: Vec<&Cell> = gathered.cells.iter().collect();
-    let (kept, left_out) = trim(cells, handful)?;
+    let handful = handful(gathered.census.cells.iter().map(CensusCell::distinct).sum());
+    let cells: Vec<&CensusCell> = gathered.census.cells.iter().collect();
+    let (kept, left_out) = trim(cells, handful);
     let (cube, lattice) = (&gathered.frame.cube, &gathered.lattice.lattice);
     let corner = cube.offset(lattice);
     let mut others = Aabb::EMPTY;
@@ -66,12 +66,9 @@ fn handful(places: u64) -> u64 {
 
 /// Leaves out cells from both ends of every axis as long as the distinct points in them are a handful; also returns the
 /// number of points left out, distinct or not.
-fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
+fn trim(mut cells: Vec<&CensusCell>, handful: u64) -> (Vec<&CensusCell>, u64) {
     let (mut left_out, mut points_left_out) = (0, 0);
-    let along = |axis: usize, c: &Cell| [c.key.x, c.key.y, c.key.z][axis];
-    if cells.windows(2).any(|w| w[0].key.level != w[1].key.level) {
-        return None; // divided already
-    }
+    let along = |axis: usize, c: &CensusCell| [c.key.x, c.key.y, c.key.z][axis];
     for axis in 0..3 {
         for from_end in [false, true] {
             cells.sort_by_key(|c| if from_end { u32::MAX - along(axis, c) } else { along(axis, c) });
@@ -92,46 +89,35 @@ fn trim(mut cells: Vec<&Cell>, handful: u64) -> Option<(Vec<&Cell>, u64)> {
             left_out += cut.2;
         }
     }
-    Some((cells, points_left_out))
+    (cells, points_left_out)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::{Moments, Segments};
     use pointmill_format::NodeKey;
 
-    fn cell(x: u32, points: u64) -> Cell {
-        let key = NodeKey { level: 8, x, y: 3, z: 0 };
-        Cell {
-            key,
-            points,
-            segments: Segments::default(),
-            is_one_place: false,
-            repeats: 0,
-            bounds: None,
-            moments: Moments::default(),
-        }
+    fn cell(x: u32, points: u64) -> CensusCell {
+        CensusCell { key: NodeKey { level: 8, x, y: 3, z: 0 }, points, repeats: 0 }
     }
 
-    fn shared(x: u32, points: u64) -> Cell {
-        Cell { repeats: points - 1, is_one_place: true, ..cell(x, points) }
+    fn shared(x: u32, points: u64) -> CensusCell {
+        CensusCell { repeats: points - 1, ..cell(x, points) }
     }
 
     #[test]
     fn few_points_beyond_a_gap_are_left_out_and_many_are_not() {
         let cells = [cell(0, 3), cell(100, 50_000), cell(101, 70_000), cell(255, 2)];
-        let (kept, left_out) = trim(cells.iter().collect(), 16).unwrap();
+        let (kept, left_out) = trim(cells.iter().collect(), 16);
         assert_eq!((kept.len(), left_out), (2, 5));
         let many = [cell(0, 30), cell(100, 50_000)];
-        assert_eq!(trim(many.iter().collect(), 16).unwrap().1, 0);
+        assert_eq!(trim(many.iter().collect(), 16).1, 0);
     }
 
     #[test]
     fn a_mass_of_points_in_one_place_counts_as_one() {
-        let find = |cells: &[Cell]| {
-            let (kept, left_out) =
-                trim(cells.iter().collect(), handful(cells.iter().map(Cell::distinct).sum())).unwrap();
+        let find = |cells: &[CensusCell]| {
+            let (kept, left_out) = trim(cells.iter().collect(), handful(cells.iter().map(CensusCell::distinct).sum()));
             (kept.len(), left_out)
         };
         assert_eq!(find(&[shared(0, 99_999), cell(255, 1)]), (2, 0), "the only other point stays");
@@ -146,7 +132,7 @@ mod tests {
 
     #[test]
     fn thin_edges_without_a_gap_stay() {
-        let cells: Vec<Cell> = (0..200).map(|x| cell(x, if x < 5 { 1 } else { 9_000 })).collect();
-        assert_eq!(trim(cells.iter().collect(), 16).unwrap().1, 0);
+        let cells: Vec<CensusCell> = (0..200).map(|x| cell(x, if x < 5 { 1 } else { 9_000 })).collect();
+        assert_eq!(trim(cells.iter().collect(), 16).1, 0);
     }
 }

@@ -45,7 +45,8 @@ impl Partition {
         };
         let grid = match shift {
             Ok(shift) => {
-                let first = std::array::from_fn(|a| (center[a] >> shift[a]) - (1 << (CELL_BITS - 1)));
+                // whole multiples of what wider cells may span
+                let first = std::array::from_fn(|a| ((center[a] >> shift[a]) - (1 << (CELL_BITS - 1))) >> 8 << 8);
                 Grid::Absolute { shift, first }
             }
             Err(cube) => Grid::OfCube { cube: Box::new(cube), level },
@@ -100,23 +101,29 @@ impl Partition {
         }
     }
 
-    /// The octree node of a packed cell.
-    pub(super) fn node(&self, packed: u64, cube: &Cube) -> NodeKey {
+    /// The octree node of a packed cell that is `wider` levels above those of the partition.
+    pub(super) fn node(&self, packed: u64, wider: u32, cube: &Cube) -> NodeKey {
         let cell = unpack(packed);
         match &self.grid {
             Grid::Absolute { shift, first } => {
-                let [x, y, z] = std::array::from_fn(|a| (cell[a] as i64 + first[a] - (cube.min[a] >> shift[a])) as u32);
-                NodeKey { level: cube.level_of(*shift) as u8, x, y, z }
+                let at = |a: usize| cell[a] as i64 + (first[a] >> wider) - (cube.min[a] >> (shift[a] + wider));
+                let [x, y, z] = [0, 1, 2].map(|a| at(a) as u32);
+                NodeKey { level: (cube.level_of(*shift) - wider) as u8, x, y, z }
             }
             Grid::OfCube { level, .. } => {
                 let [x, y, z] = cell.map(|c| c as u32);
-                NodeKey { level: *level as u8, x, y, z }
+                NodeKey { level: (*level - wider) as u8, x, y, z }
             }
         }
     }
 }
 
-fn pack(cell: [u64; 3]) -> u64 {
+/// The cell `wider` levels above one of the partition.
+pub(super) fn coarser(packed: u64, wider: u32) -> u64 {
+    if wider == 0 { packed } else { pack(unpack(packed).map(|c| c >> wider)) }
+}
+
+pub(super) fn pack(cell: [u64; 3]) -> u64 {
     let mask = (1 << CELL_BITS) - 1;
     (cell[0] & mask) << (2 * CELL_BITS) | (cell[1] & mask) << CELL_BITS | (cell[2] & mask)
 }
@@ -147,7 +154,7 @@ mod tests {
         for corner in 0..8 {
             let q: [i64; 3] = std::array::from_fn(|a| if corner >> a & 1 == 0 { actual.min[a] } else { actual.max[a] });
             partition.cells(&JobColumns(q.map(|v| vec![v])), &mut cells);
-            let node = partition.node(cells[0], &cube);
+            let node = partition.node(cells[0], 0, &cube);
             assert_eq!([node.x, node.y, node.z], cube.tree(JobPoint(q)).cell(31 - u32::from(node.level)));
         }
         true

@@ -1,22 +1,33 @@
 //! One pass over the sources, with a lattice and bounds that are believed until they prove wrong.
 
+use std::collections::HashMap;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use pointmill_format::{Aabb, Advice, AxisGrid, Lattice, Scratch};
+use pointmill_format::{Aabb, Advice, AxisGrid, Lattice, NodeKey, Scratch};
 
 use super::axis::SourceMap;
 use super::batch::Worker;
-use super::context::{CellPart, CellParts, Context, Demand};
+use super::context::{CellPart, Collected, Context, Demand};
 use super::cut::Cut;
 use super::lattice::ulp;
+use super::loose::Grouper;
 use super::origins::Origins;
 use super::partition::Partition;
-use crate::cloud::{Cell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton};
+use crate::cloud::{
+    Cell, Census, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz,
+};
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
-use crate::runtime::Runtime;
+use crate::runtime::{Consumer, Evict, Reservation, Runtime};
 use crate::sources::{Fineness, Source, Sources};
 use crate::warning::{Warning, reason_of};
+
+/// The level of cells by which records are grouped that came in no order of space: of a volume there are 512 then.
+const LOOSE_LEVEL: u8 = 3;
+
+/// The same where others came in order, so that their cells are wide, too.
+const MIXED_LEVEL: u8 = 5;
 
 /// How a pass over the inputs ended.
 pub(super) enum PassEnd {
@@ -52,6 +63,9 @@ impl<'a> Pass<'a> {
         let cuts = |bounds: Option<Aabb>| -> Vec<Option<Cut>> {
             sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect()
         };
+        let store = Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
+        let evict: Arc<dyn Evict> = Arc::clone(&store) as _;
+        rt.memory.evict_from(Arc::downgrade(&evict));
         let context = Context {
             plan,
             sources,
@@ -63,7 +77,8 @@ impl<'a> Pass<'a> {
             cuts: cuts(plan.filter.bounds),
             origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
-            store: Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, rt.budget.store_bytes),
+            store,
+            memory: &rt.memory,
             wants_moments: demand.moments,
             misled: false.into(),
         };
@@ -72,45 +87,44 @@ impl<'a> Pass<'a> {
 
     /// Reads every point.
     pub(super) fn run(self) -> Result<PassEnd, ConvertError> {
-        let (stats, parts) = self.read()?;
+        let (stats, collected, mut room) = self.read()?;
         let bounds = stats.bounds;
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
         }
-        let Self { context: Context { partition, store, misled, intake, .. }, lattice, .. } = self;
+        let Self { context: Context { partition, store, misled, intake, wants_moments, .. }, lattice, rt } = self;
         let cube = match Cube::around(&bounds, &lattice.lattice) {
             Ok(cube) if !misled.into_inner() && partition.fits(&cube, &bounds) => cube,
             _ => return Ok(PassEnd::Misled(Box::new(stats))),
         };
-        let mut cells: Vec<Cell> = parts
-            .into_iter()
-            .map(|(packed, CellPart { mut segments, moments })| {
-                segments.sort();
-                let points = segments.points();
-                Cell {
-                    key: partition.node(packed, &cube),
-                    points,
-                    segments,
-                    is_one_place: false,
-                    repeats: 0,
-                    bounds: None,
-                    moments,
-                }
-            })
-            .collect();
-        cells.sort_unstable_by(|a, b| morton::compare(a.xyz(), b.xyz()));
+        let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
+        let Collected { cells, loose, census, .. } = collected;
+        let census = Census { cells: census.finish(&partition, &cube), bounds: HashMap::new() };
+        let mut nodes: Vec<(NodeKey, CellPart)> =
+            cells.into_iter().map(|(packed, part)| (partition.node(packed, 0, &cube), part)).collect();
+        if !loose.is_empty() {
+            let level = level_of_loose(&nodes, loose.points(), stats.points);
+            nodes = widened(nodes, level);
+            let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
+            nodes.extend(grouper.group(&loose, u32::from(level))?);
+        }
+        let cells = finished(nodes);
+        let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
+        room.resize(of_cells + (census.cells.capacity() * size_of::<CensusCell>()) as u64)?;
         Ok(PassEnd::Complete(Box::new(Gathered {
             lattice: lattice.clone(),
             is_lossless: is_rounding(&stats, &lattice.lattice),
-            frame: RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() },
+            frame,
             store,
             cells,
+            census,
+            room,
             stats,
             shared_places: Vec::new(),
         })))
     }
 
-    fn read(&self) -> Result<(Stats, CellParts), ConvertError> {
+    fn read(&self) -> Result<(Stats, Collected, Reservation), ConvertError> {
         let pieces = |(s, source): (usize, &Source)| (0..source.scan.pieces().len()).map(move |p| (s, p));
         let pieces: Vec<(usize, usize)> = self.context.sources.all.iter().enumerate().flat_map(pieces).collect();
         let parts = self.rt.in_parallel(
@@ -123,17 +137,15 @@ impl<'a> Pass<'a> {
             |(worker, _)| worker.finish(),
         )?;
         let mut stats = Stats::new(&self.context.intake.schema, self.context.sources.all.len());
-        let mut cells = CellParts::default();
+        let mut collected = Collected::default();
+        let mut room = Reservation::new(&self.rt.memory, Consumer::Cells);
         for part in parts {
-            let (part, more) = part?;
+            let (part, more, taken) = part?;
             stats.merge(&part);
-            for (cell, mut more) in more {
-                let part: &mut CellPart = cells.entry(cell).or_default();
-                part.segments.append(&mut more.segments);
-                part.moments.merge(&more.moments);
-            }
+            collected.merge(more);
+            room.merge(taken);
         }
-        Ok((stats, cells))
+        Ok((stats, collected, room))
     }
 
     /// Decodes one piece; what a broken piece held is counted or is an error, by policy.
@@ -178,6 +190,42 @@ impl<'a> Pass<'a> {
             Err(error) => Err(error.into()),
         }
     }
+}
+
+/// The level of cells by which loose records are grouped, beside cells of one level.
+fn level_of_loose(cells: &[(NodeKey, CellPart)], loose: u64, points: u64) -> u8 {
+    match cells.first() {
+        None => LOOSE_LEVEL,
+        // a few batches do not make all cells wide
+        Some((key, _)) if loose <= points / 16 => key.level,
+        Some((key, _)) => MIXED_LEVEL.min(key.level),
+    }
+}
+
+/// Cells below `level` become the one that they lie in.
+fn widened(cells: Vec<(NodeKey, CellPart)>, level: u8) -> Vec<(NodeKey, CellPart)> {
+    let mut wide: HashMap<NodeKey, CellPart> = HashMap::new();
+    for (key, part) in cells {
+        wide.entry(key.ancestor(level).unwrap_or(key)).or_default().merge(part);
+    }
+    wide.into_iter().collect()
+}
+
+/// One cell for each node, in Morton order.
+fn finished(mut nodes: Vec<(NodeKey, CellPart)>) -> Vec<Cell> {
+    nodes.sort_unstable_by(|(a, _), (b, _)| morton::compare(xyz(*a), xyz(*b)));
+    nodes.dedup_by(|(key, next), (previous, part)| {
+        let is_same = key == previous;
+        if is_same {
+            part.merge(std::mem::take(next));
+        }
+        is_same
+    });
+    let cell = |(key, mut part): (NodeKey, CellPart)| {
+        part.segments.sort();
+        Cell::new(key, part.segments, part.moments)
+    };
+    nodes.into_iter().map(cell).collect()
 }
 
 /// The axes on which the points of a source have to prove a claim: a lattice that does not hold the claimed grid moves

@@ -5,11 +5,12 @@ use std::ops::Range;
 use pointmill_format::NodeKey;
 
 use super::divide::Chunk;
+use super::list::List;
 use super::order::{OrderScratch, Point, order};
-use super::raise::{Nodes, Pending};
+use super::raise::{Nodes, Pairs, Pending, Points};
 use super::sample::Sampler;
 use super::sink::{FinishedNode, NodeEncoder, finish_node};
-use crate::cloud::{Checksum, Cloud, Ledger, TreePoint, morton};
+use crate::cloud::{Checksum, Cloud, Ledger, morton};
 use crate::error::ConvertError;
 use crate::plan::Duplicates;
 use crate::runtime::os_hints;
@@ -27,11 +28,8 @@ pub(super) struct BuiltChunk {
     pub(super) payloads: Vec<u8>,
     /// Byte offsets are relative to `payloads`.
     pub(super) nodes: Vec<FinishedNode>,
-    /// Points are indices into `pending_trees`.
-    pub(super) root: Pending<u32>,
-    /// Tree coordinates and records (as stored) of the pending points.
-    pub(super) pending_trees: Vec<TreePoint>,
-    pub(super) pending_records: Vec<u8>,
+    /// Records as stored.
+    pub(super) root: Pending<List>,
     pub(super) ledger: Ledger,
     pub(super) overfull_leaves: u64,
 }
@@ -52,6 +50,11 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
         Self { plan, sampler, encoder, records, points, scratch }
     }
 
+    /// Gives back the memory of the chunks so far.
+    pub(super) fn release(&mut self) {
+        (self.records, self.points, self.scratch) = (Vec::new(), Vec::new(), OrderScratch::default());
+    }
+
     /// Builds a chunk; `payloads` is a buffer to use again.
     pub(super) fn build(&mut self, chunk: &Chunk, payloads: Vec<u8>) -> Result<BuiltChunk, ConvertError> {
         let frame = &self.plan.cloud.frame;
@@ -65,6 +68,7 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
             points: &self.points,
             records: &self.records,
             stride: frame.stride,
+            sampler: &mut self.sampler,
             encoder: &mut self.encoder,
             payloads,
             nodes: Vec::new(),
@@ -73,17 +77,13 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
         nodes.payloads.clear();
         let room = self.points.len().max(self.plan.usual_points as usize) * frame.stride;
         os_hints::reserve(&mut nodes.payloads, room);
-        let mut subtree =
-            Subtree { capacity: self.plan.leaf_capacity as usize, sampler: &mut self.sampler, overfull_leaves: 0 };
-        let mut root = subtree.node(chunk.key, 0..self.points.len(), &mut nodes)?;
+        let mut subtree = Subtree { capacity: self.plan.leaf_capacity as usize, overfull_leaves: 0 };
+        let root = subtree.node(chunk.key, 0..self.points.len(), &mut nodes)?;
         let overfull_leaves = subtree.overfull_leaves;
         ledger.written = nodes.written;
         let (payloads, nodes) = (nodes.payloads, nodes.nodes);
-        let pending = count(&root);
-        let mut pending_trees = Vec::with_capacity(pending);
-        let mut pending_records = Vec::with_capacity(pending * frame.stride);
-        self.detach(&mut root, &mut pending_trees, &mut pending_records);
-        Ok(BuiltChunk { payloads, nodes, root, pending_trees, pending_records, ledger, overfull_leaves })
+        let root = self.detach(root);
+        Ok(BuiltChunk { payloads, nodes, root, ledger, overfull_leaves })
     }
 
     fn load(&mut self, chunk: &Chunk, ledger: &mut Ledger) -> Result<(), ConvertError> {
@@ -113,43 +113,73 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
     }
 
     /// Copies what the pending nodes refer to, so that the chunk's memory can be used again.
-    fn detach(&self, node: &mut Pending<u32>, trees: &mut Vec<TreePoint>, records: &mut Vec<u8>) {
+    fn detach(&self, node: Pending<Vec<u32>>) -> Pending<List> {
         let stride = self.plan.cloud.frame.stride;
-        for point in &mut node.points {
-            let p = self.points[*point as usize];
-            *point = trees.len() as u32;
-            trees.push(p.t);
-            records.extend_from_slice(&self.records[p.record as usize * stride..][..stride]);
+        let mut records = Vec::with_capacity(node.points.len() * stride);
+        for point in node.points {
+            let record = self.points[point as usize].record as usize;
+            records.extend_from_slice(&self.records[record * stride..][..stride]);
         }
-        for child in &mut node.children {
-            self.detach(child, trees, records);
-        }
+        let children = node.children.into_iter().map(|child| self.detach(child)).collect();
+        Pending { key: node.key, points: List::of_chunk(records, stride), is_inner: node.is_inner, children }
     }
 }
 
-/// Points of a node and of everything below it that was not written.
-fn count(node: &Pending<u32>) -> usize {
-    node.points.len() + node.children.iter().map(count).sum::<usize>()
-}
-
-/// Final nodes of a chunk.
+/// The nodes of a chunk while they are made.
 struct ChunkNodes<'a, E> {
     points: &'a [Point],
     records: &'a [u8],
     stride: usize,
+    sampler: &'a mut Sampler,
     encoder: &'a mut E,
     payloads: Vec<u8>,
     nodes: Vec<FinishedNode>,
     written: Checksum,
 }
 
-impl<E: NodeEncoder> Nodes<u32> for ChunkNodes<'_, E> {
-    #[inline]
-    fn tree(&self, point: u32) -> TreePoint {
-        self.points[point as usize].t
+impl Points for Vec<u32> {
+    fn count(&self) -> u64 {
+        self.len() as u64
+    }
+}
+
+impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, E> {
+    fn sample(&mut self, key: NodeKey, children: &mut [Pending<Vec<u32>>]) -> Result<Vec<u32>, ConvertError> {
+        self.sampler.begin(key);
+        for child in &*children {
+            self.sampler.offer(child.points.iter().map(|p| self.points[*p as usize].t));
+        }
+        let accepted = self.sampler.choose();
+        let mut points = Vec::with_capacity(accepted.iter().map(|b| usize::from(*b)).sum());
+        let mut rest = accepted;
+        for child in children {
+            let (mine, others) = rest.split_at(child.points.len());
+            rest = others;
+            let mut flags = mine.iter();
+            child.points.retain(|p| {
+                let taken = flags.next().is_some_and(|f| *f);
+                if taken {
+                    points.push(*p);
+                }
+                !taken
+            });
+        }
+        Ok(points)
     }
 
-    fn write(&mut self, key: NodeKey, points: &[u32]) -> Result<(), ConvertError> {
+    fn take_middle(&mut self, from: &mut Vec<u32>) -> Result<Vec<u32>, ConvertError> {
+        Ok(vec![from.remove(from.len() / 2)])
+    }
+
+    fn excludes(&mut self, level: u8, points: &Vec<u32>, enough: usize) -> Result<bool, ConvertError> {
+        let mut pairs = Pairs::new(level);
+        Ok(points.iter().any(|p| {
+            pairs.add(self.sampler, self.points[*p as usize].t);
+            pairs.count >= enough
+        }))
+    }
+
+    fn write(&mut self, key: NodeKey, points: Vec<u32>) -> Result<(), ConvertError> {
         let records = points.iter().map(|p| {
             let at = self.points[*p as usize].record as usize * self.stride;
             &self.records[at..at + self.stride]
@@ -161,19 +191,18 @@ impl<E: NodeEncoder> Nodes<u32> for ChunkNodes<'_, E> {
 }
 
 /// The division of a chunk into nodes.
-struct Subtree<'a> {
+struct Subtree {
     capacity: usize,
-    sampler: &'a mut Sampler,
     overfull_leaves: u64,
 }
 
-impl Subtree<'_> {
+impl Subtree {
     fn node(
         &mut self,
         key: NodeKey,
         range: Range<usize>,
         nodes: &mut ChunkNodes<'_, impl NodeEncoder>,
-    ) -> Result<Pending<u32>, ConvertError> {
+    ) -> Result<Pending<Vec<u32>>, ConvertError> {
         let points = &nodes.points[range.clone()];
         let is_one_place = points.first().map(|p| p.t) == points.last().map(|p| p.t);
         if points.len() <= self.capacity || is_one_place {
@@ -190,6 +219,6 @@ impl Subtree<'_> {
                 start += count;
             }
         }
-        Pending::above(key, children, self.sampler, nodes)
+        Pending::above(key, children, nodes)
     }
 }

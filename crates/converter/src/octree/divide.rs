@@ -55,14 +55,9 @@ fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) 
     let mut parts = BTreeMap::<u64, Segments>::new();
     regrouper.regroup(&cell.segments, code, |path, segment| parts.entry(path).or_default().push(segment))?;
     let is_one_place = extremes.is_some_and(|(lo, hi)| lo == hi);
-    let part = |(path, segments): (u64, Segments)| Cell {
-        key: (0..levels).rev().fold(cell.key, |key, l| key.child((path >> (3 * l) & 7) as u8).unwrap_or(key)),
-        points: segments.iter().map(|s| u64::from(s.count)).sum(),
-        segments,
-        is_one_place,
-        repeats: 0,
-        bounds: None,
-        moments: Moments::default(),
+    let part = |(path, segments): (u64, Segments)| {
+        let key = (0..levels).rev().fold(cell.key, |key, l| key.child((path >> (3 * l) & 7) as u8).unwrap_or(key));
+        Cell { is_one_place, ..Cell::new(key, segments, Moments::default()) }
     };
     Ok(parts.into_iter().map(part).collect())
 }
@@ -76,7 +71,7 @@ fn choose(node: NodeKey, cells: &mut [Cell], max_points: u64, out: &mut Vec<Chun
     let is_last = cells.len() == 1 && (cells[0].is_one_place || cells[0].key == node);
     if points <= max_points || is_last {
         let mut segments = Segments::default();
-        cells.iter_mut().for_each(|c| segments.append(&mut c.segments));
+        cells.iter_mut().for_each(|c| segments.append(std::mem::take(&mut c.segments)));
         segments.sort();
         out.push(Chunk { key: node, points, segments });
         return;

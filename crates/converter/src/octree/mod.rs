@@ -3,7 +3,8 @@
 //! 1. [`divide`] cuts the cloud into chunks, nodes small enough to be built in memory alone.
 //! 2. [`chunk`] puts the points of a chunk in Morton order ([`order`]), divides them into nodes and moves points up the
 //!    tree by the rule of [`raise`]; inner nodes take a [`sample`] of their children.
-//! 3. [`commit`] puts chunks behind one another and builds the few nodes above them as their children become complete.
+//! 3. [`commit`] puts chunks behind one another and builds the few nodes above them ([`top`]) as their children become
+//!    complete; what waits for that is in [`list`]s, in memory or on the disk.
 //!
 //! Finished nodes go to a [`sink`], behind which a format stands. The order of nodes depends on the tree alone: a node's
 //! children are written, in order, once the node can no longer be asked for a point; the root comes last.
@@ -11,10 +12,13 @@
 mod chunk;
 mod commit;
 mod divide;
+mod list;
 mod order;
+mod place;
 mod raise;
 mod sample;
 mod sink;
+mod top;
 
 pub(crate) use commit::Octree;
 #[cfg(feature = "bench")]
@@ -28,6 +32,7 @@ use crate::error::ConvertError;
 use crate::runtime::Runtime;
 use chunk::{ChunkBuilder, ChunkPlan};
 use commit::Committer;
+use top::TopNodes;
 
 /// How a tree is built.
 #[derive(Debug, Clone, Copy)]
@@ -45,23 +50,27 @@ pub(crate) fn build<S: NodeSink>(
     sink: &S,
 ) -> Result<Octree, ConvertError> {
     let chunks = divide::divide(cloud, rt.budget.chunk_points)?;
-    for chunk in &chunks {
-        rt.budget.check_chunk(chunk.points)?;
-    }
     let plan = ChunkPlan {
         cloud,
         leaf_capacity: settings.leaf_capacity,
         usual_points: rt.budget.chunk_points.min(cloud.points()),
     };
     let keys = chunks.iter().map(|c| c.key).collect();
-    let committer = Committer::new(sink, keys, rt.budget.window, cloud.frame.stride, Sampler::new(settings.sampling));
+    let top = TopNodes::new(cloud, rt, Sampler::new(settings.sampling), sink);
+    let committer = Committer::new(keys, rt.budget.window, sink, top);
     rt.in_parallel_or(
         chunks.len(),
         || ChunkBuilder::new(&plan, Sampler::new(settings.sampling), sink.encoder()),
         |builder, index| {
             let Some(buffer) = committer.admit(index) else { return Ok(()) };
             rt.check_stop()?; // it may have waited long
-            let built = builder.build(&chunks[index], buffer)?;
+            let chunk = &chunks[index];
+            let built = if chunk.points > rt.budget.chunk_points {
+                builder.release();
+                place::build(&plan, chunk, rt, rt.budget.chunk_bytes())?
+            } else {
+                builder.build(chunk, buffer)?
+            };
             committer.submit(index, built)?;
             rt.advance(chunks[index].points);
             Ok(())

@@ -16,28 +16,41 @@ use crate::error::ConvertError;
 /// later (one point each, at most 31 of them); everything below it is then final.
 const ENOUGH_FOR_ALL_ANCESTORS: usize = 32;
 
-/// A node whose points are not final.
+/// A node whose points are not final; `L`: a list of points.
 #[derive(Debug)]
-pub(super) struct Pending<P> {
+pub(super) struct Pending<L> {
     pub(super) key: NodeKey,
     /// In Morton order.
-    pub(super) points: Vec<P>,
+    pub(super) points: L,
     pub(super) is_inner: bool,
     /// Children that were not written yet; empty once they are.
-    pub(super) children: Vec<Pending<P>>,
+    pub(super) children: Vec<Pending<L>>,
+}
+
+/// A list of points in Morton order.
+pub(super) trait Points {
+    /// Their number.
+    fn count(&self) -> u64;
 }
 
 /// What the rule needs from its surroundings.
-pub(super) trait Nodes<P> {
-    /// Tree coordinates of a point.
-    fn tree(&self, point: P) -> TreePoint;
+pub(super) trait Nodes<L: Points> {
+    /// Chooses the points of the node above `children`; these keep the rest.
+    fn sample(&mut self, key: NodeKey, children: &mut [Pending<L>]) -> Result<L, ConvertError>;
+
+    /// Moves the middle one of a list into a list of its own.
+    fn take_middle(&mut self, from: &mut L) -> Result<L, ConvertError>;
+
+    /// True if `enough` disjoint pairs of points (neighbours in Morton order) exclude one another in a sample of `level`.
+    fn excludes(&mut self, level: u8, points: &L, enough: usize) -> Result<bool, ConvertError>;
+
     /// Writes a final node.
-    fn write(&mut self, key: NodeKey, points: &[P]) -> Result<(), ConvertError>;
+    fn write(&mut self, key: NodeKey, points: L) -> Result<(), ConvertError>;
 }
 
-impl<P: Copy> Pending<P> {
+impl<L: Points> Pending<L> {
     /// A leaf.
-    pub(super) fn leaf(key: NodeKey, points: Vec<P>) -> Self {
+    pub(super) fn leaf(key: NodeKey, points: L) -> Self {
         Self { key, points, is_inner: false, children: Vec::new() }
     }
 
@@ -45,91 +58,83 @@ impl<P: Copy> Pending<P> {
     pub(super) fn above(
         key: NodeKey,
         mut children: Vec<Self>,
-        sampler: &mut Sampler,
-        nodes: &mut impl Nodes<P>,
+        nodes: &mut impl Nodes<L>,
     ) -> Result<Self, ConvertError> {
-        sampler.begin();
-        for child in &children {
-            sampler.offer(child.points.iter().map(|p| nodes.tree(*p)));
-        }
-        let accepted = sampler.choose(key);
-        let mut points = Vec::with_capacity(accepted.iter().map(|b| usize::from(*b)).sum());
-        let mut rest = accepted;
+        let points = nodes.sample(key, &mut children)?;
         for child in &mut children {
-            let (mine, others) = rest.split_at(child.points.len());
-            rest = others;
-            let mut flags = mine.iter();
-            child.points.retain(|p| {
-                let taken = flags.next().is_some_and(|f| *f);
-                if taken {
-                    points.push(*p);
-                }
-                !taken
-            });
+            child.refill(nodes)?;
         }
+        children.retain(|c| c.points.count() > 0);
         for child in &mut children {
-            child.refill();
-        }
-        children.retain(|c| !c.points.is_empty());
-        for child in &mut children {
-            if child.points.len() >= ENOUGH_FOR_ALL_ANCESTORS {
+            if child.points.count() >= ENOUGH_FOR_ALL_ANCESTORS as u64 {
                 child.write_children(nodes)?;
             }
         }
         let is_inner = !children.is_empty();
         let mut node = Self { key, points, is_inner, children };
-        if key.level == 0 || node.will_keep_enough(sampler, nodes) {
+        if node.will_keep_enough(nodes)? {
             node.write_children(nodes)?;
         }
         Ok(node)
     }
 
-    /// True if enough disjoint pairs of points (neighbours in Morton order) exclude one another in the parent's sample.
-    fn will_keep_enough(&self, sampler: &Sampler, nodes: &impl Nodes<P>) -> bool {
-        let Some(parent) = self.key.parent() else { return true };
-        let mut pairs = 0;
-        let mut rest = &self.points[..];
-        while let [a, b, ..] = rest {
-            let excluded = sampler.takes_one_only(parent.level, nodes.tree(*a), nodes.tree(*b));
-            pairs += usize::from(excluded);
-            if pairs == ENOUGH_FOR_ALL_ANCESTORS {
-                return true;
-            }
-            rest = &rest[if excluded { 2 } else { 1 }..];
+    /// True if nothing above can take so many points that the node needs one from below.
+    fn will_keep_enough(&self, nodes: &mut impl Nodes<L>) -> Result<bool, ConvertError> {
+        match self.key.parent() {
+            None => Ok(true),
+            Some(parent) => nodes.excludes(parent.level, &self.points, ENOUGH_FOR_ALL_ANCESTORS),
         }
-        false
     }
 
     /// If an inner node has no point left, takes one from the child that has most.
-    fn refill(&mut self) {
-        if !self.is_inner || !self.points.is_empty() {
-            return;
+    fn refill(&mut self, nodes: &mut impl Nodes<L>) -> Result<(), ConvertError> {
+        if !self.is_inner || self.points.count() > 0 {
+            return Ok(());
         }
-        let Some(most) = self.children.iter().map(|c| c.points.len()).max() else { return };
-        if let Some(at) = self.children.iter().position(|c| c.points.len() == most) {
+        let Some(most) = self.children.iter().map(|c| c.points.count()).max() else { return Ok(()) };
+        if let Some(at) = self.children.iter().position(|c| c.points.count() == most) {
             let donor = &mut self.children[at];
-            // The middle one in Morton order: any is right, this one is most likely near the others.
-            let middle = donor.points.len() / 2;
-            if middle < donor.points.len() {
-                self.points.push(donor.points.remove(middle));
+            if most > 0 {
+                // The middle one in Morton order: any is right, this one is most likely near the others.
+                self.points = nodes.take_middle(&mut donor.points)?;
             }
-            donor.refill();
-            if donor.points.is_empty() {
+            donor.refill(nodes)?;
+            if donor.points.count() == 0 {
                 self.children.remove(at);
             }
         }
         self.is_inner = !self.children.is_empty();
+        Ok(())
     }
 
     /// Writes everything below that is still pending; the node's own points stay.
-    pub(super) fn write_children(&mut self, nodes: &mut impl Nodes<P>) -> Result<(), ConvertError> {
+    pub(super) fn write_children(&mut self, nodes: &mut impl Nodes<L>) -> Result<(), ConvertError> {
         let mut children = std::mem::take(&mut self.children);
         for child in &mut children {
             child.write_children(nodes)?;
         }
-        for child in &children {
-            nodes.write(child.key, &child.points)?;
+        for child in children {
+            nodes.write(child.key, child.points)?;
         }
         Ok(())
+    }
+}
+
+/// Counts disjoint pairs of neighbours that exclude one another in a sample of a level, as points come in order.
+pub(super) struct Pairs {
+    level: u8,
+    last: Option<TreePoint>,
+    pub(super) count: usize,
+}
+
+impl Pairs {
+    pub(super) fn new(level: u8) -> Self {
+        Self { level, last: None, count: 0 }
+    }
+
+    pub(super) fn add(&mut self, sampler: &Sampler, next: TreePoint) {
+        let excluded = self.last.is_some_and(|last| sampler.takes_one_only(self.level, last, next));
+        self.count += usize::from(excluded);
+        self.last = (!excluded).then_some(next);
     }
 }

@@ -25,7 +25,7 @@ pub(crate) trait NodeSink: Sync {
     fn encoder(&self) -> Self::Encoder;
 
     /// Takes the bytes of `nodes`, which begin at `offset` among the bytes of the whole tree. Called from several threads,
-    /// in any order; every byte comes once.
+    /// in any order; every byte comes once. Bytes of a large node come in parts before the node comes itself.
     ///
     /// # Errors
     /// Whatever writing them meets.
@@ -45,6 +45,18 @@ pub(crate) trait NodeEncoder {
         written: &mut Checksum,
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError>;
+
+    /// True if the bytes of a node are those of its points one after the other, so that they may be encoded in parts.
+    fn is_row_by_row(&self) -> bool;
+
+    /// Bytes of memory that encoding takes for each point of a node beside its record, otherwise.
+    fn bytes_per_point(&self) -> u64;
+}
+
+/// A number of points as nodes have it.
+pub(super) fn points_of(count: u64) -> Result<u32, ConvertError> {
+    u32::try_from(count)
+        .map_err(|_| crate::error::Unsupported::CrowdedNode { points: count, max: u64::from(u32::MAX) }.into())
 }
 
 /// Appends the bytes of a node to `out`; its offset counts from the start of `out`.
@@ -56,8 +68,7 @@ pub(super) fn finish_node<'r>(
     out: &mut Vec<u8>,
 ) -> Result<FinishedNode, ConvertError> {
     let (count, start) = (records.len(), out.len());
-    let points = u32::try_from(count)
-        .map_err(|_| crate::error::Unsupported::CrowdedNode { points: count as u64, max: u64::from(u32::MAX) })?;
+    let points = points_of(count as u64)?;
     encoder.encode(key, records, written, out)?;
     Ok(FinishedNode { key, points, byte_offset: start as u64, byte_size: (out.len() - start) as u64 })
 }

@@ -1,8 +1,12 @@
 //! Which points do not come back from what a format stores of them.
 
+use std::cmp::Ordering;
+
 use pointmill_format::Lattice;
 
-use crate::cloud::Cloud;
+use crate::cloud::{BigSort, Cloud};
+use crate::error::ConvertError;
+use crate::runtime::Runtime;
 
 /// Points that do not come back.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -71,6 +75,54 @@ impl Recovery {
             lost.merged += if is_one_place { 0 } else { run.len() as u64 };
         }
         lost
+    }
+}
+
+/// [`Recovery::count`] for more points than memory holds.
+pub(super) struct LostSort<'a> {
+    recovery: Recovery,
+    sort: BigSort<'a, fn(&[u8], &[u8]) -> Ordering>,
+    points: u64,
+}
+
+/// Decoded position and integers, three words each.
+const ENTRY_BYTES: usize = 48;
+const DECODED_BYTES: usize = 24;
+
+impl<'a> LostSort<'a> {
+    /// In `memory_bytes` of memory.
+    pub(super) fn new(rt: &'a Runtime<'a>, memory_bytes: u64, recovery: Recovery) -> Self {
+        let compare: fn(&[u8], &[u8]) -> Ordering = |a, b| a.cmp(b);
+        Self { recovery, sort: BigSort::new(rt, ENTRY_BYTES, memory_bytes, compare), points: 0 }
+    }
+
+    /// Adds a point.
+    pub(super) fn add(&mut self, decoded: [f64; 3], q: [i64; 3]) -> Result<(), ConvertError> {
+        self.points += u64::from(self.recovery.integers(decoded) != q);
+        // adding 0 makes −0 the 0 that it equals
+        let words = decoded.map(|v| (v + 0.0).to_bits()).into_iter().chain(q.map(i64::cast_unsigned));
+        self.sort.records().extend(words.flat_map(u64::to_le_bytes));
+        self.sort.settle()
+    }
+
+    /// What does not come back.
+    pub(super) fn finish(self) -> Result<Lost, ConvertError> {
+        let mut lost = Lost { points: self.points, merged: 0 };
+        let (mut run, mut last, mut is_one_place) = (0u64, Vec::new(), true);
+        self.sort.finish(|entry| {
+            if last.get(..DECODED_BYTES) != entry.get(..DECODED_BYTES) {
+                lost.merged += if is_one_place { 0 } else { run };
+                (run, is_one_place) = (0, true);
+            } else if last != entry {
+                is_one_place = false;
+            }
+            run += 1;
+            last.clear();
+            last.extend_from_slice(entry);
+            Ok(())
+        })?;
+        lost.merged += if is_one_place { 0 } else { run };
+        Ok(lost)
     }
 }
 

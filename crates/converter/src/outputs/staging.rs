@@ -8,7 +8,7 @@ use pointmill_format::DatasetKind;
 use tempfile::TempDir;
 
 use crate::error::{ConvertError, OutputFault};
-use crate::runtime::disk::{create_folder, rename, sync_folder, sync_path};
+use crate::runtime::disk::{create_folder, rename, sync_file_system, sync_folder, sync_path};
 use crate::runtime::{Disk, DiskFile};
 
 /// The account of a run, beside the datasets or in the one that there is.
@@ -119,11 +119,21 @@ impl StagedDataset {
         DiskFile::create(&self.folder.join(name), &self.disk)
     }
 
+    /// Opens a file that was made before, to write more.
+    pub(crate) fn open(&self, name: &str) -> Result<DiskFile, ConvertError> {
+        DiskFile::open(&self.folder.join(name), &self.disk)
+    }
+
     /// Writes and syncs a small file.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ConvertError> {
         let file = self.create(name)?;
         file.write_at(bytes, 0, "writing the file")?;
         file.sync("writing the file")
+    }
+
+    /// Syncs everything that the file system of the dataset has; false where the system cannot.
+    pub(crate) fn sync_file_system(&self) -> Result<bool, ConvertError> {
+        sync_file_system(&*self.disk, &self.folder).map_err(|e| ConvertError::io(&self.folder, "syncing the files", e))
     }
 
     /// Syncs a file that was made before and is closed.

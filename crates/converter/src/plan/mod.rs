@@ -34,6 +34,9 @@ pub struct Plan {
     pub threads: usize,
     /// Maximum points of a unit of work; `None`: what the memory allows. Changes nothing in the output.
     pub task_points: Option<u64>,
+    /// Maximum bytes of points that wait in memory between being read and being built; `None`: what the ceiling leaves. More
+    /// go through temporary files. Changes nothing in the output.
+    pub waiting_bytes: Option<u64>,
     /// Where temporary files go; `None`: beside the output.
     pub temp_dir: Option<PathBuf>,
     /// Which points go in.
@@ -189,6 +192,7 @@ impl Plan {
             memory_bytes: crate::memory::default_ceiling_bytes(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             task_points: None,
+            waiting_bytes: None,
             temp_dir: None,
             filter: Filter::default(),
             duplicates: Duplicates::Keep,

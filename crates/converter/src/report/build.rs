@@ -20,6 +20,8 @@ pub(crate) struct Account {
     pub(crate) settings: Map<String, Value>,
     pub(crate) other_files: OtherFilesReport,
     pub(crate) outputs: Vec<OutputReport>,
+    /// Written to temporary files.
+    pub(crate) temp_bytes: u64,
     pub(crate) phases: Vec<PhaseTime>,
     /// Wall seconds in all.
     pub(crate) seconds: f64,
@@ -31,7 +33,7 @@ pub(crate) struct Account {
 /// Points that do not add up.
 pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
     let stats = &cloud.stats;
-    let Account { settings, other_files, outputs, phases, seconds } = account;
+    let Account { settings, other_files, outputs, temp_bytes, phases, seconds } = account;
     let of_outputs = outputs.iter().flat_map(|o| &o.warnings);
     Ok(Report {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -43,7 +45,7 @@ pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, Conv
         points: points_report(cloud, &outputs)?,
         shared_places: cloud.shared_places.iter().map(shared_place).collect(),
         checksum_in: stats.checksum.to_string(),
-        temp_bytes: cloud.store.spilled_bytes(),
+        temp_bytes,
         output_bytes: outputs.iter().map(|o| o.bytes).sum(),
         warnings: cloud.warnings.iter().chain(of_outputs).cloned().collect(),
         outputs,

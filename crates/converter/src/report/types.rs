@@ -365,6 +365,8 @@ pub struct Estimate {
     pub attributes: Vec<String>,
     /// Bytes per point of the output (before compression).
     pub bytes_per_point: u64,
+    /// The least memory ceiling with which the run could begin, bytes.
+    pub least_memory_bytes: u64,
     /// Estimated highest resident set, bytes.
     pub memory_bytes: u64,
     /// Estimated temporary bytes; 0 if all fits in memory.

@@ -1,14 +1,21 @@
 //! How the memory ceiling is shared out.
 
+use super::pool::{Consumer, Pool, Reservation};
 use crate::error::{ConvertError, MemoryNeed};
 use crate::plan::Plan;
 
-/// The program itself, headers, tables.
-const FIXED_BYTES: u64 = 40 << 20;
+/// The program itself, its tables and stacks.
+const FIXED_BYTES: u64 = 32 << 20;
 
-/// A thread's buffers beside the chunk that it builds: a piece as read and as decoded, a batch of columns, a block of
-/// records, the decompressor's models, the sampler's grid.
-const THREAD_BYTES: u64 = 28 << 20;
+/// What a reading thread has beside what its reader takes: a block of records, columns of lattice integers, lists by which
+/// points are grouped.
+const GATHER_BYTES: u64 = 20 << 20;
+
+/// What a building thread has beside the chunk that it builds: the sampler's grid, buffers of encoders.
+const BUILD_BYTES: u64 = 6 << 20;
+
+/// Less than this in the pool is not worth beginning.
+const LEAST_POOL_BYTES: u64 = 24 << 20;
 
 /// Larger chunks gain nothing: they leave the caches and the threads uneven.
 pub(crate) const MAX_CHUNK_POINTS: u64 = 400_000;
@@ -16,33 +23,40 @@ pub(crate) const MAX_CHUNK_POINTS: u64 = 400_000;
 /// Chunks that may be finished before the oldest unfinished one, per thread.
 const AHEAD_PER_THREAD: usize = 2;
 
-/// The minimum that the outputs need.
+/// The minimum that the inputs and outputs need.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Least {
     /// Points that must be in memory together.
     points: u64,
+    /// Bytes that decoding takes at most, on one thread.
+    decode_bytes: u64,
+    /// Bytes that all inputs take as long as the run goes on.
+    input_bytes: u64,
 }
 
 impl Least {
     /// Of outputs that need as many points together.
-    pub(crate) fn of(points: impl IntoIterator<Item = u64>) -> Self {
-        Self { points: points.into_iter().fold(10_000, u64::max) }
+    pub(crate) fn of(points: impl IntoIterator<Item = u64>, decode_bytes: u64, input_bytes: u64) -> Self {
+        Self { points: points.into_iter().fold(10_000, u64::max), decode_bytes, input_bytes }
     }
 }
 
 /// What each part of a run may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Budget {
-    /// Records that wait in memory; more go to disk.
-    pub(crate) store_bytes: u64,
+    /// For all that is not there from the beginning to the end; records go to the disk when others need it.
+    pub(crate) pool_bytes: u64,
     /// Points of a chunk.
     pub(crate) chunk_points: u64,
     /// Chunks in flight.
     pub(crate) window: usize,
-    /// Fixed costs, all threads included.
-    fixed_bytes: u64,
+    /// The least ceiling with which the run can begin.
+    pub(crate) least_ceiling: u64,
+    threads: u64,
+    /// Of a thread that reads.
+    reader_bytes: u64,
     bytes_per_chunk_point: u64,
-    ceiling: u64,
+    fixed_bytes: u64,
     /// For tests.
     asked_task_points: Option<u64>,
 }
@@ -53,42 +67,62 @@ impl Budget {
         let ceiling = plan.memory_bytes;
         let threads = plan.threads.max(1) as u64;
         let window = plan.threads.max(1) * (1 + AHEAD_PER_THREAD);
-        let fixed_bytes = FIXED_BYTES + threads * THREAD_BYTES;
+        let fixed_bytes = FIXED_BYTES + least.input_bytes;
+        let reader_bytes = GATHER_BYTES + least.decode_bytes;
         // Allocators keep some of what is freed.
         let usable = ceiling - ceiling / 10;
         let bytes_per_chunk_point = bytes_per_chunk_point(stride, window as u64, threads);
         let least_chunk = least.points.max(20_000);
-        let least_bytes = fixed_bytes + threads * least_chunk * bytes_per_chunk_point + (8 << 20);
-        if usable < least_bytes {
-            return Err(ConvertError::Memory {
-                ceiling,
-                needed: least_bytes + least_bytes / 9 + 1,
-                why: MemoryNeed::Threads { threads, points: least_chunk },
-            });
+        let least_build = BUILD_BYTES + least_chunk.saturating_mul(bytes_per_chunk_point);
+        let of_threads = threads.saturating_mul(reader_bytes.max(least_build));
+        let least_bytes = fixed_bytes.saturating_add(of_threads).saturating_add(LEAST_POOL_BYTES);
+        let least_ceiling = (least_bytes.saturating_mul(10).div_ceil(9) + 1).next_multiple_of(1 << 20);
+        if ceiling < least_ceiling {
+            let why = if least.input_bytes > of_threads {
+                MemoryNeed::Inputs { bytes: least.input_bytes }
+            } else {
+                MemoryNeed::Threads { threads, points: least_chunk }
+            };
+            return Err(ConvertError::Memory { ceiling, needed: least_ceiling, why });
         }
-        let free = usable - fixed_bytes;
-        let chunk_points =
-            (free / 2 / threads / bytes_per_chunk_point).clamp(least_chunk, MAX_CHUNK_POINTS.max(least_chunk));
-        let store_bytes = free - threads * chunk_points * bytes_per_chunk_point;
+        let pool_bytes = usable - fixed_bytes;
+        let share = (pool_bytes / 2 / threads).saturating_sub(BUILD_BYTES);
+        let chunk_points = (share / bytes_per_chunk_point).clamp(least_chunk, MAX_CHUNK_POINTS.max(least_chunk));
         Ok(Self {
-            store_bytes,
+            pool_bytes,
             chunk_points,
             window,
-            fixed_bytes,
+            least_ceiling,
+            threads,
+            reader_bytes,
             bytes_per_chunk_point,
-            ceiling,
+            fixed_bytes,
             asked_task_points: plan.task_points,
         })
     }
 
-    /// Refuses a chunk that cannot be divided and does not fit.
-    pub(crate) fn check_chunk(&self, points: u64) -> Result<(), ConvertError> {
-        let needed = self.fixed_bytes + points.saturating_mul(self.bytes_per_chunk_point);
-        if points > self.chunk_points && needed > self.ceiling {
-            let why = MemoryNeed::OnePlace { points };
-            return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why });
-        }
-        Ok(())
+    /// Takes what the threads need while they read.
+    pub(crate) fn reading(&self, memory: &std::sync::Arc<Pool>) -> Result<Reservation, ConvertError> {
+        let mut reservation = Reservation::new(memory, Consumer::Threads);
+        reservation.resize(self.threads * self.reader_bytes)?;
+        Ok(reservation)
+    }
+
+    /// Takes what the threads need while they build an output of so many points.
+    pub(crate) fn building(&self, memory: &std::sync::Arc<Pool>, points: u64) -> Result<Reservation, ConvertError> {
+        let mut reservation = Reservation::new(memory, Consumer::Threads);
+        reservation.resize(self.build_bytes(points))?;
+        Ok(reservation)
+    }
+
+    fn build_bytes(&self, points: u64) -> u64 {
+        let chunks = (self.threads * self.chunk_points).min(points);
+        self.threads * BUILD_BYTES + chunks * self.bytes_per_chunk_point
+    }
+
+    /// Bytes of a thread for the unit of work that it builds.
+    pub(crate) fn chunk_bytes(&self) -> u64 {
+        self.chunk_points * self.bytes_per_chunk_point
     }
 
     /// Points of a unit of work that takes `bytes_per_point`: what a chunk may use, at most `at_most`.
@@ -97,21 +131,15 @@ impl Budget {
         (self.chunk_points * self.bytes_per_chunk_point / bytes_per_point).min(at_most)
     }
 
-    /// Refuses a task that is larger than others because it cannot be divided, and does not fit.
-    pub(crate) fn check_task(&self, points: u64, usual_points: u64, bytes_per_point: u64) -> Result<(), ConvertError> {
-        let needed = self.fixed_bytes + points.saturating_mul(bytes_per_point);
-        if points > usual_points && needed > self.ceiling {
-            let why = MemoryNeed::OneCell { points };
-            return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why });
-        }
-        Ok(())
+    /// Bytes of records that can stay in memory while they are read and built.
+    pub(crate) fn record_bytes(&self, points: u64) -> u64 {
+        self.pool_bytes.saturating_sub(self.build_bytes(points).max(self.threads * self.reader_bytes))
     }
 
     /// Highest resident set of a run over `points` points of `stride` bytes, estimated.
     pub(crate) fn estimate_peak(&self, points: u64, stride: usize) -> u64 {
-        let data = points.saturating_mul(stride as u64);
-        let chunks = (self.ceiling - self.fixed_bytes - self.store_bytes).min(points * self.bytes_per_chunk_point);
-        self.fixed_bytes + data.min(self.store_bytes) + chunks
+        let data = points.saturating_mul(stride as u64).min(self.record_bytes(points));
+        self.fixed_bytes + data + self.build_bytes(points).max(self.threads * self.reader_bytes)
     }
 }
 
@@ -125,20 +153,37 @@ fn bytes_per_chunk_point(stride: usize, window: u64, threads: u64) -> u64 {
 mod tests {
     use super::*;
 
+    fn plan(mib: u64, threads: usize) -> Plan {
+        let mut plan = Plan::new(vec![], "out".into());
+        (plan.memory_bytes, plan.threads) = (mib << 20, threads);
+        plan
+    }
+
     #[test]
-    fn the_parts_stay_below_the_ceiling_and_tiny_ceilings_are_refused() {
+    fn the_parts_stay_below_the_ceiling() {
+        let least = Least::of([], 8 << 20, 1 << 20);
         for mib in [256u64, 512, 1024, 8192, 65_536] {
             for threads in [1, 2, 4] {
-                let mut plan = Plan::new(vec![], "out".into());
-                plan.memory_bytes = mib << 20;
-                plan.threads = threads;
-                let b = Budget::new(&plan, 38, Least::of([])).unwrap();
-                let used = b.fixed_bytes + b.store_bytes + threads as u64 * b.chunk_points * b.bytes_per_chunk_point;
-                assert!(used <= plan.memory_bytes && b.chunk_points >= 10_000);
+                let b = Budget::new(&plan(mib, threads), 38, least).unwrap();
+                let used = b.fixed_bytes + b.pool_bytes;
+                assert!(used <= mib << 20 && b.chunk_points >= 10_000);
+                assert!(b.build_bytes(u64::MAX) <= b.pool_bytes && b.threads * b.reader_bytes < b.pool_bytes);
+                assert!(b.estimate_peak(1 << 40, 38) <= mib << 20);
             }
         }
-        let mut plan = Plan::new(vec![], "out".into());
-        plan.memory_bytes = 50 << 20;
-        assert!(matches!(Budget::new(&plan, 38, Least::of([])), Err(ConvertError::Memory { .. })));
+    }
+
+    #[test]
+    fn a_ceiling_that_is_too_small_is_refused_and_the_one_named_instead_is_enough() {
+        for (threads, decode_bytes, input_bytes) in [(1, 0, 0), (2, 8 << 20, 0), (64, 1 << 20, 0), (1, 0, 500 << 20)] {
+            let least = Least::of([50_000], decode_bytes, input_bytes);
+            let Err(ConvertError::Memory { needed, .. }) = Budget::new(&plan(50, threads), 38, least) else {
+                panic!("50 MiB are enough for {threads} threads?")
+            };
+            let enough = Budget::new(&plan(needed >> 20, threads), 38, least).unwrap();
+            assert_eq!(enough.least_ceiling, needed);
+            assert!(enough.build_bytes(u64::MAX) + LEAST_POOL_BYTES / 2 <= enough.pool_bytes);
+            assert!(Budget::new(&plan((needed >> 20) - 1, threads), 38, least).is_err());
+        }
     }
 }

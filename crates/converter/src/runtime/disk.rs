@@ -6,6 +6,7 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill_format::bytes;
 
@@ -51,6 +52,8 @@ pub(crate) struct DiskFile {
     file: File,
     path: PathBuf,
     disk: Arc<dyn Disk>,
+    /// Counts what is written, if it is a temporary file.
+    written: Option<Arc<AtomicU64>>,
 }
 
 impl DiskFile {
@@ -61,7 +64,14 @@ impl DiskFile {
             File::options().read(true).write(true).create(true).truncate(true).open(path)
         };
         let file = create().map_err(|e| ConvertError::io(path, "making the file", e))?;
-        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk) })
+        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk), written: None })
+    }
+
+    /// Opens the file `path`, which is there.
+    pub(crate) fn open(path: &Path, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+        let file = File::options().read(true).write(true).open(path);
+        let file = file.map_err(|e| ConvertError::io(path, "opening the file again", e))?;
+        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk), written: None })
     }
 
     /// Writes all of `bytes` at `offset`; `doing` is for the error ("writing a leaf").
@@ -71,6 +81,9 @@ impl DiskFile {
 
     fn try_write_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
         self.disk.permit(DiskOperation::Write)?;
+        if let Some(written) = &self.written {
+            written.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        }
         bytes::write_all_at(&self.file, bytes, offset)
     }
 
@@ -113,11 +126,17 @@ impl DiskFile {
 pub(crate) struct TempFiles {
     folder: PathBuf,
     disk: Arc<dyn Disk>,
+    written: Arc<AtomicU64>,
 }
 
 impl TempFiles {
     pub(crate) fn new(folder: PathBuf, disk: Arc<dyn Disk>) -> Self {
-        Self { folder, disk }
+        Self { folder, disk, written: Arc::default() }
+    }
+
+    /// Bytes that were written to all of them.
+    pub(crate) fn written_bytes(&self) -> u64 {
+        self.written.load(Ordering::Relaxed)
     }
 
     /// A new file without a name: nothing is left behind however the run ends. Errors name the folder.
@@ -127,7 +146,8 @@ impl TempFiles {
             tempfile::tempfile_in(&self.folder)
         };
         let file = make().map_err(|e| ConvertError::io(&self.folder, "making a temporary file", e))?;
-        Ok(DiskFile { file, path: self.folder.clone(), disk: Arc::clone(&self.disk) })
+        let written = Some(Arc::clone(&self.written));
+        Ok(DiskFile { file, path: self.folder.clone(), disk: Arc::clone(&self.disk), written })
     }
 }
 
@@ -164,6 +184,12 @@ impl io::Write for Sequential<'_> {
 pub(crate) fn sync_folder(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
     disk.permit(DiskOperation::Sync)?;
     if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+/// Waits until all that is written to the file system of a folder is safe; false where the system has no such request.
+pub(crate) fn sync_file_system(disk: &dyn Disk, folder: &Path) -> io::Result<bool> {
+    disk.permit(DiskOperation::Sync)?;
+    os_hints::sync_file_system(&File::open(folder)?)
 }
 
 /// Waits until a file that is closed is safe.

@@ -5,6 +5,7 @@ mod clock;
 pub(crate) mod disk;
 mod events;
 pub(crate) mod os_hints;
+mod pool;
 mod workers;
 
 pub(crate) use budget::{Budget, Least};
@@ -12,6 +13,9 @@ pub(crate) use clock::{Clock, PhaseTime};
 pub use disk::{Disk, DiskOperation, SystemDisk};
 pub(crate) use disk::{DiskFile, Sequential, TempFiles};
 pub use events::{Events, Phase, Silent};
+pub(crate) use pool::{Consumer, Evict, Pool, Reservation};
+
+use std::sync::Arc;
 
 use crate::error::ConvertError;
 use crate::plan::Plan;
@@ -20,6 +24,8 @@ use crate::warning::Warning;
 /// Threads, memory, files and events of one run.
 pub(crate) struct Runtime<'a> {
     pub(crate) budget: Budget,
+    /// Memory that is shared out as it is needed.
+    pub(crate) memory: Arc<Pool>,
     pub(crate) temp: TempFiles,
     /// Worker threads, ≥ 1.
     pub(crate) threads: usize,
@@ -41,7 +47,8 @@ impl<'a> Runtime<'a> {
             .thread_name(|i| format!("pointmill-{i}"))
             .build()
             .map_err(|e| ConvertError::Internal(format!("starting threads: {e}")))?;
-        Ok(Self { budget, temp, threads, events, pool })
+        let memory = Pool::new(budget.pool_bytes, plan.memory_bytes).with_records(plan.waiting_bytes);
+        Ok(Self { budget, memory: Arc::new(memory), temp, threads, events, pool })
     }
 
     /// Fails if the run was asked to stop.

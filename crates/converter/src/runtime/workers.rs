@@ -85,7 +85,7 @@ mod tests {
         let mut plan = Plan::new(vec![], "out".into());
         plan.threads = threads;
         plan.memory_bytes = 1 << 30;
-        let budget = Budget::new(&plan, 38, Least::of([])).unwrap();
+        let budget = Budget::new(&plan, 38, Least::of([], 0, 0)).unwrap();
         Runtime::start(&plan, budget, TempFiles::new(".".into(), Arc::new(SystemDisk)), &Silent).unwrap()
     }
 

@@ -17,6 +17,7 @@ use spacing::cell_shift;
 
 /// Chooses samples; one for each thread.
 pub(crate) struct Sampler {
+    node: NodeKey,
     candidates: Vec<TreePoint>,
     accepted: Vec<bool>,
     method: Method,
@@ -33,23 +34,44 @@ impl Sampler {
             Sampling::Poisson => Method::Poisson(Box::default()),
             other => Method::Cells(other),
         };
-        Self { candidates: Vec::new(), accepted: Vec::new(), method }
+        Self { node: NodeKey::ROOT, candidates: Vec::new(), accepted: Vec::new(), method }
     }
 
-    /// Forgets the candidates of the last node.
-    pub(crate) fn begin(&mut self) {
+    /// Begins with a node.
+    pub(crate) fn begin(&mut self, node: NodeKey) {
         self.candidates.clear();
+        if let Method::Poisson(p) = &mut self.method {
+            p.begin();
+        }
+        self.node = node;
     }
 
-    /// Adds the points of the next child, in Morton order.
+    /// Says how many candidates of the node there will be.
+    pub(crate) fn expect(&mut self, candidates: u64) {
+        if let Method::Poisson(p) = &mut self.method {
+            p.expect(candidates);
+        }
+    }
+
+    /// Memory that the points taken so far need, bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        match &self.method {
+            Method::Poisson(p) => p.bytes(),
+            Method::Cells(_) => 0,
+        }
+    }
+
+    /// Adds the points of the next child, or a part of them, in Morton order.
     pub(crate) fn offer(&mut self, points: impl Iterator<Item = TreePoint>) {
         self.candidates.extend(points);
     }
 
-    /// One flag for each candidate: true if the node takes it. At least one is true if there are candidates.
-    pub(crate) fn choose(&mut self, node: NodeKey) -> &[bool] {
+    /// One flag for each candidate since the last call: true if the node takes it. Of all candidates of a node at least one
+    /// is taken. Between two calls for a node, no part may be cut ([`Self::may_be_cut`]).
+    pub(crate) fn choose(&mut self) -> &[bool] {
         self.accepted.clear();
         self.accepted.resize(self.candidates.len(), false);
+        let node = self.node;
         match &mut self.method {
             Method::Poisson(p) => p.choose(node.level, &self.candidates, &mut self.accepted),
             Method::Cells(Sampling::Random { seed }) => {
@@ -57,7 +79,14 @@ impl Sampler {
             }
             Method::Cells(_) => cells::nearest_to_center(node.level, &self.candidates, &mut self.accepted),
         }
+        self.candidates.clear();
         &self.accepted
+    }
+
+    /// True if candidates of a node of `level` that follow each other may come in two parts.
+    pub(crate) fn may_be_cut(level: u8, a: TreePoint, b: TreePoint) -> bool {
+        let shift = cell_shift(level) + poisson::TILE_BITS;
+        a.cell(shift) != b.cell(shift)
     }
 
     /// True if a node of `level` cannot take both points, whatever else it is offered.

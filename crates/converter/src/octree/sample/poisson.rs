@@ -21,6 +21,10 @@ use crate::cloud::{TREE_BITS, TreePoint};
 
 /// A cell is `2^CELL_BITS` spacings wide; a tile is two cells wide.
 const CELL_BITS: u32 = 1;
+
+/// A tile is `2^TILE_BITS` spacings wide.
+pub(super) const TILE_BITS: u32 = CELL_BITS + 1;
+
 const GRID_BITS: u32 = SPACING_BITS - CELL_BITS;
 const GRID_SIZE: u32 = 1 << GRID_BITS;
 const CELL_SPACINGS: f32 = (1 << CELL_BITS) as f32;
@@ -30,6 +34,9 @@ const CELL_SPACINGS: f32 = (1 << CELL_BITS) as f32;
 const CONFLICT_BELOW: f32 = 1.0 + 4e-5;
 
 const LANES: usize = 8;
+
+/// More points of a node cannot be that far apart: spheres as dense as they can be packed, and some over the border.
+const MOST_TAKEN: u64 = 3_200_000;
 
 /// The grid, kept from node to node; all empty in between.
 pub(super) struct Poisson {
@@ -128,6 +135,24 @@ impl Default for Poisson {
 }
 
 impl Poisson {
+    /// Forgets what was taken for the last node.
+    pub(super) fn begin(&mut self) {
+        self.occupied.fill(0);
+        self.taken.clear();
+    }
+
+    /// Makes room for what a node may take of so many candidates, so that the list never moves: what is not touched costs
+    /// no memory.
+    pub(super) fn expect(&mut self, candidates: u64) {
+        self.taken.reserve_exact(candidates.min(MOST_TAKEN) as usize);
+    }
+
+    /// Memory of the points taken so far, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        (self.taken.len() * size_of::<[f32; 3]>()) as u64
+    }
+
+    /// Chooses among the next candidates of a node; a part ends where a tile ends.
     pub(super) fn choose(&mut self, level: u8, candidates: &[TreePoint], accepted: &mut [bool]) {
         let Some(first) = candidates.first() else { return };
         if u32::from(level) > TREE_BITS - SPACING_BITS {
@@ -139,13 +164,11 @@ impl Poisson {
         }
         let shift = cell_shift(level);
         let cell_shift = shift + CELL_BITS;
-        let tile_shift = cell_shift + 1;
+        let tile_shift = shift + TILE_BITS;
         let node_bits = TREE_BITS - u32::from(level).min(TREE_BITS);
         let corner = first.cell(node_bits).map(|c| c << node_bits);
         // A power of two, so nothing is lost by it.
         let unit = 1.0 / (1u32 << shift) as f32;
-        self.occupied.fill(0);
-        self.taken.clear();
         let mut at = 0;
         while let Some(&first) = candidates.get(at) {
             self.collect_near(first.cell(tile_shift).map(|c| c << 1 & (GRID_SIZE - 1)));
@@ -253,6 +276,7 @@ mod tests {
         let mut count = 0;
         for _ in 0..2 {
             let mut accepted = vec![false; candidates.len()];
+            poisson.begin();
             poisson.choose(level, &points, &mut accepted);
             let taken: Vec<_> = candidates.iter().zip(&accepted).filter(|(_, a)| **a).map(|(t, _)| *t).collect();
             for (i, a) in taken.iter().enumerate() {

@@ -29,6 +29,8 @@ pub(super) struct Task {
     /// The bucket code at which it begins.
     pub(super) start: u64,
     pub(super) segments: Segments,
+    /// Its records were put in order already, and are not in the store of the cloud ([`super::large`]).
+    pub(super) is_sorted: bool,
 }
 
 /// An aligned cube of the grid, by the Morton code of its first corner (21 bits per axis) and its level (0: all).
@@ -72,8 +74,8 @@ fn start_of(bucket: [u32; 3], level: u32) -> u64 {
 }
 
 fn merge(buckets: &mut Buckets, more: Vec<Buckets>) {
-    for (bucket, mut segments) in more.into_iter().flatten() {
-        buckets.entry(bucket).or_default().append(&mut segments);
+    for (bucket, segments) in more.into_iter().flatten() {
+        buckets.entry(bucket).or_default().append(segments);
     }
 }
 
@@ -92,14 +94,14 @@ fn join(buckets: Buckets, max_points: u64) -> Vec<Task> {
     buckets.sort_unstable_by_key(|((start, _), _)| *start);
     let mut tasks: Vec<Task> = Vec::new();
     let mut first_point = 0;
-    for ((start, _), mut segments) in buckets {
+    for ((start, _), segments) in buckets {
         let points = segments.points();
         match tasks.last_mut().filter(|t| t.points + points <= max_points) {
             Some(task) => {
                 task.points += points;
-                task.segments.append(&mut segments);
+                task.segments.append(segments);
             }
-            None => tasks.push(Task { first_point, points, start, segments }),
+            None => tasks.push(Task { first_point, points, start, segments, is_sorted: false }),
         }
         first_point += points;
     }

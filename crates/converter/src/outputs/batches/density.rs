@@ -2,7 +2,7 @@
 
 use pointmill_format::{Aabb, Lattice, NodeKey};
 
-use crate::cloud::{Cell, Cloud, JobBounds};
+use crate::cloud::{CensusCell, Cloud, JobBounds};
 
 /// Points that a cell of level 0 should hold. Of a surface level 0 then shows one point in 64, level 1 one in 16 and level
 /// 2 one in 4.
@@ -44,12 +44,18 @@ impl Density {
     fn of(cloud: &Cloud<'_>) -> Self {
         let lattice = &cloud.lattice.lattice;
         let side = |level: u8| cloud.frame.cube.side / 2f64.powi(i32::from(level));
-        let patch = |cell: &Cell| {
+        let patch = |cell: &CensusCell| {
             let own = |b: JobBounds| area([0, 1, 2].map(|a| b.extent(a)), lattice, cell.distinct());
-            let area = cell.bounds.map_or(f64::INFINITY, own).min(side(cell.key.level).powi(2));
+            let area = cloud
+                .census
+                .bounds
+                .get(&cell.key)
+                .copied()
+                .map_or(f64::INFINITY, own)
+                .min(side(cell.key.level).powi(2));
             Patch { points: cell.distinct(), area }
         };
-        let mut keys: Vec<NodeKey> = cloud.cells.iter().map(|cell| cell.key).collect();
+        let mut keys: Vec<NodeKey> = cloud.census.cells.iter().map(|cell| cell.key).collect();
         let finest = keys.iter().map(|key| key.level).min().unwrap_or(0);
         let at = |level: u8| {
             keys.iter_mut().for_each(|key| *key = key.ancestor(level).unwrap_or(*key));
@@ -57,7 +63,7 @@ impl Density {
             (side(level), keys.len() as u64)
         };
         let levels = (0..=finest).rev().map(at).collect();
-        Self { patches: cloud.cells.iter().map(patch).collect(), levels }
+        Self { patches: cloud.census.cells.iter().map(patch).collect(), levels }
     }
 
     /// Halves the cell from `widest` on, not below `least`, until there are enough.

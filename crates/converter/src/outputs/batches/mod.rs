@@ -8,6 +8,7 @@ mod density;
 mod figures;
 mod finish;
 mod frame;
+mod large;
 mod lod;
 mod order;
 mod output;
@@ -35,6 +36,7 @@ use buckets::Task;
 use content::Content;
 use finish::finish;
 use frame::{Frame, refused};
+use large::WORD_BYTES;
 use output::{BatchFile, ORIGINAL_BYTES};
 use settings::colour_of;
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
@@ -107,19 +109,19 @@ impl Output for BatchesSettings {
         let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();
         let layout = Layout::new(points, &attributes, planes_at_most(&frame, self.planes)).map_err(refused)?;
         let tasks = buckets::tasks(cloud, rt, &frame, task_points)?;
-        for task in &tasks {
-            rt.budget.check_task(task.points, task_points, per_point)?;
-        }
+        let sorted = Store::new(rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
+        let tasks = large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points)?;
         let file = to.create(self.kind().marker_file())?;
         // what is compressed is written raw first, elsewhere
         let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
-        let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, cloud.store.unused_bytes());
+        let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, &rt.memory);
         let output =
             BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals, Recovery::new(cloud), frame.grid.origin);
         let shop = Workshop {
             frame: &frame,
             content: &content,
             store: &cloud.store,
+            sorted: &sorted,
             stride: cloud.frame.stride,
             output: &output,
             keeps_originals: self.originals,

@@ -33,7 +33,8 @@ impl Order {
     pub(super) fn sort(&mut self, loaded: &Loaded<'_>, frame: &Frame, extras: &[Extra], first_code: u128) {
         let count = loaded.words.len();
         let positions = loaded.records.chunks_exact(loaded.stride).map(position);
-        let compare = |a: usize, b: usize| compare(loaded, frame, extras, a, b);
+        let row = |i: usize| (loaded.record(i), loaded.words[i]);
+        let compare = |a: usize, b: usize| compare(frame, extras, row(a), row(b));
         let idle_bits = 3 * frame.idle_bits();
         let keys = self.sorter.codes(count);
         if frame.is_wide() {
@@ -63,8 +64,13 @@ impl Order {
     }
 }
 
-fn compare(loaded: &Loaded<'_>, frame: &Frame, extras: &[Extra], a: usize, b: usize) -> Ordering {
-    let (ra, rb) = (loaded.record(a), loaded.record(b));
+/// Compares two records with their colour words.
+pub(super) fn compare(
+    frame: &Frame,
+    extras: &[Extra],
+    (ra, word_a): (&[u8], u32),
+    (rb, word_b): (&[u8], u32),
+) -> Ordering {
     let (pa, pb) = (position(ra), position(rb));
     if pa != pb {
         // stored positions differ from X by a constant
@@ -72,5 +78,5 @@ fn compare(loaded: &Loaded<'_>, frame: &Frame, extras: &[Extra], a: usize, b: us
         return code(pa).cmp(&code(pb)).then(pa.cmp(&pb));
     }
     let bytes = || extras.iter().map(|e| ra[e.from..e.to].cmp(&rb[e.from..e.to])).find(|o| o.is_ne());
-    loaded.words[a].cmp(&loaded.words[b]).then_with(|| bytes().unwrap_or(Ordering::Equal))
+    word_a.cmp(&word_b).then_with(|| bytes().unwrap_or(Ordering::Equal))
 }

@@ -1,7 +1,7 @@
 //! The file while tasks are written: batches go to their slots as soon as they are complete.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use pointmill_format::batches::{
     BATCH_POINTS, BatchRecord, EncodedBatch, ErrorSums, Layout, Section, batch_points, encode_batch, le_bytes,
@@ -25,7 +25,7 @@ pub(super) struct BatchFile<'a> {
     origin: [f64; 3],
     state: Mutex<State>,
     /// Entries of the originals, as they came.
-    pub(super) originals: Store,
+    pub(super) originals: Arc<Store>,
 }
 
 /// What is kept until the end.
@@ -83,7 +83,7 @@ impl<'a> BatchFile<'a> {
     pub(super) fn new(
         file: &'a DiskFile,
         layout: &'a Layout,
-        originals: Store,
+        originals: Arc<Store>,
         recovery: Recovery,
         origin: [f64; 3],
     ) -> Self {

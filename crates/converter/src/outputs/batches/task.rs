@@ -5,6 +5,7 @@ use pointmill_format::batches::{le_bytes, lod_of, rgb_of};
 use super::buckets::Task;
 use super::content::Content;
 use super::frame::Frame;
+use super::large::{WORD_BYTES, split};
 use super::lod::{Edges, LEVELS, Levels, unselected};
 use super::order::{Loaded, Order};
 use super::output::{BatchFile, Encoder, ORIGINAL_BYTES, Piece, pieces};
@@ -21,6 +22,8 @@ pub(super) struct Workshop<'a> {
     pub(super) frame: &'a Frame,
     pub(super) content: &'a Content,
     pub(super) store: &'a Store,
+    /// Records of large tasks, with their colour words.
+    pub(super) sorted: &'a Store,
     pub(super) stride: usize,
     pub(super) output: &'a BatchFile<'a>,
     pub(super) keeps_originals: bool,
@@ -120,7 +123,15 @@ impl<'a> Worker<'a> {
         self.loaded_words.clear();
         os_hints::reserve(&mut self.records, points * shop.stride);
         self.loaded_words.reserve_exact(points);
-        for segment in &task.segments {
+        for segment in task.segments.iter().filter(|_| task.is_sorted) {
+            let mut entries = Vec::new();
+            shop.sorted.take(*segment, &mut entries)?;
+            for (record, word) in entries.chunks_exact(shop.stride + WORD_BYTES).map(split) {
+                self.records.extend_from_slice(record);
+                self.loaded_words.push(word);
+            }
+        }
+        for segment in task.segments.iter().filter(|_| !task.is_sorted) {
             let start = self.records.len();
             let source = shop.store.take(*segment, &mut self.records)?;
             shop.content.words(&self.records[start..], shop.stride, source, &mut self.loaded_words);

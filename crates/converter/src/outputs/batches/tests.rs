@@ -230,7 +230,7 @@ fn neither_memory_nor_the_order_of_inputs_shows() {
     let (expected, _) = bench.convert(&plan, cell(1.0)).unwrap();
     plan.memory_bytes = 1 << 20;
     let Err(ConvertError::Memory { needed, .. }) = bench.convert(&plan, cell(1.0)) else { panic!("1 MiB cannot do") };
-    plan.memory_bytes = needed;
+    (plan.memory_bytes, plan.waiting_bytes) = (needed, Some(1 << 20));
     let (spilled, report) = bench.convert(&plan, cell(1.0)).unwrap();
     assert!(report.temp_bytes > 0);
     assert_same_bytes(&spilled, &expected, "spilled");

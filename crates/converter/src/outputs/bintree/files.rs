@@ -9,6 +9,9 @@ use crate::error::ConvertError;
 use crate::outputs::staging::StagedDataset;
 use crate::runtime::{DiskFile, Runtime};
 
+/// More files are not synced one by one: the file system is asked to sync all it has.
+const FEW_FILES: usize = 256;
+
 /// The leaves of a dataset; any number of threads put them.
 pub(super) struct Leaves<'a> {
     staged: &'a StagedDataset,
@@ -45,12 +48,30 @@ impl<'a> Leaves<'a> {
         Ok(None)
     }
 
+    /// The byte where a leaf with `start` points before it starts in a packed file.
+    pub(super) fn start_of(&self, start: u64) -> Option<u64> {
+        self.packed.as_ref().map(|_| start * self.stride)
+    }
+
+    /// [`Self::put`] for a part of the records of a leaf: those after the first `from`. The first part comes first.
+    pub(super) fn put_part(&self, path: &[bool], start: u64, from: u64, records: &[u8]) -> Result<(), ConvertError> {
+        if self.packed.is_some() || from == 0 {
+            return self.put(path, start + from, records).map(drop);
+        }
+        self.bytes.fetch_add(records.len() as u64, Ordering::Relaxed);
+        let file = self.staged.open(&leaf_file_name(path.iter().copied()))?;
+        file.write_at(records, from * self.stride, "writing a leaf")
+    }
+
     /// Syncs what was written; returns its bytes.
     pub(super) fn finish(self, rt: &Runtime<'_>) -> Result<u64, ConvertError> {
         if let Some(file) = &self.packed {
             file.sync("syncing the leaves")?;
         }
         let written = self.written.into_inner().unwrap_or_default();
+        if written.len() > FEW_FILES && self.staged.sync_file_system()? {
+            return Ok(self.bytes.into_inner());
+        }
         let sync = |(): &mut (), leaf: usize| self.staged.sync_file(&written[leaf]);
         rt.in_parallel(written.len(), || (), sync, |()| ())?;
         Ok(self.bytes.into_inner())

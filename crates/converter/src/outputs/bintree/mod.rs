@@ -12,6 +12,7 @@
 mod assemble;
 mod files;
 mod item;
+mod large;
 mod leaf;
 mod order;
 mod rule;
@@ -109,11 +110,8 @@ impl Output for BintreeSettings {
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
         let upper = upper::split(cloud, rt, self, task_points)?;
-        for task in &upper.tasks {
-            rt.budget.check_task(task.points(), task_points, bytes_per_point)?;
-        }
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
-        let built = build(cloud, rt, self, &columns, &upper, &leaves)?;
+        let built = build(cloud, rt, self, &columns, &upper, task_points, &leaves)?;
         let leaf_bytes = leaves.finish(rt)?;
 
         let mut ledger = Ledger::default();
@@ -162,6 +160,7 @@ fn build(
     settings: &BintreeSettings,
     columns: &Columns,
     upper: &Upper,
+    task_points: u64,
     leaves: &Leaves<'_>,
 ) -> Result<Vec<Built>, ConvertError> {
     let done = rt.in_parallel(
@@ -169,7 +168,12 @@ fn build(
         || (Builder::new(cloud, settings, columns, leaves), Vec::new()),
         |(builder, built), index| {
             let task = &upper.tasks[index];
-            built.push((index, builder.build(task)?));
+            let subtree = if task.points() > task_points {
+                builder.build_large(task, rt, rt.budget.chunk_bytes())?
+            } else {
+                builder.build(task)?
+            };
+            built.push((index, subtree));
             rt.advance(task.points());
             Ok(())
         },

@@ -31,20 +31,20 @@ pub(super) struct Built {
 
 /// One thread's means to build subtrees.
 pub(super) struct Builder<'a> {
-    cloud: &'a Cloud<'a>,
-    settings: &'a BintreeSettings,
-    columns: &'a Columns,
-    leaves: &'a Leaves<'a>,
+    pub(super) cloud: &'a Cloud<'a>,
+    pub(super) settings: &'a BintreeSettings,
+    pub(super) columns: &'a Columns,
+    pub(super) leaves: &'a Leaves<'a>,
     records: Vec<u8>,
     items: Vec<Item>,
     swap: Vec<Item>,
     sorter: MortonSorter,
     order: Vec<u32>,
-    bytes: Vec<u8>,
-    recovery: Recovery,
+    pub(super) bytes: Vec<u8>,
+    pub(super) recovery: Recovery,
     /// Of the subtree so far.
-    deviations: Deviations,
-    lost: Lost,
+    pub(super) deviations: Deviations,
+    pub(super) lost: Lost,
 }
 
 /// A node that is still to be divided.
@@ -98,6 +98,12 @@ impl<'a> Builder<'a> {
             deviations: Deviations::default(),
             lost: Lost::default(),
         }
+    }
+
+    /// Gives back the memory of the tasks so far.
+    pub(super) fn release(&mut self) {
+        (self.records, self.items, self.swap) = (Vec::new(), Vec::new(), Vec::new());
+        (self.sorter, self.order, self.bytes) = (MortonSorter::default(), Vec::new(), Vec::new());
     }
 
     /// Builds the subtree of a task and writes its leaves.
@@ -292,7 +298,7 @@ impl<'a> Builder<'a> {
 }
 
 /// The offset from the center at the start of a leaf record.
-fn record_offset(record: &[u8]) -> [f32; 3] {
+pub(super) fn record_offset(record: &[u8]) -> [f32; 3] {
     let words = record.as_chunks::<4>().0;
     std::array::from_fn(|a| words.get(a).map_or(0.0, |w| f32::from_le_bytes(*w)))
 }
@@ -322,7 +328,7 @@ fn extent(items: &[Item]) -> Extent {
 }
 
 /// Boxes of inner nodes: the unions of what is below. Children come after their parents, so backwards.
-fn unite(nodes: &mut [Node]) {
+pub(super) fn unite(nodes: &mut [Node]) {
     for i in (0..nodes.len()).rev() {
         if let Some(high) = nodes[i].high() {
             nodes[i].bounds = nodes[i + 1].bounds.union(&nodes[high as usize].bounds);

@@ -10,8 +10,9 @@ use crate::runtime::Runtime;
 /// Bytes of a side that are put into a block together.
 const SIDE_BYTES: usize = 4 << 20;
 
-/// Records that are read and divided together.
-const CUT_POINTS: u32 = 65_536;
+/// Records that are read and divided together, and bytes of wide ones.
+const CUT_POINTS: usize = 65_536;
+const CUT_BYTES: usize = 4 << 20;
 
 /// Bins of the histogram by which a median is narrowed down.
 const BINS: u64 = 4096;
@@ -139,7 +140,9 @@ impl Cut<'_> {
                 sides[1].parts.push(part);
             } else {
                 sides.iter_mut().for_each(Side::start_part);
-                for segment in part.segments.iter().flat_map(|s| s.split(CUT_POINTS)) {
+                for segment in
+                    part.segments.iter().flat_map(|s| s.split((CUT_BYTES / self.stride).clamp(1, CUT_POINTS) as u32))
+                {
                     records.clear();
                     let source = self.store.take(segment, &mut records)?;
                     for side in &mut sides {
@@ -225,9 +228,10 @@ impl Cut<'_> {
 
     /// The values of a part's points, which stay where they are.
     fn each(&self, part: &Part, records: &mut Vec<u8>, mut see: impl FnMut(i64)) -> Result<(), ConvertError> {
-        for segment in &part.segments {
+        for segment in part.segments.iter().flat_map(|s| s.split((CUT_BYTES / self.stride).clamp(1, CUT_POINTS) as u32))
+        {
             records.clear();
-            self.store.read(*segment, records)?;
+            self.store.read(segment, records)?;
             records.chunks_exact(self.stride).for_each(|r| see(self.job(r)[self.axis]));
         }
         Ok(())

@@ -13,6 +13,9 @@ use crate::octree::NodeEncoder;
 /// many scattered records at once, and what is done with them then happens in the first-level cache.
 const TILE_RECORDS: usize = 128;
 
+/// Bytes of a position in a Brotli payload.
+const BROTLI_POSITION_BYTES: u64 = 16;
+
 /// Turns stored records into payloads; one for each thread.
 pub(crate) struct PayloadEncoder {
     layout: OutputLayout,
@@ -76,5 +79,14 @@ impl NodeEncoder for PayloadEncoder {
             }
         }
         Ok(())
+    }
+
+    fn is_row_by_row(&self) -> bool {
+        self.encoding == Encoding::Default
+    }
+
+    fn bytes_per_point(&self) -> u64 {
+        // plain and sorted records, planes and their compressed bytes; codes, keys, and the order of the points
+        4 * (self.layout.stride as u64 + BROTLI_POSITION_BYTES) + 16 + 16 + 4
     }
 }

@@ -1,0 +1,306 @@
+//! Records of nodes that wait for the nodes above them: in memory as long as there is room, else in a temporary file.
+
+use std::sync::Arc;
+
+use super::raise::Points;
+use crate::error::ConvertError;
+use crate::runtime::{Consumer, DiskFile, Pool, Reservation, TempFiles};
+
+/// Records are read and written in pieces of about this size.
+const PIECE_BYTES: usize = 256 << 10;
+
+/// Records of a node, in Morton order.
+pub(super) struct List {
+    count: u64,
+    place: Place,
+    /// All points share one place: they are never cut, a sample takes the first of them at most.
+    pub(super) is_one_place: bool,
+}
+
+enum Place {
+    /// `Reservation`: of the pool; none while the records are part of a chunk.
+    Memory(Vec<u8>, Option<Reservation>),
+    /// From a byte of the file on.
+    Disk(u64),
+    /// From a byte of a file of its own on.
+    Own(DiskFile, u64),
+}
+
+impl Points for List {
+    fn count(&self) -> u64 {
+        self.count
+    }
+}
+
+impl List {
+    /// Records in memory that nobody has accounted for yet.
+    pub(super) fn of_chunk(records: Vec<u8>, stride: usize) -> Self {
+        Self { count: (records.len() / stride) as u64, place: Place::Memory(records, None), is_one_place: false }
+    }
+
+    /// Records of points that share one place, in a file of their own.
+    pub(super) fn of_place(file: DiskFile, count: u64) -> Self {
+        Self { count, place: Place::Own(file, 0), is_one_place: true }
+    }
+
+    /// Of nothing.
+    pub(super) fn empty() -> Self {
+        Self { count: 0, place: Place::Memory(Vec::new(), None), is_one_place: false }
+    }
+}
+
+/// Where lists are.
+pub(super) struct Lists {
+    pub(super) stride: usize,
+    memory: Arc<Pool>,
+    temp: TempFiles,
+    file: Option<DiskFile>,
+    /// Where the next list that goes to the file begins.
+    end: u64,
+}
+
+impl Lists {
+    pub(super) fn new(stride: usize, memory: &Arc<Pool>, temp: &TempFiles) -> Self {
+        Self { stride, memory: Arc::clone(memory), temp: temp.clone(), file: None, end: 0 }
+    }
+
+    /// Accounts for a list of a chunk: it stays in memory if there is room.
+    pub(super) fn admit(&mut self, list: &mut List) -> Result<(), ConvertError> {
+        if let Place::Memory(records, None) = &mut list.place {
+            let records = std::mem::take(records);
+            list.place = self.settle(records)?;
+        }
+        Ok(())
+    }
+
+    fn settle(&mut self, mut records: Vec<u8>) -> Result<Place, ConvertError> {
+        records.shrink_to_fit();
+        match self.reserve(records.len()) {
+            Some(reservation) => Ok(Place::Memory(records, Some(reservation))),
+            None => {
+                let start = self.region(records.len() as u64);
+                self.file()?.write_at(&records, start, "writing nodes that wait")?;
+                Ok(Place::Disk(start))
+            }
+        }
+    }
+
+    /// Room in memory for that many bytes.
+    fn reserve(&self, bytes: usize) -> Option<Reservation> {
+        let bytes = bytes as u64;
+        self.memory
+            .try_take_eighth(Consumer::Waiting, bytes)
+            .then(|| Reservation::of(&self.memory, Consumer::Waiting, bytes))
+    }
+
+    /// A region of the file; what of it is never written takes no room on the disk.
+    fn region(&mut self, bytes: u64) -> u64 {
+        let start = self.end;
+        self.end += bytes;
+        start
+    }
+
+    fn file(&mut self) -> Result<&DiskFile, ConvertError> {
+        match &mut self.file {
+            Some(file) => Ok(file),
+            empty => Ok(empty.insert(self.temp.make()?)),
+        }
+    }
+
+    /// Reads a list from front to back, in pieces of whole records, until `see` says to stop.
+    pub(super) fn each(
+        &self,
+        list: &List,
+        mut see: impl FnMut(&[u8]) -> Result<bool, ConvertError>,
+    ) -> Result<(), ConvertError> {
+        let (mut at, mut buffer) = (0, Vec::new());
+        while let Some(records) = self.piece(list, at, &mut buffer)? {
+            at += (records.len() / self.stride) as u64;
+            if !see(records)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The records of a list from `at` on, as many as are read together; `None` at its end.
+    pub(super) fn piece<'b>(
+        &self,
+        list: &'b List,
+        at: u64,
+        buffer: &'b mut Vec<u8>,
+    ) -> Result<Option<&'b [u8]>, ConvertError> {
+        let most = (PIECE_BYTES / self.stride).max(1) as u64;
+        match most.min(list.count.saturating_sub(at)) {
+            0 => Ok(None),
+            count => self.read(list, at, count, buffer).map(Some),
+        }
+    }
+
+    /// Some records of a list.
+    fn read<'b>(&self, list: &'b List, at: u64, count: u64, buffer: &'b mut Vec<u8>) -> Result<&'b [u8], ConvertError> {
+        let (start, len) = (at * self.stride as u64, count as usize * self.stride);
+        match (&list.place, &self.file) {
+            (Place::Memory(records, _), _) => Ok(&records[start as usize..][..len]),
+            (Place::Disk(offset), Some(file)) | (Place::Own(file, offset), _) => {
+                buffer.resize(len, 0);
+                file.read_at(buffer, offset + start, "reading nodes that wait")?;
+                Ok(buffer)
+            }
+            (Place::Disk(_), None) => Err(ConvertError::Internal("nodes that wait were lost".into())),
+        }
+    }
+
+    /// The first record of a list that is not empty.
+    pub(super) fn first(&self, list: &List) -> Result<Vec<u8>, ConvertError> {
+        Ok(self.read(list, 0, 1, &mut Vec::new())?.to_vec())
+    }
+
+    /// Leaves out the first record of a list that is not empty.
+    pub(super) fn drop_first(&self, list: &mut List) {
+        list.count -= 1;
+        match &mut list.place {
+            Place::Memory(records, _) => drop(records.drain(..self.stride)),
+            Place::Disk(offset) | Place::Own(_, offset) => *offset += self.stride as u64,
+        }
+    }
+
+    /// Moves one record into a list of its own.
+    pub(super) fn take_one(&mut self, list: &mut List, index: u64) -> Result<List, ConvertError> {
+        let from = std::mem::replace(list, List::empty());
+        let (mut one, mut rest) = (Writer::new(1), Writer::new(from.count - 1));
+        let (mut at, mut buffer) = (0, Vec::new());
+        while let Some(piece) = self.piece(&from, at, &mut buffer)?.map(<[u8]>::to_vec) {
+            for record in piece.chunks_exact(self.stride) {
+                let writer = if at == index { &mut one } else { &mut rest };
+                writer.push(record, self)?;
+                at += 1;
+            }
+        }
+        *list = rest.finish(self)?;
+        list.is_one_place = from.is_one_place;
+        one.finish(self)
+    }
+}
+
+/// A list while it is written.
+pub(super) struct Writer {
+    /// Records that it may come to.
+    most: u64,
+    count: u64,
+    records: Vec<u8>,
+    /// Where it begins in the file, and how many of its bytes are there.
+    in_file: Option<(u64, u64)>,
+    room: Option<Reservation>,
+}
+
+impl Writer {
+    /// Of a list of at most `most` records.
+    pub(super) fn new(most: u64) -> Self {
+        Self { most, count: 0, records: Vec::new(), in_file: None, room: None }
+    }
+
+    #[inline]
+    pub(super) fn push(&mut self, record: &[u8], lists: &mut Lists) -> Result<(), ConvertError> {
+        if self.records.len() + record.len() > self.records.capacity() {
+            self.grow(lists)?;
+        }
+        self.records.extend_from_slice(record);
+        self.count += 1;
+        Ok(())
+    }
+
+    /// Makes room for more records: in memory, or by writing those that are there.
+    fn grow(&mut self, lists: &mut Lists) -> Result<(), ConvertError> {
+        let stride = lists.stride;
+        if self.in_file.is_none() {
+            let most = usize::try_from(self.most).unwrap_or(usize::MAX).saturating_mul(stride);
+            let capacity = (2 * self.records.len()).max(PIECE_BYTES).min(most).max(self.records.len() + stride);
+            if self.room.is_none() {
+                self.room = lists.reserve(0);
+            }
+            let is_reserved = match &mut self.room {
+                Some(room) => room.try_resize(capacity as u64),
+                None => false,
+            };
+            if is_reserved {
+                self.records.reserve_exact(capacity - self.records.len());
+                return Ok(());
+            }
+            self.in_file = Some((lists.region(self.most * stride as u64), 0));
+        }
+        self.flush(lists)?;
+        self.records = Vec::with_capacity(PIECE_BYTES.max(stride));
+        self.room = None;
+        Ok(())
+    }
+
+    fn flush(&mut self, lists: &mut Lists) -> Result<(), ConvertError> {
+        if let Some((start, written)) = &mut self.in_file {
+            lists.file()?.write_at(&self.records, *start + *written, "writing nodes that wait")?;
+            *written += self.records.len() as u64;
+            self.records.clear();
+        }
+        Ok(())
+    }
+
+    /// The list.
+    pub(super) fn finish(mut self, lists: &mut Lists) -> Result<List, ConvertError> {
+        self.flush(lists)?;
+        let place = match self.in_file {
+            Some((start, _)) => Place::Disk(start),
+            None => {
+                self.records.shrink_to_fit();
+                if let Some(room) = &mut self.room {
+                    room.try_resize(self.records.len() as u64);
+                }
+                Place::Memory(self.records, self.room)
+            }
+        };
+        Ok(List { count: self.count, place, is_one_place: false })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runtime::SystemDisk;
+
+    fn numbers(lists: &Lists, list: &List) -> Vec<u32> {
+        let mut found = Vec::new();
+        let add = |records: &[u8]| {
+            found.extend(records.as_chunks::<4>().0.iter().map(|r| u32::from_le_bytes(*r)));
+            Ok(true)
+        };
+        lists.each(list, add).unwrap();
+        found
+    }
+
+    #[test]
+    fn lists_give_back_what_they_hold_from_memory_and_from_the_disk() {
+        for room in [1 << 30, 300_000, 0] {
+            let memory = Arc::new(Pool::new(room, room));
+            let mut lists = Lists::new(4, &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
+            let (mut even, mut odd) = (Writer::new(200_000), Writer::new(200_000));
+            for i in 0..400_000u32 {
+                let writer = if i % 2 == 0 { &mut even } else { &mut odd };
+                writer.push(&i.to_le_bytes(), &mut lists).unwrap();
+            }
+            let (mut even, mut odd) = (even.finish(&mut lists).unwrap(), odd.finish(&mut lists).unwrap());
+            assert_eq!(numbers(&lists, &even), (0..400_000).step_by(2).collect::<Vec<u32>>());
+            let middle = lists.take_one(&mut odd, 100_000).unwrap();
+            assert_eq!(numbers(&lists, &middle), [200_001]);
+            let left: Vec<u32> = (1..400_000).step_by(2).filter(|i| *i != 200_001).collect();
+            assert_eq!((numbers(&lists, &odd), odd.count()), (left, 199_999));
+            assert_eq!(lists.first(&even).unwrap(), [0; 4]);
+            lists.drop_first(&mut even);
+            assert_eq!(numbers(&lists, &even), (2..400_000).step_by(2).collect::<Vec<u32>>());
+            let mut chunk = List::of_chunk(vec![7; 400], 4);
+            lists.admit(&mut chunk).unwrap();
+            assert_eq!(numbers(&lists, &chunk).len(), 100);
+            assert_eq!(lists.end > 0, room < 1 << 30);
+            drop((even, odd, middle, chunk));
+            assert_eq!(memory.free(), room, "all was given back");
+        }
+    }
+}
