@@ -125,8 +125,7 @@ impl From<ConvertError> for Failure {
 
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
 
-/// Keeps panics silent and remembers the last one. A decompressor that panics on corrupt bytes is caught by the reader
-/// and reported as a broken input, so nothing may be printed here; `main` reports panics that were not caught.
+/// Keeps panics silent and remembers the last one: a worker's panic ends the run, and `main` reports it once.
 pub(crate) fn remember_panics() {
     let backtrace_wanted = std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0");
     let default_hook = std::panic::take_hook();

@@ -3,6 +3,11 @@
 //! Results go to standard output, everything else to standard error; a failure is one line there. `README.md` has the
 //! table of exit codes, `exit.rs` is where they come from.
 
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
+
 mod allocator;
 mod args;
 mod commands;

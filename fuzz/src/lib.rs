@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use pointmill_format::{ReadError, Scan, ScanInfo, ScanKind, Wanted};
+use pointmill_format::{ReadError, Scan, ScanKind, Wanted};
 pub use pointmill_testkit::reader::check_error;
 use pointmill_testkit::reader::{check_scan_error, keeps_promises};
 
@@ -19,18 +19,10 @@ pub type Open = fn(&Path) -> Result<Box<dyn Scan>, ReadError>;
 /// # Panics
 /// If a promise of [`Scan`] is broken.
 pub fn read(bytes: &[u8], open: Open) {
-    read_some(bytes, open, Wanted::all);
-}
-
-/// [`read`], where `wanted` chooses the columns.
-///
-/// # Panics
-/// As [`read`].
-pub fn read_some(bytes: &[u8], open: Open, wanted: fn(&ScanInfo) -> Wanted) {
     let path = write(bytes);
     let _ = ScanKind::of(&bytes[..bytes.len().min(4096)]);
     match open(path) {
-        Ok(scan) => keeps_promises(&*scan, &wanted(scan.info()), MAX_POINTS),
+        Ok(scan) => keeps_promises(&*scan, &Wanted::all(scan.info()), MAX_POINTS),
         Err(error) => check_scan_error(&error),
     }
 }

@@ -44,7 +44,7 @@ fn folder() -> Dir {
     dir.write("cut.las", &las[..300]);
     dir.write("header.las", &las[..100]);
     dir.write("empty.las", b"");
-    let mut absurd = las.clone();
+    let mut absurd = las;
     absurd[147..155].copy_from_slice(&5e-310f64.to_le_bytes());
     dir.write("absurd.las", &absurd);
     dir.write("b.xyz", b"1 2 3 4\n2 3 4 5\n3 4 5 6\n");

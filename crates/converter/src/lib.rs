@@ -24,6 +24,11 @@
 //! # }
 //! ```
 
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
+
 mod advice;
 #[cfg(feature = "bench")]
 #[doc(hidden)]

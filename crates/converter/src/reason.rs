@@ -115,9 +115,13 @@ impl fmt::Display for AxisReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.basis.fmt(f)?;
         let Some(Coarser { factor, cause }) = self.coarser else { return Ok(()) };
-        // a step that is absurdly fine gives hundreds of digits
-        let times = if factor < 1e9 { factor.to_string() } else { format!("{factor:e}") };
-        write!(f, "; made {times} times coarser, because ")?;
+        // a step that was absurdly fine would give hundreds of digits
+        if factor < 1e9 {
+            write!(f, "; made {factor}")?;
+        } else {
+            write!(f, "; made {factor:e}")?;
+        }
+        f.write_str(" times coarser, because ")?;
         match cause {
             CoarserCause::Extent => f.write_str("31 bits do not hold the extent"),
             CoarserCause::Doubles => f.write_str("doubles as large as the coordinates are further apart"),

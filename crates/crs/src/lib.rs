@@ -22,6 +22,11 @@
 //! Projections and the registry of systems are those of the crates `proj-core` and `proj-wkt`; docs/inputs.md has their
 //! measured agreement with PROJ. What they cannot do exactly is refused, not approximated: changes of datum that need a
 //! grid or have no published parameters, and changes of the reference of heights.
+
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
 #![forbid(unsafe_code)]
 
 mod heights;

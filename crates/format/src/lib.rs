@@ -43,9 +43,13 @@
 //!
 //! The crate has no threads, no temporary files and no tree building: it says what the bytes say. Lengths and counts
 //! found in a file are never trusted; an allocation is bounded by the size of the file or, for compressed nodes, by
-//! [`potree2::Dataset::set_max_node_bytes`]. A decompressor that panics on corrupt bytes is caught, and the panic is an
-//! error ([`Fault::Decode`]); the panic hook of the process is left alone, so the default one prints a line. One that
-//! exhausts the stack ends the process: a damaged GPS time in LAZ may.
+//! [`potree2::Dataset::set_max_node_bytes`]. No bytes make it panic; a piece that cannot be decoded is an error
+//! ([`Fault::Decode`]).
+
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
 #![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a separate module
 
 mod dataset_kind;

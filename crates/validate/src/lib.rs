@@ -17,6 +17,11 @@
 //! The crate shares the readers of `pointmill-format` and computes every expected value itself, from
 //! the page of the format in `docs/formats`: boxes, spacing, order, checksums. That repetition is deliberate. It never
 //! sees the converter.
+
+#![cfg_attr(
+    not(test),
+    warn(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::unwrap_in_result)
+)]
 #![forbid(unsafe_code)]
 
 mod accuracy;

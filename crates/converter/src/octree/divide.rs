@@ -7,6 +7,7 @@ use pointmill_format::NodeKey;
 
 use crate::cloud::{Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, morton};
 use crate::error::ConvertError;
+use crate::runtime::{Consumer, Reservation, Runtime};
 
 /// A subtree that is built alone.
 #[derive(Debug)]
@@ -20,8 +21,15 @@ pub(super) struct Chunk {
 /// Levels by which a cell that is too large is divided at once.
 const SPLIT_LEVELS: u32 = 3;
 
-/// The chunks of the cloud, in Morton order, none larger than `max_points` unless its points share one place.
-pub(super) fn divide(cloud: &Cloud<'_>, max_points: u64) -> Result<Vec<Chunk>, ConvertError> {
+/// The chunks of the cloud, in Morton order, none larger than `max_points` unless its points share one place; and what
+/// these lists take.
+pub(super) fn divide(
+    cloud: &Cloud<'_>,
+    rt: &Runtime<'_>,
+    max_points: u64,
+) -> Result<(Vec<Chunk>, Reservation), ConvertError> {
+    let mut room = Reservation::new(&rt.memory, Consumer::Cells);
+    let mut lists = 0;
     let mut regrouper = Regrouper::new(&cloud.store, cloud.frame.stride);
     let mut cells = Vec::with_capacity(cloud.cells.len());
     // The stack returns the last first.
@@ -30,12 +38,17 @@ pub(super) fn divide(cloud: &Cloud<'_>, max_points: u64) -> Result<Vec<Chunk>, C
         if cell.points <= max_points || cell.is_one_place {
             cells.push(cell);
         } else {
-            stack.extend(divide_cell(&cell, &cloud.frame, &mut regrouper)?.into_iter().rev());
+            rt.check_stop()?;
+            let parts = divide_cell(&cell, &cloud.frame, &mut regrouper)?;
+            lists += parts.iter().map(|part| part.segments.bytes() + size_of::<Cell>() as u64).sum::<u64>();
+            room.grow_to(lists)?;
+            stack.extend(parts.into_iter().rev());
         }
     }
     let mut chunks = Vec::new();
     choose(NodeKey::ROOT, &mut cells, max_points, &mut chunks);
-    Ok(chunks)
+    room.resize(chunks.iter().map(|chunk| chunk.segments.bytes() + size_of::<Chunk>() as u64).sum())?;
+    Ok((chunks, room))
 }
 
 /// The parts of a cell some levels below it, in Morton order.

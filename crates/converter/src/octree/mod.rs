@@ -49,7 +49,7 @@ pub(crate) fn build<S: NodeSink>(
     settings: OctreeSettings,
     sink: &S,
 ) -> Result<Octree, ConvertError> {
-    let chunks = divide::divide(cloud, rt.budget.chunk_points)?;
+    let (chunks, _room) = divide::divide(cloud, rt, rt.budget.chunk_points)?;
     let plan = ChunkPlan {
         cloud,
         leaf_capacity: settings.leaf_capacity,

@@ -30,6 +30,9 @@ pub(super) struct TopNodes<'a, S: NodeSink> {
     sampler: Sampler,
     sampled: Reservation,
     encoder: S::Encoder,
+    /// Memory that is used again: records of a node, and candidates.
+    records: Vec<u8>,
+    part: Part,
     /// Finished nodes that have no place yet, and their bytes.
     open: Vec<FinishedNode>,
     payloads: Vec<u8>,
@@ -58,6 +61,8 @@ impl<'a, S: NodeSink> TopNodes<'a, S> {
             sampler,
             sampled: Reservation::new(&rt.memory, Consumer::Work),
             encoder: sink.encoder(),
+            records: Vec::new(),
+            part: Part::default(),
             open: Vec::new(),
             payloads: Vec::new(),
             nodes: Vec::new(),
@@ -133,22 +138,27 @@ impl<'a, S: NodeSink> TopNodes<'a, S> {
     /// The bytes of a node, its records in memory.
     fn encode(&mut self, key: NodeKey, points: &List) -> Result<(FinishedNode, Vec<u8>), ConvertError> {
         let stride = self.lists.stride;
-        let mut records = Vec::with_capacity(points.count() as usize * stride);
+        let mut records = std::mem::take(&mut self.records);
+        records.clear();
+        records.reserve_exact(points.count() as usize * stride);
         self.lists.each(points, |piece| {
             records.extend_from_slice(piece);
             Ok(true)
         })?;
         let mut bytes = std::mem::take(&mut self.payloads);
         let node = finish_node(&mut self.encoder, key, records.chunks_exact(stride), &mut self.written, &mut bytes)?;
+        if records.len() as u64 <= LARGE_BYTES {
+            self.records = records;
+        }
         Ok((node, bytes))
     }
 }
 
-/// Candidates in Morton order, their records, and where they go.
-struct Part<'w> {
+/// Candidates in Morton order, and their records.
+#[derive(Default)]
+struct Part {
     records: Vec<u8>,
     trees: Vec<TreePoint>,
-    taken: &'w mut Writer,
 }
 
 impl<S: NodeSink> TopNodes<'_, S> {
@@ -165,7 +175,7 @@ impl<S: NodeSink> TopNodes<'_, S> {
             return Ok(list);
         }
         let mut rest = Writer::new(list.count());
-        let mut part = Part { records: Vec::new(), trees: Vec::new(), taken };
+        let mut part = std::mem::take(&mut self.part);
         let (mut at, mut buffer) = (0, Vec::new());
         while let Some(piece) = self.lists.piece(&list, at, &mut buffer)? {
             at += (piece.len() / self.lists.stride) as u64;
@@ -173,20 +183,27 @@ impl<S: NodeSink> TopNodes<'_, S> {
             part.trees.extend(piece.chunks_exact(self.lists.stride).map(|record| self.frame.tree(record)));
             if part.records.len() >= PART_BYTES {
                 let cut = part.trees.windows(2).rposition(|w| Sampler::may_be_cut(level, w[0], w[1]));
-                self.choose(&mut part, cut.map_or(0, |i| i + 1), &mut rest)?;
+                self.choose(&mut part, cut.map_or(0, |i| i + 1), taken, &mut rest)?;
             }
         }
         let all = part.trees.len();
-        self.choose(&mut part, all, &mut rest)?;
+        self.choose(&mut part, all, taken, &mut rest)?;
+        self.part = part;
         rest.finish(&mut self.lists)
     }
 
     /// Decides about the first `count` candidates of a part.
-    fn choose(&mut self, part: &mut Part<'_>, count: usize, rest: &mut Writer) -> Result<(), ConvertError> {
+    fn choose(
+        &mut self,
+        part: &mut Part,
+        count: usize,
+        taken: &mut Writer,
+        rest: &mut Writer,
+    ) -> Result<(), ConvertError> {
         self.sampler.offer(part.trees[..count].iter().copied());
         let stride = self.lists.stride;
         for (record, is_taken) in part.records.chunks_exact(stride).zip(self.sampler.choose()) {
-            let writer = if *is_taken { &mut *part.taken } else { &mut *rest };
+            let writer = if *is_taken { &mut *taken } else { &mut *rest };
             writer.push(record, &mut self.lists)?;
         }
         self.sampled.grow_to(self.sampler.bytes())?; // memory that was touched stays

@@ -78,10 +78,12 @@ impl Recovery {
     }
 }
 
+type Compare = fn(&[u8], &[u8]) -> Ordering;
+
 /// [`Recovery::count`] for more points than memory holds.
 pub(super) struct LostSort<'a> {
     recovery: Recovery,
-    sort: BigSort<'a, fn(&[u8], &[u8]) -> Ordering>,
+    sort: BigSort<'a, Compare>,
     points: u64,
 }
 
@@ -92,7 +94,7 @@ const DECODED_BYTES: usize = 24;
 impl<'a> LostSort<'a> {
     /// In `memory_bytes` of memory.
     pub(super) fn new(rt: &'a Runtime<'a>, memory_bytes: u64, recovery: Recovery) -> Self {
-        let compare: fn(&[u8], &[u8]) -> Ordering = |a, b| a.cmp(b);
+        let compare: Compare = |a, b| a.cmp(b);
         Self { recovery, sort: BigSort::new(rt, ENTRY_BYTES, memory_bytes, compare), points: 0 }
     }
 

@@ -56,20 +56,6 @@ pub(crate) fn start_write_back(file: &File, offset: u64, len: usize) {
     let _ = (file, offset, len);
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn buffers_hold_what_they_are_given() {
-        let mut b = buffer(5 << 20);
-        b.resize(4 << 20, 7);
-        reserve(&mut b, 9 << 20);
-        assert!(b.capacity() >= 13 << 20 && b.len() == 4 << 20 && b.iter().all(|v| *v == 7));
-        assert_eq!(buffer(0).capacity(), 0);
-    }
-}
-
 /// Waits until all that is written to the file system of `folder` is on the disk; false where the system cannot be asked.
 pub(crate) fn sync_file_system(folder: &File) -> std::io::Result<bool> {
     #[cfg(target_os = "linux")]
@@ -85,5 +71,19 @@ pub(crate) fn sync_file_system(folder: &File) -> std::io::Result<bool> {
     {
         let _ = folder;
         Ok(false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn buffers_hold_what_they_are_given() {
+        let mut b = buffer(5 << 20);
+        b.resize(4 << 20, 7);
+        reserve(&mut b, 9 << 20);
+        assert!(b.capacity() >= 13 << 20 && b.len() == 4 << 20 && b.iter().all(|v| *v == 7));
+        assert_eq!(buffer(0).capacity(), 0);
     }
 }

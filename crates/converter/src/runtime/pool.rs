@@ -158,6 +158,11 @@ impl Reservation {
         Self { pool: Arc::clone(pool), who, bytes }
     }
 
+    /// What the owner has.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
     /// [`Self::resize`] if there is room without anything making way, and the consumer has no more than an eighth of all then.
     pub(crate) fn try_resize(&mut self, bytes: u64) -> bool {
         let fits = match bytes.checked_sub(self.bytes) {
@@ -223,8 +228,7 @@ mod tests {
     #[test]
     fn records_make_room_until_there_are_none_and_then_the_error_says_how_much_is_enough() {
         let pool = Arc::new(Pool::new(100, 1000));
-        let records = Arc::new(Records(Arc::downgrade(&pool)));
-        let evict: Arc<dyn Evict> = records.clone();
+        let evict: Arc<dyn Evict> = Arc::new(Records(Arc::downgrade(&pool)));
         pool.evict_from(Arc::downgrade(&evict));
         assert!(pool.try_take(Consumer::Records, 90) && !pool.try_take(Consumer::Records, 20));
         let mut nodes = Reservation::new(&pool, Consumer::Nodes);

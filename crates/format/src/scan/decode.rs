@@ -1,5 +1,6 @@
 //! What every reader of scans offers: pieces that decode alone, in batches of points.
 
+use std::any::Any;
 use std::ops::ControlFlow;
 
 use super::{Piece, ScanInfo, Wanted};
@@ -13,14 +14,12 @@ pub const MAX_BATCH_POINTS: usize = 65_536;
 pub const MAX_BATCH_BYTES: usize = 4 << 20;
 
 /// Points of a full batch, where each takes `point_bytes` (> 0) bytes.
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 pub(super) fn batch_points(point_bytes: usize) -> usize {
     MAX_BATCH_BYTES.checked_div(point_bytes).unwrap_or(MAX_BATCH_POINTS).clamp(1, MAX_BATCH_POINTS)
 }
 
 /// Bytes that a point takes in a batch: its position and all attributes, whether they are wanted or not, so that
 /// batches are the same whatever is wanted.
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 pub(super) fn point_bytes(attributes: &[crate::Attribute], is_quantized: bool) -> usize {
     let axis = if is_quantized { size_of::<i32>() } else { size_of::<f64>() };
     attributes.iter().fold(3 * axis, |sum, attribute| sum.saturating_add(attribute.size()))
@@ -39,6 +38,9 @@ pub struct Scratch {
     pub decoded: Vec<u8>,
     /// The batch that is handed to the sink; its columns fit the scan that was decoded last.
     pub batch: Option<PointBatch>,
+    /// What else the reader that decoded last wants to find again.
+    #[cfg_attr(not(feature = "las"), allow(dead_code))]
+    pub(super) kept: Option<Box<dyn Any + Send + Sync>>,
 }
 
 /// The batch of the scratch memory with these columns and, if `is_quantized`, integer positions; its memory is kept
@@ -66,11 +68,9 @@ pub(super) fn fitting_batch<'a>(
 }
 
 /// Memory of a column beside its values, and of small things for each of them in a decode.
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 const COLUMN_BYTES: u64 = 256;
 
 /// Memory of a batch of at most `points` points with the wanted columns: [`resize`] gives them no more room than they need.
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 pub(super) fn batch_bytes(attributes: &[crate::Attribute], is_quantized: bool, wanted: &Wanted, points: u64) -> u64 {
     let sizes = attributes.iter().enumerate().filter(|(i, _)| wanted.is_wanted(*i)).map(|(_, a)| a.size() as u64);
     let each = point_bytes(&[], is_quantized) as u64 + sizes.sum::<u64>();
@@ -129,8 +129,7 @@ pub trait Scan: Send + Sync {
     /// A sink that breaks ends the decode early, without an error.
     ///
     /// # Errors
-    /// A piece that cannot be decoded to its end; batches handed over before stay valid. A panic inside a
-    /// decompressor comes out as an error too.
+    /// A piece that cannot be decoded to its end; batches handed over before stay valid.
     fn decode(
         &self,
         piece: usize,

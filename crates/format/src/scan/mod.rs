@@ -2,8 +2,6 @@
 
 mod archive;
 mod batches;
-#[cfg(feature = "las")]
-mod catch_panic;
 mod chosen;
 mod decimal;
 mod decode;

@@ -79,42 +79,4 @@ impl Source {
         self.read_at(offset, out)?;
         Ok(out)
     }
-
-    /// A sequential reader over `offset..end`.
-    #[cfg(feature = "las")]
-    pub(crate) fn reader(&self, offset: u64, end: u64) -> SourceReader<'_> {
-        SourceReader { source: self, next: offset, end: end.min(self.len), buf: Vec::new(), at: 0 }
-    }
-}
-
-/// A buffered reader of a part of a [`Source`].
-#[cfg(feature = "las")]
-pub(crate) struct SourceReader<'a> {
-    source: &'a Source,
-    next: u64,
-    end: u64,
-    buf: Vec<u8>,
-    at: usize,
-}
-
-/// Large enough that a read costs little beside decoding, small beside a batch.
-#[cfg(feature = "las")]
-pub(super) const READER_BUFFER: u64 = 256 * 1024;
-
-#[cfg(feature = "las")]
-impl io::Read for SourceReader<'_> {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        if self.at == self.buf.len() {
-            let len = READER_BUFFER.min(self.end.saturating_sub(self.next));
-            self.buf.resize(len as usize, 0);
-            read_exact_at(&self.source.file, &mut self.buf, self.next)?;
-            self.next += len;
-            self.at = 0;
-        }
-        let rest = &self.buf[self.at..];
-        let n = rest.len().min(out.len());
-        out[..n].copy_from_slice(&rest[..n]);
-        self.at += n;
-        Ok(n)
-    }
 }

@@ -1,9 +1,9 @@
 //! Honest damage: cut files, wrong counts, lost chunk tables. What is there is read, what is missing is reported.
 
-use laz::{LasZipCompressor, LazVlrBuilder};
+use laz::LazVlrBuilder;
 use pointmill_testkit::damage::{put, u32_at};
 
-use crate::common::{LAS, fixture, points_start, read_bytes};
+use crate::common::{LAS, fixture, laz_file, points_start, read_bytes};
 
 const LEGACY_COUNT: usize = 107;
 const COUNT: usize = 247;
@@ -208,8 +208,6 @@ fn a_path_may_have_any_letters_and_folders_and_empty_files_are_errors() {
 fn a_chunk_larger_than_a_batch_comes_in_several() {
     for (point_format, len) in [(0u8, 20usize), (6, 30)] {
         let n = 150_000usize;
-        let mut bytes = fixture(&format!("format{point_format}.las"));
-        bytes.truncate(points_start(&bytes));
         let points: Vec<u8> = (0..n)
             .flat_map(|i| {
                 let mut record = vec![0; len];
@@ -217,32 +215,10 @@ fn a_chunk_larger_than_a_batch_comes_in_several() {
                 record
             })
             .collect();
-        let vlr = LazVlrBuilder::default()
-            .with_point_format(point_format, 0)
-            .unwrap()
-            .with_fixed_chunk_size(n as u32)
-            .build();
-        let mut data = Vec::new();
-        vlr.write_to(&mut data).unwrap();
-        bytes.extend([0, 0]);
-        bytes.extend(b"laszip encoded\0\0");
-        bytes.extend(22204u16.to_le_bytes());
-        bytes.extend((data.len() as u16).to_le_bytes());
-        bytes.extend([0; 32]);
-        bytes.extend(data);
-        let (start, vlrs) = (bytes.len() as u32, u32_at(&bytes, 100) + 1);
-        put(&mut bytes, 96, &start.to_le_bytes());
-        put(&mut bytes, 100, &vlrs.to_le_bytes());
-        bytes[104] |= 0x80;
-        put(&mut bytes, if point_format < 6 { LEGACY_COUNT } else { COUNT }, &(n as u32).to_le_bytes());
-        put(&mut bytes, LEGACY_COUNT, &(n as u32).to_le_bytes());
-        let mut out = std::io::Cursor::new(bytes);
-        out.set_position(u64::from(start));
-        let mut compressor = LasZipCompressor::new(&mut out, vlr).unwrap();
-        compressor.compress_many(&points).unwrap();
-        compressor.done().unwrap();
-        drop(compressor);
-        let cloud = read_bytes(out.get_ref()).unwrap();
+        let vlr = LazVlrBuilder::default().with_point_format(point_format, 0).unwrap();
+        let vlr = vlr.with_fixed_chunk_size(n as u32).build();
+        let bytes = laz_file(point_format, vlr, n, |compressor| compressor.compress_many(&points).unwrap());
+        let cloud = read_bytes(&bytes).unwrap();
         assert!(
             cloud.errors.is_empty() && cloud.info.warnings.is_empty(),
             "{:?} {:?}",

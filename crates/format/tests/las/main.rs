@@ -6,6 +6,7 @@ mod corpus;
 mod damage;
 mod golden;
 mod hostile;
+mod laz_chunks;
 mod mended;
 mod mutation;
 mod oracle;

@@ -30,7 +30,7 @@ use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
-use crate::runtime::Runtime;
+use crate::runtime::{Consumer, Reservation, Runtime};
 use crate::sources::Schema;
 use buckets::Task;
 use content::Content;
@@ -110,6 +110,8 @@ impl Output for BatchesSettings {
         let layout = Layout::new(points, &attributes, planes_at_most(&frame, self.planes)).map_err(refused)?;
         let tasks = buckets::tasks(cloud, rt, &frame, task_points)?;
         let sorted = Store::new(rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
+        let mut room = Reservation::new(&rt.memory, Consumer::Cells);
+        room.resize(tasks.iter().map(|task| task.segments.bytes() + size_of::<Task>() as u64).sum())?;
         let tasks = large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points)?;
         let file = to.create(self.kind().marker_file())?;
         // what is compressed is written raw first, elsewhere

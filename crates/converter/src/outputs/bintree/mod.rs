@@ -43,7 +43,7 @@ use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, FormatErrors, OutputReport};
-use crate::runtime::{Runtime, Sequential};
+use crate::runtime::{Consumer, Reservation, Runtime, Sequential};
 use crate::sources::Schema;
 use crate::warning::Warning;
 
@@ -110,8 +110,10 @@ impl Output for BintreeSettings {
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
         let upper = upper::split(cloud, rt, self, task_points)?;
+        let mut room = Reservation::new(&rt.memory, Consumer::Cells);
+        room.resize(upper.tasks.iter().map(upper::Task::bytes).sum())?;
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
-        let built = build(cloud, rt, self, &columns, &upper, task_points, &leaves)?;
+        let (built, _known) = build(cloud, rt, self, &columns, &upper, task_points, &leaves)?;
         let leaf_bytes = leaves.finish(rt)?;
 
         let mut ledger = Ledger::default();
@@ -153,7 +155,7 @@ impl Output for BintreeSettings {
     }
 }
 
-/// Builds all subtrees, in parallel; they come back in order.
+/// Builds all subtrees, in parallel; they come back in order, with what their nodes take.
 fn build(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
@@ -162,26 +164,29 @@ fn build(
     upper: &Upper,
     task_points: u64,
     leaves: &Leaves<'_>,
-) -> Result<Vec<Built>, ConvertError> {
+) -> Result<(Vec<Built>, Vec<Reservation>), ConvertError> {
     let done = rt.in_parallel(
         upper.tasks.len(),
-        || (Builder::new(cloud, settings, columns, leaves), Vec::new()),
-        |(builder, built), index| {
+        || (Builder::new(cloud, settings, columns, leaves), Vec::new(), Reservation::new(&rt.memory, Consumer::Nodes)),
+        |(builder, built, known), index| {
             let task = &upper.tasks[index];
             let subtree = if task.points() > task_points {
                 builder.build_large(task, rt, rt.budget.chunk_bytes())?
             } else {
                 builder.build(task)?
             };
+            // they are copied once, when all are put together
+            known.resize(known.bytes() + 2 * (subtree.nodes.len() * size_of::<Node>()) as u64)?;
             built.push((index, subtree));
             rt.advance(task.points());
             Ok(())
         },
-        |(_, built)| built,
+        |(_, built, known)| (built, known),
     )?;
-    let mut built: Vec<(usize, Built)> = done.into_iter().flatten().collect();
+    let (built, known): (Vec<_>, Vec<Reservation>) = done.into_iter().unzip();
+    let mut built: Vec<(usize, Built)> = built.into_iter().flatten().collect();
     built.sort_unstable_by_key(|(index, _)| *index);
-    Ok(built.into_iter().map(|(_, built)| built).collect())
+    Ok((built.into_iter().map(|(_, built)| built).collect(), known))
 }
 
 fn write_index(

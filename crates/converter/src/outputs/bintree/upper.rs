@@ -40,6 +40,11 @@ impl Task {
         self.parts.iter().map(|p| p.points).sum()
     }
 
+    /// Memory that the lists of its records take.
+    pub(super) fn bytes(&self) -> u64 {
+        self.parts.iter().map(|p| p.segments.bytes() + size_of::<Part>() as u64).sum()
+    }
+
     pub(super) fn segments(&self) -> impl Iterator<Item = &Segment> {
         self.parts.iter().flat_map(|p| p.segments.iter())
     }

@@ -28,7 +28,7 @@ pub(super) fn piece(
         return Err(ReadError::broken(scan.source.path(), fault.byte, what).advise(fault.advice.clone()));
     }
     let needed = needed(plan, wanted);
-    let Scratch { raw, decoded, batch } = scratch;
+    let Scratch { raw, decoded, batch, .. } = scratch;
     let streams = Streams::gather(&scan.source, cut, &plan.fields, &needed, raw, decoded)?;
     let records = cut.records as usize;
     let step = step(scan);

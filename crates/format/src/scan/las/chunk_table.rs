@@ -1,13 +1,8 @@
 //! The chunks of a LAZ file: from its chunk table, or, for layered chunks, found by walking from one to the next.
 
-use std::io::Cursor;
-
-use laz::decoders::ArithmeticDecoder;
-use laz::decompressors::IntegerDecompressorBuilder;
-
 use super::bytes::{i64_at, u32_at};
+use super::laz::decode_entries;
 use crate::ReadError;
-use crate::scan::catch_panic::catch_panic;
 use crate::scan::source::Source;
 
 /// Maximum number of empty chunks (some writers close a chunk that they never fill).
@@ -96,9 +91,7 @@ impl Layout {
         }
         // an entry is two corrected integers of at most 32 bits and their contexts: 16 bytes are ample
         let coded = source.vec_at(table + 8, 16 * count + 64).map_err(|e| e.what())?;
-        let chunks = catch_panic(|| self.decode_entries(coded, count as usize))
-            .unwrap_or_else(Err)
-            .map_err(|e| format!("it does not decode: {e}"))?;
+        let chunks = self.decode_entries(&coded, count as usize)?;
         Ok(Entries { chunks, data_bytes })
     }
 
@@ -140,26 +133,14 @@ impl Layout {
         })
     }
 
-    fn decode_entries(&self, coded: Vec<u8>, count: usize) -> Result<Vec<Chunk>, String> {
-        const POINTS: u32 = 0;
-        const BYTES: u32 = 1;
-        let mut out = Vec::with_capacity(count);
-        if count == 0 {
-            return Ok(out);
-        }
-        let mut integers = IntegerDecompressorBuilder::new().bits(32).contexts(2).build_initialized();
-        let mut decoder = ArithmeticDecoder::new(Cursor::new(coded));
-        decoder.read_init_bytes().map_err(|e| e.to_string())?;
-        let (mut points, mut bytes) = (0, 0);
-        for _ in 0..count {
-            if self.chunk_points.is_none() {
-                points = integers.decompress(&mut decoder, points, POINTS).map_err(|e| e.to_string())?;
-            }
-            bytes = integers.decompress(&mut decoder, bytes, BYTES).map_err(|e| e.to_string())?;
-            let points = self.chunk_points.filter(|_| bytes != 0).unwrap_or(points as u32);
-            out.push(Chunk { points: u64::from(points), bytes: u64::from(bytes as u32) });
-        }
-        Ok(out)
+    fn decode_entries(&self, coded: &[u8], count: usize) -> Result<Vec<Chunk>, String> {
+        let entries = decode_entries(coded, count, self.chunk_points.is_none());
+        let entries = entries.ok_or("it does not decode: its bytes end, or make no sense")?;
+        let chunk = |(points, bytes): (u32, u32)| {
+            let points = self.chunk_points.filter(|_| bytes != 0).unwrap_or(points);
+            Chunk { points: u64::from(points), bytes: u64::from(bytes) }
+        };
+        Ok(entries.into_iter().map(chunk).collect())
     }
 
     /// Finds layered chunks without a table, up to `end` or until `point_limit` points are found. What follows the

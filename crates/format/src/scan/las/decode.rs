@@ -1,12 +1,12 @@
 //! A piece to batches.
 
-use std::io::Read;
 use std::ops::ControlFlow;
 
-use super::decompress::{self, Decompressor, Stop};
+use super::decompress::{self, Decompressor, LazModels};
 use super::file::LasScan;
 use super::kernels;
 use super::laszip::LaszipRecord;
+use super::laz::{Input, Pointwise, Stop};
 use super::pieces::Storage;
 use super::schema::Schema;
 use crate::scan::decode::{batch_points, fitting_batch, point_bytes, resize};
@@ -32,7 +32,7 @@ pub(super) fn piece(
         let fault = Fault::NoSuchPiece { piece: index, pieces: scan.plan.pieces.len() };
         return Err(ReadError::unsupported(scan.source.path(), fault));
     };
-    let Scratch { raw, decoded, batch } = scratch;
+    let Scratch { raw, decoded, batch, kept } = scratch;
     let batch = fitting_batch(batch, &scan.info.attributes, true);
     let mut out = Emitter {
         record_len: scan.record_len,
@@ -47,11 +47,13 @@ pub(super) fn piece(
         return out.records(&scan.source, piece, raw);
     };
     let laz = Laz { scan, laszip, index, piece };
+    let mut own = LazModels::default();
+    let models = LazModels::of(kept).unwrap_or(&mut own);
     match scan.plan.storage {
         Storage::Records => Ok(()),
-        Storage::Layered => laz.layered(raw, decoded, &mut out),
-        Storage::Chunk => laz.chunk(raw, decoded, &mut out),
-        Storage::Stream { chunk_points } => laz.stream(chunk_points, decoded, &mut out),
+        Storage::Layered => laz.layered(models, raw, decoded, &mut out),
+        Storage::Chunk => laz.chunk(models, raw, decoded, &mut out),
+        Storage::Stream { chunk_points } => laz.stream(models, chunk_points, decoded, &mut out),
     }
 }
 
@@ -68,16 +70,6 @@ struct Emitter<'a, 's> {
 }
 
 impl Emitter<'_, '_> {
-    /// `records`: whole ones, at most [`Self::batch_points`].
-    fn emit(&mut self, records: &[u8]) -> ControlFlow<()> {
-        if records.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        kernels::resize(records.len() / self.record_len, &self.schema.fields, self.wanted, self.batch);
-        kernels::fill(records, self.record_len, 0, &self.schema.fields, self.wanted, self.batch);
-        self.hand_over()
-    }
-
     fn hand_over(&mut self) -> ControlFlow<()> {
         self.batch.first_point = self.next_point;
         self.next_point += self.batch.len() as u64;
@@ -106,29 +98,54 @@ impl Emitter<'_, '_> {
     }
 
     /// Decodes `points` points and hands them over, until the sink breaks.
-    fn pump<R>(
+    fn pump(
         &mut self,
-        decompressor: &mut Decompressor<'_, R>,
+        decompressor: &mut Decompressor<'_, '_>,
         points: u64,
         decoded: &mut Vec<u8>,
     ) -> Result<ControlFlow<()>, Stop> {
         let mut left = points;
         while left > 0 {
-            let n = left.min(self.batch_points);
-            let len = n as usize * self.record_len;
-            if decoded.len() < len {
-                resize(decoded, len);
-            }
-            let (good, result) = decompressor.fill(&mut decoded[..len]);
+            let n = left.min(self.batch_points) as usize;
+            let (good, result) = self.batch(decompressor, n, decoded);
             // what was decoded before corruption showed is not to be trusted; before the end of the bytes it is
-            let keep = if matches!(result, Err(Stop::Corrupt(_))) { 0 } else { good };
-            if self.emit(&decoded[..keep * self.record_len]).is_break() {
+            let keep = if result.as_ref().is_err_and(|stop| !stop.is_honest()) { 0 } else { good };
+            if keep < n {
+                kernels::resize(keep, &self.schema.fields, self.wanted, self.batch);
+            }
+            if keep > 0 && self.hand_over().is_break() {
                 return Ok(ControlFlow::Break(()));
             }
             result?;
-            left -= n;
+            left -= n as u64;
         }
         Ok(ControlFlow::Continue(()))
+    }
+
+    /// Decodes up to `points` points to the batch, so many records at once as stay in the first-level cache.
+    fn batch(
+        &mut self,
+        decompressor: &mut Decompressor<'_, '_>,
+        points: usize,
+        decoded: &mut Vec<u8>,
+    ) -> (usize, Result<(), Stop>) {
+        let most = points.min(kernels::BLOCK) * self.record_len;
+        if decoded.len() < most {
+            resize(decoded, most);
+        }
+        kernels::resize(points, &self.schema.fields, self.wanted, self.batch);
+        let mut good = 0;
+        while good < points {
+            let block = (points - good).min(kernels::BLOCK);
+            let (more, result) = decompressor.fill(&mut decoded[..block * self.record_len]);
+            let records = &decoded[..more * self.record_len];
+            kernels::fill(records, self.record_len, good, &self.schema.fields, self.wanted, self.batch);
+            good += more;
+            if result.is_err() {
+                return (good, result);
+            }
+        }
+        (good, Ok(()))
     }
 }
 
@@ -141,57 +158,71 @@ struct Laz<'a> {
 }
 
 impl Laz<'_> {
-    fn layered(&self, raw: &mut Vec<u8>, decoded: &mut Vec<u8>, out: &mut Emitter<'_, '_>) -> Result<(), ReadError> {
+    fn layered(
+        &self,
+        models: &mut LazModels,
+        raw: &mut Vec<u8>,
+        decoded: &mut Vec<u8>,
+        out: &mut Emitter<'_, '_>,
+    ) -> Result<(), ReadError> {
         let Piece { points, byte_offset, byte_len, .. } = *self.piece;
         let bytes = self.scan.source.slice_at(byte_offset, byte_len, raw)?;
         let layout = self.scan.layout(self.laszip);
-        let selection = decompress::selection(&self.scan.schema, out.wanted);
-        Decompressor::layered(&self.laszip.items, layout, selection, bytes, points)
-            .and_then(|mut d| out.pump(&mut d, points, decoded))
+        let parts = decompress::parts(&self.scan.schema, out.wanted);
+        Decompressor::layered(models.layered(&self.laszip.items), layout, parts, bytes, points)
+            .and_then(|mut decompressor| out.pump(&mut decompressor, points, decoded))
             .map(drop)
-            // the layers lie inside the chunk: one that ends early is damaged, not cut
-            .map_err(|stop| self.error(out, if stop == Stop::CutShort { corrupt("a layer ends early") } else { stop }))
+            .map_err(|stop| self.error(out, stop))
     }
 
-    fn chunk(&self, raw: &mut Vec<u8>, decoded: &mut Vec<u8>, out: &mut Emitter<'_, '_>) -> Result<(), ReadError> {
+    fn chunk(
+        &self,
+        models: &mut LazModels,
+        raw: &mut Vec<u8>,
+        decoded: &mut Vec<u8>,
+        out: &mut Emitter<'_, '_>,
+    ) -> Result<(), ReadError> {
         let Piece { byte_offset, byte_len, .. } = *self.piece;
         if byte_len > MAX_CHUNK_IN_MEMORY {
-            return self.sequential(self.scan.source.reader(byte_offset, byte_offset + byte_len), None, decoded, out);
+            return self.stream(models, None, decoded, out);
         }
         let bytes = self.scan.source.slice_at(byte_offset, byte_len, raw)?;
-        self.sequential(bytes, None, decoded, out)
+        self.pointwise(models, Input::Whole(bytes), None, decoded, out)
     }
 
     fn stream(
         &self,
+        models: &mut LazModels,
         chunk_points: Option<u32>,
         decoded: &mut Vec<u8>,
         out: &mut Emitter<'_, '_>,
     ) -> Result<(), ReadError> {
         let Piece { byte_offset, byte_len, .. } = *self.piece;
-        self.sequential(self.scan.source.reader(byte_offset, byte_offset + byte_len), chunk_points, decoded, out)
+        let input = Input::of_file(&self.scan.source, byte_offset, byte_offset + byte_len);
+        self.pointwise(models, input, chunk_points, decoded, out)
     }
 
     /// Records one after the other; a chunk ends after `chunk_points` points and the next one follows at once (the
     /// encoder pads each chunk so that the decoder stops reading at its last byte).
-    fn sequential<R: Read>(
+    fn pointwise(
         &self,
-        mut reader: R,
+        models: &mut LazModels,
+        input: Input<'_>,
         chunk_points: Option<u32>,
         decoded: &mut Vec<u8>,
         out: &mut Emitter<'_, '_>,
     ) -> Result<(), ReadError> {
+        let models = models.pointwise(&self.laszip.items);
+        let mut decompressor = Decompressor::Pointwise(Pointwise::new(models, input));
         let mut left = self.piece.points;
         while left > 0 {
             let n = left.min(chunk_points.map_or(u64::MAX, u64::from));
-            let mut decompressor = Decompressor::sequential(&self.laszip.items, self.scan.record_len, reader)
-                .map_err(|stop| self.error(out, stop))?;
             let flow = out.pump(&mut decompressor, n, decoded).map_err(|stop| self.error(out, stop))?;
             if flow.is_break() {
                 return Ok(());
             }
             left -= n;
-            reader = decompressor.into_inner();
+            decompressor.next_chunk();
         }
         Ok(())
     }
@@ -200,16 +231,15 @@ impl Laz<'_> {
         let Piece { first_point, points, byte_offset, byte_len } = *self.piece;
         let decoded = out.next_point - first_point;
         let pieces = self.scan.plan.pieces.len();
-        let (why, advice) = match stop {
-            Stop::CutShort => ("the bytes end".to_owned(), Advice::CutShort),
-            Stop::Corrupt(why) => (why, Advice::Damaged),
+        let (at, why, advice) = match stop {
+            Stop::CutShort => (byte_len, "the bytes end".to_owned(), Advice::CutShort),
+            // the layers lie inside the chunk: one that ends early is damaged, not cut
+            Stop::LayerEnds { at, layer } => (at as u64, format!("the layer of {layer} ends early"), Advice::Damaged),
+            Stop::Corrupt { at, why } => (at, why, Advice::Damaged),
+            Stop::Read(error) => return error,
         };
         let (piece, bytes) = (self.index, byte_len);
         let fault = Fault::Decode { piece, pieces, bytes, decoded, points, why };
-        ReadError::broken(self.scan.source.path(), byte_offset, fault).advise(advice)
+        ReadError::broken(self.scan.source.path(), byte_offset + at.min(byte_len), fault).advise(advice)
     }
-}
-
-fn corrupt(why: &str) -> Stop {
-    Stop::Corrupt(why.to_owned())
 }

@@ -1,16 +1,15 @@
 //! The LASzip record (`laszip encoded` 22204): how the points are compressed.
 
-use laz::{LazItem, LazItemType, LazVlr};
-
 use super::bytes::{u16_at, u32_at};
 use super::header::Header;
+use super::laz::{Item, ItemKind};
 use super::records::Record;
 
 /// Bytes of the record before its items, and of an item.
 const FIXED: usize = 34;
 const ITEM: usize = 6;
 
-/// More extra bytes per record than this are refused: the decompressor's models take 16 kB for each.
+/// More extra bytes per record than this are refused: the decoder's models take up to 5 kB for each.
 const MAX_EXTRA_BYTES: usize = 2048;
 
 /// How the compressed points are arranged.
@@ -33,7 +32,7 @@ pub(super) struct LaszipRecord {
     pub(super) arrangement: Arrangement,
     /// Points a chunk, the last one excepted; `None` if each chunk has its own number.
     pub(super) chunk_points: Option<u32>,
-    pub(super) items: Vec<LazItem>,
+    pub(super) items: Vec<Item>,
 }
 
 /// Why the points cannot be decompressed, as text.
@@ -67,10 +66,8 @@ impl LaszipRecord {
         if u16_at(data, 2) != 0 {
             return Err(LaszipFault::Unknown(format!("LASzip coder {} is not known", u16_at(data, 2))));
         }
-        let items = LazVlr::from_buffer(data)
-            .map_err(|e| LaszipFault::Broken(format!("the LASzip record: {e}")))?
-            .items()
-            .clone();
+        let items: Result<Vec<Item>, _> = data[FIXED..FIXED + ITEM * count].chunks_exact(ITEM).map(item).collect();
+        let items = items?;
         check_items(&items, header, arrangement)?;
         // u32::MAX by the specification; 0 is what lascopcindex writes
         let chunk_points = Some(u32_at(data, 12)).filter(|n| *n != 0 && *n != u32::MAX);
@@ -79,52 +76,58 @@ impl LaszipRecord {
 
     /// Layers of a chunk: their sizes stand behind its first record.
     pub(super) fn layers(&self) -> usize {
-        self.items.iter().map(|item| layers(item.item_type())).sum()
+        self.items.iter().map(layers).sum()
     }
 }
 
+fn item(bytes: &[u8]) -> Result<Item, LaszipFault> {
+    let number = u16_at(bytes, 0);
+    let kind = ItemKind::of_number(number)
+        .ok_or_else(|| LaszipFault::Broken(format!("the LASzip record has an item {number}, which is not known")))?;
+    Ok(Item { kind, bytes: u16_at(bytes, 2), version: u16_at(bytes, 4) })
+}
+
 /// The items must be those of the point format, in order, each of its usual size and a version that is decoded.
-fn check_items(items: &[LazItem], header: &Header, arrangement: Arrangement) -> Result<(), LaszipFault> {
-    use LazItemType as I;
+fn check_items(items: &[Item], header: &Header, arrangement: Arrangement) -> Result<(), LaszipFault> {
+    use ItemKind as K;
     let extra = header.record_len - header.format_len();
     if extra > MAX_EXTRA_BYTES {
         let what = format!("{extra} compressed extra bytes per point are more than the {MAX_EXTRA_BYTES} supported");
         return Err(LaszipFault::Unknown(what));
     }
-    let n = extra as u16;
     let mut expected = match header.point_format {
-        0 => vec![I::Point10],
-        1 => vec![I::Point10, I::GpsTime],
-        2 => vec![I::Point10, I::RGB12],
-        3 => vec![I::Point10, I::GpsTime, I::RGB12],
-        4 => vec![I::Point10, I::GpsTime, I::WavePacket13],
-        5 => vec![I::Point10, I::GpsTime, I::RGB12, I::WavePacket13],
-        6 => vec![I::Point14],
-        7 => vec![I::Point14, I::RGB14],
-        8 => vec![I::Point14, I::RGBNIR14],
-        9 => vec![I::Point14, I::WavePacket14],
-        _ => vec![I::Point14, I::RGBNIR14, I::WavePacket14],
+        0 => vec![K::Point10],
+        1 => vec![K::Point10, K::GpsTime11],
+        2 => vec![K::Point10, K::Rgb12],
+        3 => vec![K::Point10, K::GpsTime11, K::Rgb12],
+        4 => vec![K::Point10, K::GpsTime11, K::WavePacket13],
+        5 => vec![K::Point10, K::GpsTime11, K::Rgb12, K::WavePacket13],
+        6 => vec![K::Point14],
+        7 => vec![K::Point14, K::Rgb14],
+        8 => vec![K::Point14, K::RgbNir14],
+        9 => vec![K::Point14, K::WavePacket14],
+        _ => vec![K::Point14, K::RgbNir14, K::WavePacket14],
     };
     let layered = header.point_format >= 6;
-    if n > 0 {
-        expected.push(if layered { I::Byte14(n) } else { I::Byte(n) });
+    if extra > 0 {
+        expected.push(if layered { K::Byte14 } else { K::Byte });
     }
-    let found: Vec<I> = items.iter().map(LazItem::item_type).collect();
+    let found: Vec<K> = items.iter().map(|item| item.kind).collect();
     if found != expected {
         return Err(LaszipFault::Broken(format!(
             "the LASzip items {found:?} are not those of point format {} with records of {} bytes",
             header.point_format, header.record_len
         )));
     }
-    if let Some(item) = items.iter().find(|item| item.size() != size(item.item_type())) {
-        let what = format!("the LASzip item {:?} claims {} bytes", item.item_type(), item.size());
+    if let Some(item) = items.iter().find(|item| item.bytes != item.kind.bytes().unwrap_or(extra as u16)) {
+        let what = format!("the LASzip item {:?} claims {} bytes", item.kind, item.bytes);
         return Err(LaszipFault::Broken(what));
     }
     let versions = if layered { 3..=4 } else { 1..=2 };
     let fits = arrangement == Arrangement::Plain || layered == (arrangement == Arrangement::Layered);
-    match items.iter().find(|item| !versions.contains(&item.version())) {
+    match items.iter().find(|item| !versions.contains(&item.version)) {
         Some(item) if arrangement != Arrangement::Plain => {
-            let what = format!("LASzip item {:?} of version {} is not known", item.item_type(), item.version());
+            let what = format!("LASzip item {:?} of version {} is not known", item.kind, item.version);
             Err(LaszipFault::Unknown(what))
         }
         _ if !fits => {
@@ -135,25 +138,12 @@ fn check_items(items: &[LazItem], header: &Header, arrangement: Arrangement) -> 
     }
 }
 
-fn size(item: LazItemType) -> u16 {
-    use LazItemType as I;
-    match item {
-        I::Byte(n) | I::Byte14(n) => n,
-        I::Point10 => 20,
-        I::GpsTime | I::RGBNIR14 => 8,
-        I::RGB12 | I::RGB14 => 6,
-        I::WavePacket13 | I::WavePacket14 => 29,
-        I::Point14 => 30,
-    }
-}
-
-fn layers(item: LazItemType) -> usize {
-    use LazItemType as I;
-    match item {
-        I::Point14 => 9,
-        I::RGB14 | I::WavePacket14 => 1,
-        I::RGBNIR14 => 2,
-        I::Byte14(n) => usize::from(n),
-        I::Byte(_) | I::Point10 | I::GpsTime | I::RGB12 | I::WavePacket13 => 0,
+fn layers(item: &Item) -> usize {
+    match item.kind {
+        ItemKind::Point14 => 9,
+        ItemKind::Rgb14 | ItemKind::WavePacket14 => 1,
+        ItemKind::RgbNir14 => 2,
+        ItemKind::Byte14 => usize::from(item.bytes),
+        _ => 0,
     }
 }

@@ -2,17 +2,18 @@
 
 use super::decode::{MAX_CHUNK_IN_MEMORY, READ_RECORDS};
 use super::file::LasScan;
+use super::kernels::BLOCK;
+use super::laz::WINDOW;
 use super::pieces::Storage;
 use crate::scan::decode::{batch_bytes, batch_points, point_bytes};
-use crate::scan::source::READER_BUFFER;
 use crate::{Piece, Wanted};
 
-/// The models of a decompressor, but for those of extra bytes.
-const MODELS: u64 = 3 << 20;
+/// The models of a decoder that has met every value in every scanner channel, but for those of extra bytes.
+const MODELS: u64 = 2 << 20;
 /// What is longer in a record than this may be extra bytes.
 const SHORTEST_RECORD: u64 = 20;
 /// The models of one extra byte.
-const EXTRA_BYTE_MODELS: u64 = 16 << 10;
+const EXTRA_BYTE_MODELS: u64 = 6 << 10;
 
 /// [`crate::Scan::decode_bytes`].
 pub(super) fn decode_bytes(scan: &LasScan, wanted: &Wanted) -> u64 {
@@ -27,11 +28,10 @@ pub(super) fn decode_bytes(scan: &LasScan, wanted: &Wanted) -> u64 {
     }
     let compressed = match scan.plan.storage {
         Storage::Records => 0,
-        // a chunk, and its layers
-        Storage::Layered => 2 * bytes,
+        Storage::Layered => bytes,
         Storage::Chunk if bytes <= MAX_CHUNK_IN_MEMORY => bytes,
-        Storage::Chunk | Storage::Stream { .. } => bytes.min(READER_BUFFER),
+        Storage::Chunk | Storage::Stream { .. } => bytes.min(WINDOW as u64),
     };
     let extra = record_len.saturating_sub(SHORTEST_RECORD);
-    batch + compressed + points * record_len + MODELS + extra * EXTRA_BYTE_MODELS
+    batch + compressed + points.min(BLOCK as u64) * record_len + MODELS + extra * EXTRA_BYTE_MODELS
 }

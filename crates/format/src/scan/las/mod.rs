@@ -2,7 +2,7 @@
 //!
 //! [`open`] reads what stands around the points and cuts them into pieces; [`Scan::decode`] turns a piece into columns.
 //! Nothing that the file says is believed where the bytes can be asked: counts, lengths and offsets are clamped to the
-//! file, disagreements are reported in [`ScanInfo::warnings`], and a decompressor's panic comes out as an error.
+//! file, and disagreements are reported in [`ScanInfo::warnings`].
 //!
 //! * The header's point count is obeyed where it is smaller than what is there (0 means no points), with a warning;
 //!   where it is larger, the points that are there are read.
@@ -30,7 +30,7 @@
 //! ```
 //!
 //! Sources: ASPRS LAS Specification 1.4 R15 and 1.5; LASzip by M. Isenburg ("LASzip: lossless compression of LiDAR
-//! data", 2013), whose codec is the `laz` crate's.
+//! data", 2013).
 
 mod bytes;
 mod chunk_table;
@@ -44,6 +44,7 @@ mod geotiff;
 mod header;
 mod kernels;
 mod laszip;
+mod laz;
 mod memory;
 mod mend;
 mod pieces;

@@ -217,7 +217,7 @@ impl Decoder<'_> {
     }
 
     pub(crate) fn piece(&self, piece: &Piece, scratch: &mut Scratch, sink: &mut Sink<'_>) -> Result<(), ReadError> {
-        let Scratch { raw, decoded, batch } = scratch;
+        let Scratch { raw, decoded, batch, .. } = scratch;
         let batch = fitting_batch(batch, self.attributes, false);
         match self.storage {
             Storage::Records { stride, endian } => self.records(piece, *stride, *endian, raw, batch, sink),

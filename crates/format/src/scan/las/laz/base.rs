@@ -1,0 +1,229 @@
+//! The layer of formats 6–10 that all others depend on: scanner channel, returns, x and y.
+
+use super::channels::{Channels, Meta, State};
+use super::coder::Coder;
+use super::integer::Integer;
+use super::median::Median;
+use super::model::{Changes, Family, Tiny};
+use super::returns::{context_16, level};
+
+/// Bits of the symbol that says what differs from the last point of the channel.
+const CHANNEL: usize = 1 << 6;
+const SOURCE: usize = 1 << 5;
+const TIME: usize = 1 << 4;
+const ANGLE: usize = 1 << 3;
+const RETURNS: usize = 1 << 2;
+/// The number of the return: the same, one more, one less, another.
+const NUMBER: usize = 3;
+
+/// Where the fields are in a record.
+pub(super) const RETURNS_AT: usize = 14;
+pub(super) const FLAGS_AT: usize = 15;
+/// The scanner channel among the flags.
+pub(super) const CHANNEL_BITS: u8 = 0b0011_0000;
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Values {
+    x: i32,
+    y: i32,
+    returns: u8,
+    number: u8,
+    new_time: bool,
+}
+
+#[derive(Debug)]
+struct Channel {
+    last: Values,
+    changes: [Changes; 8],
+    channels: Tiny,
+    /// Numbers of returns, and of the return, by the last one.
+    returns: Family<16, 0>,
+    numbers: Family<16, 0>,
+    numbers_of_pulse: Tiny,
+    dx: Integer,
+    dy: Integer,
+    medians: [[Median; 2]; 12],
+}
+
+impl State for Channel {
+    type Value = Values;
+
+    fn new() -> Self {
+        Self {
+            last: Values::default(),
+            changes: std::array::from_fn(|_| Changes::new(128)),
+            channels: Tiny::new(3),
+            returns: Family::new(),
+            numbers: Family::new(),
+            numbers_of_pulse: Tiny::new(13),
+            dx: Integer::new(32, 2),
+            dy: Integer::new(32, 22),
+            medians: [[Median::new(); 2]; 12],
+        }
+    }
+
+    fn start(&mut self, last: Values) {
+        self.last = Values { new_time: false, ..last };
+        self.changes.iter_mut().for_each(Changes::reset);
+        self.channels.reset();
+        self.returns.reset();
+        self.numbers.reset();
+        self.numbers_of_pulse.reset();
+        self.dx.reset();
+        self.dy.reset();
+        self.medians = [[Median::new(); 2]; 12];
+    }
+
+    fn last(&self) -> Values {
+        self.last
+    }
+}
+
+impl Channel {
+    /// What differs from the last point of the channel.
+    #[inline]
+    fn changes(&mut self, coder: &mut Coder<'_>) -> usize {
+        let Values { returns, number, new_time, .. } = self.last;
+        let context = usize::from(number == 1) | usize::from(number >= returns) << 1 | usize::from(new_time) << 2;
+        coder.symbol(&mut self.changes[context])
+    }
+
+    #[inline]
+    fn returns(&mut self, coder: &mut Coder<'_>, changes: usize) {
+        let Values { returns, number, new_time, .. } = &mut self.last;
+        *new_time = changes & TIME != 0;
+        if changes & RETURNS != 0 {
+            *returns = coder.symbol(self.returns.of(*returns)) as u8;
+        }
+        *number = match changes & NUMBER {
+            0 => *number,
+            1 => (*number + 1) & 15,
+            2 => (*number + 15) & 15,
+            _ if *new_time => coder.symbol(self.numbers.of(*number)) as u8,
+            _ => (*number + 2 + coder.symbol(&mut self.numbers_of_pulse) as u8) & 15,
+        };
+    }
+
+    /// Returns the context of the height.
+    #[inline]
+    fn position(&mut self, coder: &mut Coder<'_>) -> usize {
+        let Values { x, y, returns, number, new_time } = &mut self.last;
+        let single = usize::from(*returns == 1);
+        let [x_median, y_median] = &mut self.medians[context_16(*returns, *number) << 1 | usize::from(*new_time)];
+
+        let dx = self.dx.next(coder, x_median.get(), single);
+        *x = x.wrapping_add(dx);
+        x_median.add(dx);
+
+        let dy = self.dy.next(coder, y_median.get(), single + (self.dx.last_bits() & !1).min(20));
+        *y = y.wrapping_add(dy);
+        y_median.add(dy);
+
+        let bits = (self.dx.last_bits() + self.dy.last_bits()) / 2;
+        single + (bits & !1).min(18)
+    }
+}
+
+/// Decoder of the layer.
+#[derive(Debug)]
+pub(super) struct Base {
+    /// Version 4 tells the layers of colours and extra bytes the channel of each point, version 3 where it changes.
+    tells_channel: bool,
+    channels: Channels<Channel>,
+    channel: u8,
+    is_used: [bool; 4],
+    item_channel: u8,
+    item_is_used: [bool; 4],
+}
+
+impl Base {
+    pub(super) fn new(version: u16) -> Self {
+        Self {
+            tells_channel: version >= 4,
+            channels: Channels::new(),
+            channel: 0,
+            is_used: [false; 4],
+            item_channel: 0,
+            item_is_used: [false; 4],
+        }
+    }
+
+    /// Starts a chunk behind its first record, and returns its channel.
+    pub(super) fn start(&mut self, first: &[u8]) -> u8 {
+        let int = |at: usize| first.get(at..).and_then(|b| b.first_chunk()).map_or(0, |b| i32::from_le_bytes(*b));
+        let byte = |at: usize| first.get(at).copied().unwrap_or(0);
+        let channel = (byte(FLAGS_AT) & CHANNEL_BITS) >> 4;
+        (self.channel, self.item_channel) = (channel, channel);
+        (self.is_used, self.item_is_used) = ([false; 4], [false; 4]);
+        self.is_used[usize::from(channel)] = true;
+        self.item_is_used[usize::from(channel)] = true;
+        let (returns, number) = (byte(RETURNS_AT) >> 4, byte(RETURNS_AT) & 15);
+        self.channels.of(channel).start(Values { x: int(0), y: int(4), returns, number, new_time: false });
+        channel
+    }
+
+    /// Decodes points, and writes what this layer knows to records that begin as the first one of the chunk.
+    pub(super) fn run(
+        &mut self,
+        paused: &mut Coder<'_>,
+        points: &mut [Meta],
+        records: &mut [u8],
+        record_len: usize,
+    ) -> usize {
+        let mut coder = *paused;
+        let mut good = 0;
+        for (meta, record) in points.iter_mut().zip(records.chunks_exact_mut(record_len)) {
+            *meta = self.next(&mut coder, record);
+            if coder.is_off() {
+                break;
+            }
+            good += 1;
+        }
+        *paused = coder;
+        good
+    }
+
+    #[inline]
+    fn next(&mut self, coder: &mut Coder<'_>, record: &mut [u8]) -> Meta {
+        let from = self.channel;
+        let state = self.channels.of(from);
+        let changes = state.changes(coder);
+        let mut is_new = false;
+        if changes & CHANNEL != 0 {
+            self.channel = (from + 1 + coder.symbol(&mut state.channels) as u8) & 3;
+            is_new = !std::mem::replace(&mut self.is_used[usize::from(self.channel)], true);
+            if is_new {
+                self.channels.open(self.channel, from);
+            }
+        }
+        let item_from = self.item_channel;
+        self.item_channel = if self.tells_channel || changes & CHANNEL != 0 { self.channel } else { 0 };
+        let item_is_new = !std::mem::replace(&mut self.item_is_used[usize::from(self.item_channel)], true);
+
+        let channel = self.channel;
+        let state = self.channels.of(channel);
+        state.returns(coder, changes);
+        let z_context = state.position(coder) as u8;
+        let Values { x, y, returns, number, new_time } = state.last;
+        if let Some(bytes) = record.first_chunk_mut::<16>() {
+            bytes[..4].copy_from_slice(&x.to_le_bytes());
+            bytes[4..8].copy_from_slice(&y.to_le_bytes());
+            bytes[RETURNS_AT] = number | returns << 4;
+            bytes[FLAGS_AT] = bytes[FLAGS_AT] & !CHANNEL_BITS | channel << 4;
+        }
+        Meta {
+            channel,
+            from,
+            is_new,
+            item_channel: self.item_channel,
+            item_from,
+            item_is_new,
+            new_time,
+            new_angle: changes & ANGLE != 0,
+            new_source: changes & SOURCE != 0,
+            place: u8::from(number == 1) << 1 | u8::from(number >= returns),
+            level: level(returns, number) as u8,
+            z_context,
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! The arithmetic decoder: an interval of the numbers of 32 bits that narrows with each symbol.
+//!
+//! `value` < `length` holds from the start on, whatever the bytes are, so no symbol is beyond its model. Bytes that are
+//! not there read as zeros, and [`Coder::is_off`] tells: callers ask after each point, so that damage costs at most the
+//! work of one point.
+
+use super::model::{BitModel, END, Model, SHARE_BITS};
+
+/// The interval is stretched by whole bytes when it becomes shorter.
+const MIN_LENGTH: u32 = 1 << 24;
+
+/// Added to the place of a decoder that has met what no encoder writes.
+const BROKEN: usize = usize::MAX / 2;
+
+/// A decoder at a place in some bytes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Coder<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    value: u32,
+    length: u32,
+}
+
+/// A decoder between two looks at its bytes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Paused {
+    /// The next byte; beyond the end if bytes were missing.
+    pub(super) at: usize,
+    value: u32,
+    length: u32,
+}
+
+impl Paused {
+    /// Goes on in `bytes`.
+    pub(super) fn resume(self, bytes: &[u8]) -> Coder<'_> {
+        let Self { at, value, length } = self;
+        Coder { bytes, at, value, length }
+    }
+}
+
+impl<'a> Coder<'a> {
+    /// Bytes that a decoder reads before its first symbol.
+    pub(super) const START: usize = 4;
+
+    /// Starts at byte `at`.
+    pub(super) fn start(bytes: &'a [u8], at: usize) -> Self {
+        let mut coder = Self { bytes, at, value: 0, length: u32::MAX };
+        for _ in 0..Self::START {
+            coder.value = coder.value << 8 | u32::from(coder.byte());
+        }
+        if coder.value == u32::MAX {
+            coder.fail();
+        }
+        coder
+    }
+
+    pub(super) fn pause(self) -> Paused {
+        let Self { at, value, length, .. } = self;
+        Paused { at, value, length }
+    }
+
+    /// The next byte; beyond the end if bytes were missing.
+    #[inline(always)]
+    pub(super) fn at(&self) -> usize {
+        if self.is_broken() { self.at - BROKEN } else { self.at }
+    }
+
+    /// True once bytes were missing or made no sense: what was decoded since the last question is worth nothing.
+    #[inline(always)]
+    pub(super) fn is_off(&self) -> bool {
+        self.at > self.bytes.len()
+    }
+
+    /// True once the bytes made no sense.
+    #[inline(always)]
+    pub(super) fn is_broken(&self) -> bool {
+        self.at >= BROKEN
+    }
+
+    /// Met what no encoder writes; if bytes were missing before, that is the reason.
+    #[cold]
+    pub(super) fn fail(&mut self) {
+        if !self.is_off() {
+            self.at += BROKEN;
+        }
+        self.value = 0;
+    }
+
+    #[inline(always)]
+    fn byte(&mut self) -> u8 {
+        let byte = self.bytes.get(self.at).copied().unwrap_or(0);
+        self.at += 1;
+        byte
+    }
+
+    #[inline(always)]
+    fn stretch(&mut self) {
+        while self.length < MIN_LENGTH {
+            self.value = self.value << 8 | u32::from(self.byte());
+            self.length <<= 8;
+        }
+    }
+
+    /// A symbol of a model; less than its number of symbols.
+    #[inline(always)]
+    pub(super) fn symbol<const N: usize, const T: usize>(&mut self, model: &mut Model<N, T>) -> usize {
+        model.prepare();
+        let unit = self.length >> SHARE_BITS;
+        // what the division cuts off belongs to the last symbol
+        let share = self.value.checked_div(unit).unwrap_or(0).min((1 << SHARE_BITS) - 1);
+        let (symbol, low, high) = model.take(share as u16);
+        let start = u32::from(low) * unit;
+        let end = if high == END { self.length } else { u32::from(high) * unit };
+        self.value -= start;
+        self.length = end - start;
+        self.stretch();
+        symbol
+    }
+
+    /// A bit of a model.
+    #[inline(always)]
+    pub(super) fn bit(&mut self, model: &mut BitModel) -> bool {
+        let zero = model.zero * (self.length >> BitModel::SHARE_BITS);
+        let bit = self.value >= zero;
+        if bit {
+            self.value -= zero;
+            self.length -= zero;
+        } else {
+            self.length = zero;
+        }
+        self.stretch();
+        model.count(bit);
+        bit
+    }
+
+    /// A number of `bits` (1 to 32) bits, all of its values equally likely.
+    #[inline(always)]
+    pub(super) fn bits(&mut self, bits: u32) -> u32 {
+        if bits > 19 {
+            let low = self.few_bits(16);
+            return self.few_bits(bits - 16) << 16 | low;
+        }
+        self.few_bits(bits)
+    }
+
+    #[inline(always)]
+    fn few_bits(&mut self, bits: u32) -> u32 {
+        self.length >>= bits;
+        let number = self.value.checked_div(self.length).unwrap_or(0);
+        self.value -= number * self.length;
+        self.stretch();
+        if number >> bits != 0 {
+            self.fail();
+            return 0;
+        }
+        number
+    }
+
+    /// A number of 64 bits.
+    pub(super) fn bits_64(&mut self) -> u64 {
+        let low = u64::from(self.bits(32));
+        u64::from(self.bits(32)) << 32 | low
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::Bytes;
+    use super::*;
+
+    #[test]
+    fn any_bytes_give_symbols_of_the_model_and_the_end_is_told() {
+        let random: Vec<u8> = (0..4000u32).map(|i| (i.wrapping_mul(0x9e37_79b1) >> 13) as u8).collect();
+        for bytes in [&random[..], &[0xff; 500], &[0; 500], &[0xff, 0xff, 0xff, 0xfe, 0xff, 0xff], &[1], &[]] {
+            let mut coder = Coder::start(bytes, 0);
+            let (mut model, mut bit) = (Bytes::new(256), BitModel::new());
+            // an adapted model needs less than 0.01 bits a symbol, never nothing
+            for round in 0.. {
+                assert!(round < 2000 * (bytes.len() + 8), "it must end");
+                if coder.is_off() {
+                    break;
+                }
+                assert!(coder.symbol(&mut model) < 256);
+                coder.bit(&mut bit);
+                assert!(coder.value < coder.length && coder.length >= MIN_LENGTH);
+                if round % 50 == 0 {
+                    coder.bits(1 + round as u32 % 31);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_no_encoder_writes_is_broken() {
+        assert!(Coder::start(&[0xff; 20], 0).is_broken());
+        let mut coder = Coder::start(&[0xff, 0xff, 0xff, 0xfe, 0, 0], 0);
+        assert!(!coder.is_off());
+        coder.bits(19); // 2^32 − 2 is behind the last of 2^19 equal parts
+        assert!(coder.is_off() && coder.is_broken());
+        let cut = Coder::start(&[1, 2, 3], 0);
+        assert!(cut.is_off() && !cut.is_broken());
+    }
+
+    #[test]
+    fn a_paused_decoder_goes_on_where_it_was_in_other_bytes() {
+        let bytes: Vec<u8> = (0..400u32).map(|i| (i * i) as u8).collect();
+        let symbols = |pause: bool| {
+            let mut model = Bytes::new(256);
+            let mut coder = Coder::start(&bytes, 0);
+            let mut out = Vec::new();
+            for i in 0..200 {
+                if pause && i == 100 {
+                    let mut paused = coder.pause();
+                    let gone = paused.at;
+                    paused.at = 0;
+                    coder = paused.resume(&bytes[gone..]);
+                }
+                out.push(coder.symbol(&mut model));
+            }
+            out
+        };
+        assert_eq!(symbols(false), symbols(true));
+    }
+}

@@ -1,0 +1,39 @@
+//! A decoder of LAZ chunks, for bytes that nobody vouches for: no input makes it panic, recurse, or work longer than
+//! its size justifies.
+//!
+//! `coder` decodes symbols, `model` learns how likely they are, `integer` and `median` predict numbers; the items of
+//! formats 0–5 (`point10`, `gps_time`, `colour`, `wave_packet`, `version_1`) follow one another in `pointwise`, the
+//! layers of formats 6–10 (`base`, `layers`, `item_layers`) stand side by side in `layered`. Models are made once a thread and reset
+//! for each chunk.
+//!
+//! Source: M. Isenburg, "LASzip: lossless compression of LiDAR data" (2013), and the files that LASzip 3.5 writes.
+
+mod base;
+mod channels;
+mod coder;
+mod colour;
+mod gps_time;
+mod input;
+mod integer;
+mod item_layers;
+mod items;
+mod layered;
+mod layers;
+mod median;
+mod model;
+mod point10;
+mod pointwise;
+mod returns;
+mod stop;
+mod table;
+#[cfg(test)]
+mod tests;
+mod version_1;
+mod wave_packet;
+
+pub(super) use input::{Input, WINDOW};
+pub(super) use items::{Item, ItemKind, record_len};
+pub(super) use layered::{Layered, LayeredModels, Part, Parts};
+pub(super) use pointwise::{Pointwise, PointwiseModels};
+pub(super) use stop::Stop;
+pub(super) use table::decode_entries;

@@ -1,0 +1,6 @@
+//! The decoder against the encoder of the crate `laz`, and against bytes that no encoder wrote.
+
+mod damage;
+mod format;
+mod round_trip;
+mod version_1;
