@@ -18,11 +18,17 @@ pub(crate) struct Source {
 impl Source {
     pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
         let io = |e| ReadError::io(path, "opening", e);
-        let file = File::open(path).map_err(io)?;
-        let meta = file.metadata().map_err(io)?;
-        if meta.is_dir() {
+        // to open a pipe would wait for somebody who writes to it
+        let kind = std::fs::metadata(path).map_err(io)?.file_type();
+        if kind.is_dir() {
             return Err(ReadError::unsupported(path, "this is a folder, not a file"));
         }
+        if !kind.is_file() {
+            return Err(ReadError::unsupported(path, "this is a pipe or a device, not a file")
+                .advise("copy what comes from it to a file"));
+        }
+        let file = File::open(path).map_err(io)?;
+        let meta = file.metadata().map_err(io)?;
         Ok(Self { file, path: path.to_path_buf(), len: meta.len() })
     }
 

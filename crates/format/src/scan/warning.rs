@@ -287,7 +287,7 @@ impl ScanWarning {
                 "{kind} {index} of {count} ({user_id} {record_id}) claims {bytes} bytes at byte {at}, more than there are"
             ),
             Self::RecordIgnored { kind, index, user_id, record_id, bytes } => {
-                format!("{kind} {index} ({user_id} {record_id}) has {bytes} bytes; it is not read")
+                format!("{kind} {index} ({user_id} {record_id}) has {bytes} bytes, too many to be kept; it is not read")
             }
             Self::RecordsIgnored { kind, count, read } => {
                 format!("the header declares {count} {kind}s; the first {read} are read")

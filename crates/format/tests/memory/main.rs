@@ -4,6 +4,7 @@
 mod batches;
 mod counting;
 mod decode;
+mod hostile;
 mod scenes;
 
 #[global_allocator]

@@ -19,7 +19,7 @@ pub(super) struct Cut {
     /// Logical offsets of the first packet with something of it, and behind the last.
     pub(super) start: u64,
     pub(super) end: u64,
-    /// For each field: bytes of its stream, from the first packet on, that belong to earlier records.
+    /// For each field that has bits: bytes of its stream, from the first packet on, that belong to earlier records.
     pub(super) skip: Box<[u64]>,
     /// Why it cannot be read, if that is known already.
     pub(super) lost: Option<BrokenChain>,
@@ -34,6 +34,9 @@ pub(super) struct Found {
     /// What ended the pass early, if no record is lost by it.
     pub(super) fault: Option<BrokenChain>,
 }
+
+/// Numbers that are remembered of the packets seen so far: 8 MiB.
+const MAX_REMEMBERED: usize = 1 << 20;
 
 /// Cuts `records` records of `fields` into pieces of `step` (a multiple of 8, so that each starts at a byte border).
 pub(super) fn cut(
@@ -99,10 +102,23 @@ struct Chain<'a> {
 impl Chain<'_> {
     fn push(&mut self, packet: Packet, sizes: &[u64]) {
         if packet.streams.is_some() {
+            if self.recent.len() * self.bits.len() >= MAX_REMEMBERED {
+                self.forget_some();
+            }
             self.recent.push_back((self.at, self.total.as_slice().into()));
             self.total.iter_mut().zip(sizes).for_each(|(total, size)| *total += size);
         }
         self.at += packet.len;
+    }
+
+    /// Forgets every other packet, where streams are so far from keeping step that there are too many: pieces begin with
+    /// earlier packets, and pass over more.
+    fn forget_some(&mut self) {
+        let mut keep = false;
+        self.recent.retain(|_| {
+            keep = !keep;
+            keep
+        });
     }
 
     /// True if the first `records` records are complete.
@@ -129,13 +145,36 @@ impl Chain<'_> {
             }
             self.recent.pop_front();
         }
-        let skip_from = |before: &[u64]| {
-            before.iter().enumerate().map(|(f, before)| start_byte(f).saturating_sub(*before)).collect()
-        };
+        let with_bits = || (0..self.bits.len()).filter(|f| self.bits[*f] > 0);
         let (start, skip) = match self.recent.front() {
-            Some((start, before)) => (*start, skip_from(before)),
-            None => (self.at, vec![0; self.bits.len()].into()),
+            Some((start, before)) => (*start, with_bits().map(|f| start_byte(f).saturating_sub(before[f])).collect()),
+            None => (self.at, with_bits().map(|_| 0).collect()),
         };
         Cut { scan, records: next - first, start, end: self.at, skip, lost: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_far_from_keeping_step_are_cut_right_from_few_remembered_packets() {
+        let bits = [8, 0, 8];
+        let mut chain = Chain { bits: &bits, at: 0, total: vec![0; 3], recent: VecDeque::new() };
+        let packets = MAX_REMEMBERED as u64;
+        // all of one stream, then all of the other: a byte a packet of 8
+        for i in 0..2 * packets {
+            let is_first = u64::from(i < packets);
+            chain.push(Packet { len: 8, streams: Some(0) }, &[is_first, 7, 1 - is_first]);
+            assert!(chain.recent.len() * bits.len() <= MAX_REMEMBERED + bits.len());
+        }
+        assert_eq!(chain.records(), packets);
+        for first in [0, packets / 2, packets - 8] {
+            let cut = chain.take(0, first, first + 8);
+            // bytes of the first stream before the cut's first packet, and of the second
+            let before = [(cut.start / 8).min(packets), (cut.start / 8).saturating_sub(packets)];
+            assert_eq!([before[0] + cut.skip[0], before[1] + cut.skip[1]], [first; 2], "{cut:?}");
+        }
     }
 }

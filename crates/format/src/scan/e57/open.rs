@@ -15,7 +15,7 @@ use super::pose::Pose;
 use super::scaling::{self, Scaling};
 use super::schema::{Roles, ScanFields, Schema};
 use super::streams::Streams;
-use super::xml::Cloud;
+use super::xml::{Cloud, Refusal};
 use super::{header, images, xml};
 use crate::scan::chosen::chosen;
 use crate::scan::source::Source;
@@ -45,9 +45,14 @@ pub(super) fn open(path: &Path, options: &E57Options) -> Result<E57Scan, ReadErr
     let source = Source::open(path)?;
     let mut warnings = Vec::new();
     let xml_bytes = header::read_xml(&source, options.max_xml, &mut warnings)?;
-    let mut document = xml::parse(&xml_bytes, &mut warnings).map_err(|why| {
-        let what = format!("the XML section cannot be read: {why}");
-        ReadError::broken(path, 24, Fault::Header(what)).advise(Advice::ExportAgain)
+    let mut document = xml::parse(&xml_bytes, options.max_xml, &mut warnings).map_err(|refusal| match refusal {
+        Refusal::Broken(why) => {
+            let what = format!("the XML section cannot be read: {why}");
+            ReadError::broken(path, 24, Fault::Header(what)).advise(Advice::ExportAgain)
+        }
+        Refusal::TooMuch(why) => {
+            ReadError::unsupported(path, format!("the XML section describes {why}")).advise(Advice::MoreMemory)
+        }
     })?;
     drop(xml_bytes);
     let images = images::describe(&document, &mut warnings);

@@ -60,7 +60,9 @@ impl<'a> Streams<'a> {
         if out.len() < size {
             resize(out, size);
         }
-        let mut skip = cut.skip.to_vec();
+        let mut skips = cut.skip.iter();
+        let of_field = |field: &Field| if field.encoding.bits() > 0 { skips.next().copied().unwrap_or(0) } else { 0 };
+        let mut skip: Vec<u64> = fields.iter().map(of_field).collect();
         let mut filled = vec![0; fields.len()];
         let mut missing = places.iter().filter(|(_, len)| *len > 0).count();
         let mut pages = Pages::new(source, raw, WINDOW);

@@ -8,6 +8,9 @@ use crate::scan::source::Source;
 /// Maximum number of empty chunks (some writers close a chunk that they never fill).
 const EMPTY_CHUNKS: u64 = 16;
 
+/// Chunks of a file that are read: each is described in memory, and those of 50,000 points would be 10^11 points.
+pub(super) const MAX_CHUNKS: u64 = 1 << 21;
+
 /// One chunk, in file order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Chunk {
@@ -89,6 +92,9 @@ impl Layout {
             let why = format!("it declares version {version} and {count} chunks in {data_bytes} bytes of points");
             return Err(why.into());
         }
+        if count > MAX_CHUNKS {
+            return Err(format!("it declares {count} chunks, more than the {MAX_CHUNKS} that are read").into());
+        }
         // an entry is two corrected integers of at most 32 bits and their contexts: 16 bytes are ample
         let coded = source.vec_at(table + 8, 16 * count + 64).map_err(|e| e.what())?;
         let chunks = self.decode_entries(&coded, count as usize)?;
@@ -151,6 +157,13 @@ impl Layout {
             let Some(chunk) = self.layered_chunk(source, at, end)? else { break };
             if self.chunk_points.is_some_and(|n| chunk.points > u64::from(n)) {
                 break;
+            }
+            if chunks.len() as u64 == MAX_CHUNKS {
+                return Err(ReadError::unsupported(
+                    source.path(),
+                    format!("there are more than {MAX_CHUNKS} chunks in it"),
+                )
+                .advise("compress it again, with larger chunks"));
             }
             points += chunk.points;
             at += chunk.bytes;

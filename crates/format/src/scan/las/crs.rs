@@ -58,7 +58,7 @@ mod tests {
             data: data.clone(),
         };
         let mut warnings = Vec::new();
-        let records = Records { kept: records.iter().map(record).collect(), evlr_start: None };
+        let records = Records { kept: records.iter().map(record).collect(), ..Records::default() };
         (read(&records, wkt_counts, &mut warnings), warnings)
     }
 

@@ -21,6 +21,9 @@ const SEARCHED: u64 = 256 << 10;
 /// Entries that are decoded in the search at most, so that no file makes it long.
 const MAX_SEARCHED_ENTRIES: u64 = 1 << 20;
 
+/// Tables of more entries are not mended: each way to mend one is a copy.
+const MAX_MENDED: usize = 1 << 18;
+
 /// The file whose table is to be mended.
 pub(super) struct Mender<'a> {
     pub(super) source: &'a Source,
@@ -41,7 +44,9 @@ pub(super) struct Mended {
 impl Mender<'_> {
     /// The chunks, if one way to mend the table is proven right.
     pub(super) fn mend(&self, fault: &TableFault) -> Option<Mended> {
-        let mut ways: Vec<Mended> = fault.entries.iter().flat_map(|entries| self.corrected(entries)).collect();
+        let is_small = |entries: &&Entries| entries.chunks.len() <= MAX_MENDED;
+        let mut ways: Vec<Mended> =
+            fault.entries.iter().filter(is_small).flat_map(|entries| self.corrected(entries)).collect();
         ways.extend(self.found_elsewhere());
         ways.extend(self.one_chunk(fault));
         ways.into_iter().filter_map(|way| self.with_all_points(way)).find(|way| self.is_proven(&way.chunks))

@@ -10,8 +10,8 @@ const EVLR_HEADER: u64 = 60;
 
 /// A file with more records than this is hostile; reading stops there.
 const MAX_RECORDS: u32 = 100_000;
-/// Records that are kept are texts and small tables; a larger one is not read.
-const MAX_PAYLOAD: u64 = 64 << 20;
+/// Records that are kept are texts and small tables; those that make them larger together are not read.
+const MAX_KEPT: u64 = 8 << 20;
 
 /// One record of those that this reader understands.
 #[derive(Debug, Clone)]
@@ -34,6 +34,10 @@ impl Record {
 pub(super) struct Records {
     /// The records of interest: VLRs in file order, then EVLRs.
     pub(super) kept: Vec<Record>,
+    /// Bytes of their data.
+    pub(super) kept_bytes: u64,
+    /// One that was not read is in the warnings.
+    pub(super) is_ignored_told: bool,
     /// Where the EVLRs begin, if every one of them lies inside the file.
     pub(super) evlr_start: Option<u64>,
 }
@@ -82,10 +86,11 @@ impl Records {
                 return Ok(false);
             };
             if is_of_interest(&user_id, record_id) {
-                if len <= MAX_PAYLOAD {
+                if self.kept_bytes + len <= MAX_KEPT {
                     let data = source.vec_at(data_offset, len)?;
+                    self.kept_bytes += len;
                     self.kept.push(Record { user_id, record_id, data_offset, data });
-                } else {
+                } else if !std::mem::replace(&mut self.is_ignored_told, true) {
                     warnings.push(ScanWarning::RecordIgnored { kind, index, user_id, record_id, bytes: len });
                 }
             }

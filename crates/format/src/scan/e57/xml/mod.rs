@@ -30,11 +30,38 @@ pub(super) struct Document {
     pub(super) coordinate_metadata: Option<String>,
 }
 
-/// Parses the XML section.
+/// Why the XML section is not read, as text.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Refusal {
+    /// It cannot be understood.
+    Broken(String),
+    /// It describes more than may be held.
+    TooMuch(String),
+}
+
+/// What may be held of a description, so that it takes no more memory than a few times the XML that is allowed: a scan or an
+/// image needs some 5,000 bytes of XML, a field 60.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    scans: usize,
+    images: usize,
+    fields: usize,
+}
+
+impl Limits {
+    /// For sections of at most `max_xml` bytes.
+    fn of(max_xml: u64) -> Self {
+        let most =
+            |bytes: u64, always: usize| usize::try_from(max_xml / bytes).unwrap_or(usize::MAX).saturating_add(always);
+        Self { scans: most(1024, 1000), images: most(1024, 1000), fields: most(128, 20_000) }
+    }
+}
+
+/// Parses the XML section. `max_xml`: as many bytes as it might have.
 ///
 /// # Errors
-/// Why it cannot be understood, as text.
-pub(super) fn parse(xml: &[u8], warnings: &mut Vec<ScanWarning>) -> Result<Document, String> {
+/// Why it is not read.
+pub(super) fn parse(xml: &[u8], max_xml: u64, warnings: &mut Vec<ScanWarning>) -> Result<Document, Refusal> {
     let text = match std::str::from_utf8(xml) {
         Ok(text) => Cow::Borrowed(text),
         Err(e) => {
@@ -43,8 +70,16 @@ pub(super) fn parse(xml: &[u8], warnings: &mut Vec<ScanWarning>) -> Result<Docum
             Cow::Owned(xml.iter().map(|b| char::from(*b)).collect())
         }
     };
-    let mut reader = Reader { markup: Markup::new(&text), numbers: Numbers::default(), document: Document::default() };
-    reader.root(warnings)?;
+    let mut reader = Reader {
+        markup: Markup::new(&text),
+        numbers: Numbers::default(),
+        document: Document::default(),
+        limits: Limits::of(max_xml),
+        fields: 0,
+        is_too_much: false,
+    };
+    let refusal = |why: String, is_too_much| if is_too_much { Refusal::TooMuch(why) } else { Refusal::Broken(why) };
+    reader.root(warnings).map_err(|why| refusal(why, reader.is_too_much))?;
     if reader.numbers.commas.get() {
         warnings.push(ScanWarning::XmlCommas);
     }
@@ -55,9 +90,21 @@ struct Reader<'a> {
     markup: Markup<'a>,
     numbers: Numbers,
     document: Document,
+    limits: Limits,
+    /// Fields of all scans so far.
+    fields: usize,
+    /// The error is that it describes more than may be held.
+    is_too_much: bool,
 }
 
 impl<'a> Reader<'a> {
+    /// # Errors
+    /// There is one more of `what` than `most`.
+    fn within(&mut self, count: usize, most: usize, what: &str) -> Result<(), String> {
+        self.is_too_much = count > most;
+        if self.is_too_much { Err(format!("more than {most} {what}, which is more than may be held")) } else { Ok(()) }
+    }
+
     fn root(&mut self, warnings: &mut Vec<ScanWarning>) -> Result<(), String> {
         let Some(Event::Start(root)) = self.markup.next()? else { return Err("it has no element".to_owned()) };
         let (core, name) = root.name.split_once(':').unwrap_or(("", root.name));
@@ -119,7 +166,10 @@ impl<'a> Reader<'a> {
         }
         let element = Element::read(&mut self.markup, tag, core)?;
         let index = self.document.clouds.len();
+        self.within(index + 1, self.limits.scans, "scans")?;
         let cloud = Cloud::read(index, &element, &self.numbers).map_err(|why| format!("scan {}: {why}", index + 1))?;
+        self.fields += cloud.fields.len();
+        self.within(self.fields, self.limits.fields, "fields of scans")?;
         self.document.clouds.push(cloud);
         Ok(())
     }
@@ -128,6 +178,7 @@ impl<'a> Reader<'a> {
         if name != "vectorChild" {
             return self.pass();
         }
+        self.within(self.document.images.len() + 1, self.limits.images, "images")?;
         let element = Element::read(&mut self.markup, tag, core)?;
         self.document.images.push(Image::read(&element, &self.numbers));
         Ok(())
@@ -154,7 +205,29 @@ mod tests {
 
     fn read(xml: &str) -> Result<(Document, Vec<ScanWarning>), String> {
         let mut warnings = Vec::new();
-        parse(xml.as_bytes(), &mut warnings).map(|document| (document, warnings))
+        let document = parse(xml.as_bytes(), 1 << 30, &mut warnings).map_err(|refusal| match refusal {
+            Refusal::Broken(why) => why,
+            Refusal::TooMuch(why) => panic!("{why}"),
+        })?;
+        Ok((document, warnings))
+    }
+
+    #[test]
+    fn more_than_may_be_held_is_refused() {
+        let many = |of: &str, count: usize| format!("<e57Root>{}</e57Root>", of.repeat(count));
+        let fields = "<vectorChild><points recordCount='0' fileOffset='0'><prototype>".to_owned()
+            + &"<a type='Float'/>".repeat(5000)
+            + "</prototype></points></vectorChild>";
+        let cases = [
+            (many("<data3D><vectorChild/></data3D>", 1001), "more than 1000 scans"),
+            (many("<images2D><vectorChild/></images2D>", 1001), "more than 1000 images"),
+            (many(&format!("<data3D>{fields}</data3D>"), 5), "more than 20000 fields of scans"),
+        ];
+        for (xml, why) in cases {
+            let refusal = parse(xml.as_bytes(), 100, &mut Vec::new()).unwrap_err();
+            assert!(matches!(&refusal, Refusal::TooMuch(text) if text.starts_with(why)), "{refusal:?}");
+            assert!(parse(xml.as_bytes(), 1 << 20, &mut Vec::new()).is_ok(), "{why}");
+        }
     }
 
     #[test]
@@ -190,7 +263,7 @@ mod tests {
         let at = latin.iter().rposition(|b| *b == b'?').unwrap();
         latin[at] = 0xf6;
         let mut warnings = Vec::new();
-        assert_eq!(parse(&latin, &mut warnings).unwrap().clouds[0].name, "Höhe");
+        assert_eq!(parse(&latin, 1 << 30, &mut warnings).unwrap().clouds[0].name, "Höhe");
         assert_eq!(warnings, [ScanWarning::XmlEncoding { at: at as u64 }]);
     }
 
