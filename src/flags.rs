@@ -71,7 +71,10 @@ fn with_advice(what: String, advised: Option<&Advice>) -> String {
 pub(crate) fn error_line(error: &ConvertError) -> String {
     match error {
         ConvertError::Plan(error) => plan_line(error),
-        ConvertError::Memory { why: MemoryNeed::Threads { threads: 2.., .. }, .. } => {
+        // fewer threads help where the ceiling holds the share of one
+        ConvertError::Memory { ceiling, needed, why: MemoryNeed::Threads { threads: threads @ 2.., .. } }
+            if *ceiling >= needed / threads =>
+        {
             with_advice(error.what(), error.advice().as_ref()) + ", or fewer --threads"
         }
         other => with_advice(other.what(), other.advice().as_ref()),

@@ -106,6 +106,7 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
     }
     match wkt::is_wkt(text) {
         true if !wkt::is_whole(text) => fault(PlanFault::CutWkt),
+        true if !wkt::has_quoted_name(text) => fault(PlanFault::EmptyWkt),
         true if wkt::is_followed(text) => fault(PlanFault::LongWkt),
         true if wkt::read(text).is_some_and(|system| system.name.trim().is_empty()) => fault(PlanFault::EmptyWkt),
         true => Ok(resolve_crs(&Crs::new(Some(text.to_owned()), None, None))),
