@@ -313,7 +313,6 @@ fn outputs_and_datasets_that_are_none() {
         ("validate~a.las", 2, &["a.las", "metadata.json"]),
         ("validate~home", 2, &["home", "metadata.json"]),
         ("validate~lost", 7, &["lost", "hierarchy.bin is missing"]),
-        ("validate~two~--json", 2, &["two", "--json"]),
         ("info~tree", 3, &["tree", "index.json"]),
     ]);
 }

@@ -68,7 +68,8 @@ fn a_signal_at_any_moment_ends_the_run_within_a_second() {
             // the run was over before
             0 => dir.succeed(["convert", "a.las", "-o", "out", "-q", "--overwrite"]),
             _ => {
-                ended.failed_with(130, &["interrupted"]);
+                assert_eq!(ended.code(), 130, "{}", ended.stderr());
+                assert!(ended.stderr().contains("interrupted"), "{}", ended.stderr());
                 assert_eq!(ended.stderr().lines().count(), 1, "{}", ended.stderr());
                 stopped += 1;
                 ended
@@ -114,7 +115,7 @@ fn a_second_signal_does_not_cut_the_cleaning_short() {
 fn a_run_whose_threads_are_held_ends_within_a_second() {
     let dir = stage(400_000);
     let before = dataset(&dir.path("out"));
-    for room in [100, 500, 700] {
+    for room in [100, 300, 500] {
         let (mut reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&vec![b'-'; (64 << 10) - room]).unwrap(); // Linux: a pipe holds 64 KiB
         let args = ["convert", "big.las", "-o", "out", "--overwrite", "--progress", "json"];
