@@ -28,13 +28,13 @@ impl Place {
         let output = self.given.clone();
         match standing {
             Standing::Nothing | Standing::Empty => Ok(standing),
-            _ if !self.overwrite => Err(OutputFault::Exists(output).into()),
-            Standing::Ours(_) => Ok(standing),
             Standing::Foreign(file) => {
                 let file = file.strip_prefix(&self.path).map_or(file.clone(), |inner| output.join(inner));
                 Err(OutputFault::Foreign { output, file }.into())
             }
             Standing::Other => Err(OutputFault::NotADataset(output).into()),
+            Standing::Ours(_) if !self.overwrite => Err(OutputFault::Exists(output).into()),
+            Standing::Ours(_) => Ok(standing),
         }
     }
 
