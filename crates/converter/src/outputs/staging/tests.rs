@@ -61,14 +61,19 @@ fn only_datasets_are_replaced_and_only_when_asked() {
         let stage = |overwrite| StagedFolder::new(&out, overwrite, Arc::new(Poor(replacing)), &Silent);
         fs::create_dir(&out).unwrap();
         fs::write(out.join("letter.txt"), "dear").unwrap();
-        assert!(matches!(fault(stage(false)), OutputFault::Exists(_)));
-        assert!(matches!(fault(stage(true)), OutputFault::NotADataset(_)));
+        for overwrite in [false, true] {
+            assert!(
+                matches!(fault(stage(overwrite)), OutputFault::NotADataset(_)),
+                "no word of replacing what is not ours"
+            );
+        }
         fs::write(out.join("metadata.json"), "{\"hierarchy\": {}}").unwrap();
         assert!(matches!(fault(stage(true)), OutputFault::NotADataset(_)), "metadata of something else");
         fs::write(out.join("metadata.json"), METADATA).unwrap();
         assert_eq!(fault(stage(true)), OutputFault::Foreign { output: out.clone(), file: out.join("letter.txt") });
         fs::remove_file(out.join("letter.txt")).unwrap();
         fs::write(out.join("hierarchy.bin"), "old").unwrap();
+        assert!(matches!(fault(stage(false)), OutputFault::Exists(_)));
         let staged = stage(true).unwrap();
         staged.whole().write("metadata.json", b"new").unwrap();
         assert_eq!(staged.finish(&Silent).unwrap(), None);
