@@ -10,6 +10,7 @@ use crate::exit::Failure;
 /// dataset elsewhere. What else the text may be, its readers judge.
 pub(crate) fn check(option: &str, text: &str) -> Result<(), Failure> {
     let text = text.trim();
+    let text = text.strip_prefix("+init=").unwrap_or(text);
     if !Placing::is_unknown_code(text) {
         return Ok(());
     }
@@ -57,7 +58,13 @@ mod tests {
         {
             assert!(check("--crs", text).is_ok(), "{text}");
         }
-        for (text, code) in [("EPSG:999999", 999_999), ("EPSG:0", 0), ("EPSG:25832+99999", 99_999), ("epsg:1", 1)] {
+        for (text, code) in [
+            ("EPSG:999999", 999_999),
+            ("EPSG:0", 0),
+            ("EPSG:25832+99999", 99_999),
+            ("epsg:1", 1),
+            ("+init=epsg:999999", 999_999),
+        ] {
             let Err(Failure::Usage(line)) = check("--crs", text) else { panic!("{text}") };
             assert!(line.starts_with(&format!("--crs: EPSG:{code} is not known")), "{line}");
         }

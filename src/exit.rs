@@ -47,8 +47,8 @@ impl Failure {
         }
     }
 
-    /// Prints the line on standard error.
-    pub(crate) fn print(&self) {
+    /// The line that reports it.
+    pub(crate) fn line(&self) -> &str {
         let (Self::Internal(line)
         | Self::Usage(line)
         | Self::Input(line)
@@ -57,9 +57,14 @@ impl Failure {
         | Self::Memory(line)
         | Self::Faults(line)
         | Self::Interrupted(line)) = self;
+        line
+    }
+
+    /// Prints the line on standard error.
+    pub(crate) fn print(&self) {
         // to be stopped is no error
         let word = if matches!(self, Self::Interrupted(_)) { "pointmill" } else { "error" };
-        write_line(word, line);
+        write_line(word, self.line());
     }
 
     /// The operating system refused; `doing` names the attempt ("writing the report").
@@ -162,7 +167,7 @@ mod tests {
     fn the_kind_of_error_decides_the_code() {
         let io_error = || io::Error::from(io::ErrorKind::StorageFull);
         let exists = || ConvertError::Output(OutputFault::Exists("x".into()));
-        let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error() };
+        let full = || ConvertError::Io { path: "a".into(), doing: "x", error: io_error(), is_temporary: false };
         let why = MemoryNeed::Part("nodes");
         let table: [(Failure, u8); 9] = [
             (ConvertError::Internal("x".into()).into(), 1),

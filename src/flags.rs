@@ -27,7 +27,9 @@ fn advice(advice: &Advice) -> String {
     match advice {
         Advice::ReplaceOutput => "choose another output, or pass --overwrite".to_owned(),
         Advice::RaiseMemory { mib } => format!("pass --memory {mib}MiB or more"),
-        Advice::FreeDisk => "free some space, or put temporary files elsewhere with --temp-dir".to_owned(),
+        Advice::FreeTemporaryDisk => {
+            "free some space there, or put temporary files elsewhere with --temp-dir".to_owned()
+        }
         Advice::DropDuplicates => "pass --duplicates drop".to_owned(),
         Advice::KeepDuplicates => "leave out --duplicates drop, or convert to potree2".to_owned(),
         Advice::CutBounds { bounds: Some(b) } => format!("--bounds {} keeps all others", bounds_value(b)),
@@ -69,7 +71,10 @@ fn with_advice(what: String, advised: Option<&Advice>) -> String {
 pub(crate) fn error_line(error: &ConvertError) -> String {
     match error {
         ConvertError::Plan(error) => plan_line(error),
-        ConvertError::Memory { why: MemoryNeed::Threads { threads: 2.., .. }, .. } => {
+        // fewer threads help where the ceiling holds the share of one
+        ConvertError::Memory { ceiling, needed, why: MemoryNeed::Threads { threads: threads @ 2.., .. } }
+            if *ceiling >= needed / threads =>
+        {
             with_advice(error.what(), error.advice().as_ref()) + ", or fewer --threads"
         }
         other => with_advice(other.what(), other.advice().as_ref()),
@@ -83,7 +88,7 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
         Some(ReadAdvice::SkipUnreadable) => {
             "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
         }
-        Some(ReadAdvice::MoreMemory) => "convert it with a larger --memory".to_owned(),
+        Some(ReadAdvice::MoreMemory) => "pass a larger --memory".to_owned(),
         Some(ReadAdvice::NameCrs) => "name its coordinate reference system with --crs".to_owned(),
         Some(ReadAdvice::OtherCrs) => {
             "choose a system for --reproject on the same datum and with the same heights, or reproject the scan elsewhere"

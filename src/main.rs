@@ -38,7 +38,10 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.print();
+            match &failure {
+                Failure::Interrupted(line) => interrupt::say(line),
+                other => other.print(),
+            }
             ExitCode::from(failure.code())
         }
     }

@@ -17,6 +17,7 @@ pub(crate) use convert::{
     OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use values::Attributes;
+use values::parse_bytes;
 
 /// Converts laser scans to datasets that renderers stream, without losing a point.
 #[derive(Debug, Parser)]
@@ -54,6 +55,9 @@ pub(crate) struct ValidateArgs {
     /// Skips spacing, coverage and quality figures, which take most of the time
     #[arg(long)]
     pub(crate) fast: bool,
+    /// Memory limit of the whole process, for example 2GiB [default: 60 % of the available memory]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    pub(crate) memory: Option<u64>,
     /// Number of worker threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = values::parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<NonZero<u16>>,

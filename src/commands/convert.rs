@@ -1,14 +1,14 @@
 //! `pointmill convert`: from the options to a `Plan`, a run and a summary.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
     AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, OriginPoints, Outliers,
-    Plan, Potree2Settings, RgbDepth, Sampling, ScaleChoice, Target,
+    Plan, Potree2Settings, Report, RgbDepth, Sampling, ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
+use super::report_file::ReportFile;
 use crate::args::{
     Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
     OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
@@ -17,7 +17,7 @@ use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::inputs::Inputs;
-use crate::interrupt::stop_flag;
+use crate::interrupt::{no_more_checks, stop_flag};
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let targets = targets(args)?;
@@ -36,24 +36,39 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
     }
     protect_inputs(&plan)?;
-    if let Some(file) = &args.report {
-        require_folder(file, &plan.output)?;
-        protect_from_report(&plan, file)?;
-    }
+    let report_file = args.report.as_ref().map(|file| {
+        let sources = plan.inputs.iter().chain(&args.inputs.files_from);
+        ReportFile::new(file, &plan.output, sources)
+    });
+    let report_file = report_file.transpose()?;
     let progress = Progress::new(&args.talk, Some(stop_flag()));
     let result = pointmill_converter::convert(&plan, &targets, &progress);
+    no_more_checks();
     let for_people = progress.end();
     let report = result?;
-    if let Some(file) = &args.report {
-        fs::write(file, to_json(&report)?).map_err(|e| Failure::io(file, "writing the report", &e))?;
-    }
-    if args.json {
-        emit(&to_json(&report)?)?;
-    }
+    tell(args, report_file.as_ref(), &report).map_err(|failure| after_all(failure, &plan.output))?;
     if for_people {
         conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| print_line(line));
     }
     Ok(())
+}
+
+/// The report where it was asked for.
+fn tell(args: &ConvertArgs, file: Option<&ReportFile>, report: &Report) -> Result<(), Failure> {
+    if file.is_none() && !args.json {
+        return Ok(());
+    }
+    let text = to_json(report)?;
+    file.map_or(Ok(()), |file| file.write(&text))?;
+    if args.json { emit(&text) } else { Ok(()) }
+}
+
+/// What fails once the dataset is in place must not read as if there were none.
+fn after_all(failure: Failure, output: &Path) -> Failure {
+    match failure {
+        Failure::Io(line) => Failure::Io(format!("{line}; the output {} is complete", output.display())),
+        other => other,
+    }
 }
 
 /// The formats with their settings; an option of a format that was not requested is a usage error.
@@ -222,28 +237,6 @@ fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
     let Some(scan) = plan.inputs.iter().find(inside) else { return Ok(()) };
     let (output, scan) = (plan.output.display(), scan.display());
     Err(Failure::Usage(format!("{output}: the output would replace the input {scan}; choose another folder")))
-}
-
-/// The report never replaces a scan.
-fn protect_from_report(plan: &Plan, report: &Path) -> Result<(), Failure> {
-    let Ok(report) = report.canonicalize() else {
-        return Ok(()); // not there: nothing to protect
-    };
-    let same = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file == report);
-    let Some(scan) = plan.inputs.iter().find(same) else { return Ok(()) };
-    Err(Failure::Usage(format!("{}: the report would replace this input; choose another file", scan.display())))
-}
-
-/// Better to learn before the run than after it that the report has no place to go.
-fn require_folder(file: &Path, output: &Path) -> Result<(), Failure> {
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty() && *folder != output);
-    if folder.is_some_and(|folder| !folder.is_dir()) || file.is_dir() {
-        return Err(Failure::Usage(format!(
-            "{}: the report cannot be written there: no such folder, or a folder itself",
-            file.display()
-        )));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

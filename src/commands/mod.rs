@@ -3,4 +3,5 @@
 pub(crate) mod convert;
 pub(crate) mod extract;
 pub(crate) mod info;
+mod report_file;
 pub(crate) mod validate;

@@ -1,6 +1,7 @@
 //! Progress and warnings of a run on standard error, and the request to stop.
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,6 +14,7 @@ use super::quantities::{count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
+use crate::interrupt;
 use crate::printable::json_escaped;
 
 /// Interval of JSON lines; one per batch would be thousands.
@@ -65,7 +67,7 @@ impl Progress {
         }
     }
 
-    /// A phase begins; `total` counts points, 0 is unknown.
+    /// A phase begins; `total` counts points (scans where headers are read), 0 is unknown.
     pub(crate) fn begin(&self, phase: &'static str, total: u64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.phase != "start" {
@@ -77,7 +79,7 @@ impl Progress {
         self.write_json(&mut state);
         if let Face::Bar(bar) = &self.face {
             bar.reset();
-            bar.set_style(style(total));
+            bar.set_style(style(phase, total));
             bar.set_message(phase);
             bar.set_length(total);
             bar.enable_steady_tick(Duration::from_millis(200));
@@ -120,7 +122,7 @@ impl Progress {
 
     /// Reports a warning.
     pub(crate) fn note(&self, line: &str) {
-        if self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
+        if self.stopped() || self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
             return;
         }
         match &self.face {
@@ -151,7 +153,8 @@ impl Progress {
     }
 
     fn write_json(&self, state: &mut State) {
-        if !matches!(self.face, Face::Json) {
+        // a run that is to stop must not wait for a reader
+        if !matches!(self.face, Face::Json) || self.stopped() {
             return;
         }
         state.last_json = Instant::now();
@@ -163,7 +166,7 @@ impl Progress {
             "phase": state.phase,
             "done": done,
             "total": (state.total > 0).then_some(state.total),
-            "points_per_second": per_second.round(),
+            "points_per_second": (unit(state.phase) == "points").then(|| per_second.round()),
             "eta_seconds": left.map(|s| (s * 10.0).round() / 10.0),
         }));
     }
@@ -172,6 +175,12 @@ impl Progress {
 impl Events for Progress {
     fn phase(&self, phase: Phase, total: u64) {
         self.begin(phase.name(), total);
+        match &self.face {
+            _ if phase != Phase::CleanUp => {}
+            Face::Silent if !self.quiet => interrupt::tell_of_cleaning(interrupt::cleaning_line),
+            Face::Json => interrupt::tell_of_cleaning(|| write_line(&json!({ "phase": Phase::CleanUp.name() }))),
+            _ => {}
+        }
     }
 
     fn advance(&self, points: u64) {
@@ -180,6 +189,14 @@ impl Events for Progress {
 
     fn warning(&self, warning: &Warning) {
         self.note(&flags::warning_line(warning));
+    }
+
+    fn works_in(&self, folder: &Path) {
+        interrupt::works_in(folder);
+    }
+
+    fn settling(&self) {
+        interrupt::settling();
     }
 
     fn stop_requested(&self) -> bool {
@@ -192,17 +209,24 @@ fn write_line(object: &serde_json::Value) {
     let _ = writeln!(io::stderr().lock(), "{}", json_escaped(&object.to_string()));
 }
 
-fn style(total: u64) -> ProgressStyle {
+/// What is counted in a phase.
+fn unit(phase: &str) -> &'static str {
+    if phase == Phase::Probe.name() { "scans" } else { "points" }
+}
+
+fn style(phase: &str, total: u64) -> ProgressStyle {
+    let unit = unit(phase);
     let template = match total {
         0 => "{msg:8} {spinner} {elapsed}",
+        _ if phase == Phase::Probe.name() => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {left}",
         _ => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {speed}  {left}",
     };
     let per_second = |state: &ProgressState| state.pos() as f64 / state.elapsed().as_secs_f64().max(1e-3);
     ProgressStyle::with_template(template)
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("=> ")
-        .with_key("points", |state: &ProgressState, w: &mut dyn std::fmt::Write| {
-            let _ = write!(w, "{} of {} points", count(state.pos()), count(state.len().unwrap_or(0)));
+        .with_key("points", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
+            let _ = write!(w, "{} of {} {unit}", count(state.pos()), count(state.len().unwrap_or(0)));
         })
         .with_key("speed", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
             let _ = write!(w, "{}", rate(per_second(state)));

@@ -43,8 +43,9 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
     (
         "pointmill-validate",
         &[
-            &["check", "place"],
+            &["check", "place", "memory"],
             &["finding"],
+            &["report"],
             &["options", "accuracy", "outcome"],
             &["against"],
             &["potree2", "bintree", "batches"],

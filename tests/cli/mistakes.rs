@@ -151,6 +151,7 @@ fn values_that_are_none() {
         ("convert~a.las~-o~o~--memory~1e3", 2, &["--memory '1e3'"]),
         ("convert~a.las~-o~o~--memory~9999999999TiB", 2, &["--memory"]),
         ("convert~a.las~-o~o~--memory~2", 6, &["2 bytes", "--memory"]),
+        ("convert~a.las~-o~o~--threads~1000~--memory~300MiB", 6, &["300 MiB", "or fewer --threads"]),
         ("convert~a.las~-o~o~--memory~1MB", 6, &["976 KiB", "--memory"]),
         ("convert~a.las~-o~o~--threads~0", 2, &["--threads '0'", "from 1 to 1024"]),
         ("convert~a.las~-o~o~--threads~60000", 2, &["--threads '60000'", "from 1 to 1024"]),
@@ -233,6 +234,8 @@ fn systems_and_places_that_are_none() {
         ("convert~a.las~-o~o~--crs~+proj=tmerc +lon_0=x", 2, &["--crs", "lon_0 x"]),
         ("convert~a.las~-o~o~--crs~PROJCS[\"x", 2, &["--crs", "brackets"]),
         ("convert~a.las~-o~o~--crs~PROJCS[\"x\",GEOGCS[\"y\"]]]", 2, &["--crs", "after its last bracket"]),
+        ("convert~a.las~-o~o~--crs~PROJCS[x,y]", 2, &["--crs", "no name in quotes"]),
+        ("convert~a.las~-o~o~--crs~+init=epsg:999999", 2, &["--crs: EPSG:999999 is not known"]),
         ("convert~a.las~-o~o~--reproject~EPSG:999999", 2, &["--reproject: EPSG:999999 is not known"]),
         ("convert~a.las~-o~o~--reproject~nonsense", 2, &["--reproject", "nonsense"]),
         ("convert~a.las~-o~o~--reproject~EPSG:25832", 4, &["a.las", "--crs"]),
@@ -310,7 +313,6 @@ fn outputs_and_datasets_that_are_none() {
         ("validate~a.las", 2, &["a.las", "metadata.json"]),
         ("validate~home", 2, &["home", "metadata.json"]),
         ("validate~lost", 7, &["lost", "hierarchy.bin is missing"]),
-        ("validate~two~--json", 2, &["two", "--json"]),
         ("info~tree", 3, &["tree", "index.json"]),
     ]);
 }

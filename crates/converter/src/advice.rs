@@ -15,8 +15,12 @@ pub enum Advice {
         /// Smallest ceiling that is enough, MiB.
         mib: u64,
     },
-    /// Free disk space, or use another folder for temporary files.
+    /// Free space where the output is, or choose an output on another disk.
     FreeDisk,
+    /// Free space where temporary files are, or use another folder for them.
+    FreeTemporaryDisk,
+    /// Raise the limit on the size of files, or choose another file system.
+    AllowLargerFiles,
     /// Drop duplicates.
     DropDuplicates,
     /// Keep the duplicates, or convert to the octree alone.
@@ -35,6 +39,8 @@ pub enum Advice {
     SkipInvalid,
     /// Skip points exactly at the origin of their scan.
     SkipOriginPoints,
+    /// Convert again once nothing writes to the inputs.
+    StopWriting,
     /// Use the colour depth that was detected.
     DetectRgbDepth,
     /// State the colour depth.
@@ -59,6 +65,8 @@ pub enum Advice {
     MoveAway,
     /// Choose another output.
     OtherOutput,
+    /// Wait until the other run has ended, or choose another output.
+    WaitForRun,
 }
 
 impl fmt::Display for Advice {
@@ -73,12 +81,15 @@ impl fmt::Display for Advice {
                 return write!(f, "keep only the points from {min:?} to {max:?}, drop outliers, or keep them");
             }
             Self::ReplaceOutput => "choose another output, or allow it to be replaced",
-            Self::FreeDisk => "free some space, or put temporary files elsewhere",
+            Self::FreeDisk => "free some space there, or choose an output on another disk",
+            Self::FreeTemporaryDisk => "free some space there, or put temporary files elsewhere",
+            Self::AllowLargerFiles => "raise the limit on the size of files, or choose another file system",
             Self::DropDuplicates => "drop duplicates",
             Self::KeepDuplicates => "keep duplicates, or convert to potree2",
             Self::CutBounds { bounds: None } => "limit the bounds to leave them out, or correct the input",
             Self::SkipInvalid => "skip invalid points to leave such points out",
             Self::SkipOriginPoints => "skip points at the origin of their scan to leave them out",
+            Self::StopWriting => "convert again once nothing writes to the inputs",
             Self::DetectRgbDepth => "let the colour depth be detected",
             Self::SetRgbDepth => "state the colour depth to override this",
             Self::CommasSeparate => "say so if they separate columns",
@@ -93,6 +104,7 @@ impl fmt::Display for Advice {
             }
             Self::MoveAway => "move it away, or choose another output",
             Self::OtherOutput => "choose another output",
+            Self::WaitForRun => "wait until it has ended, or choose another output",
         };
         f.write_str(words)
     }

@@ -5,6 +5,7 @@ use pointmill_format::{Attribute, Lattice, NodeKey};
 use crate::cloud::{Checksum, Cube, JobBounds, JobPoint, RecordFrame, StoredOrigin, TreePoint, position};
 use crate::octree::{NodeEncoder, OrderScratch, Point, Sampler, Sampling, order};
 use crate::outputs::potree2::{Encoding, OutputLayout, PayloadEncoder};
+use crate::runtime::Silent;
 use crate::sources::Schema;
 
 /// The records of a chunk, as the converter holds them while it builds the chunk.
@@ -13,7 +14,7 @@ pub struct Chunk {
     records: Vec<u8>,
     points: Vec<Point>,
     scratch: OrderScratch,
-    encoder: PayloadEncoder,
+    encoder: PayloadEncoder<'static>,
 }
 
 impl Chunk {
@@ -30,7 +31,7 @@ impl Chunk {
         let cube = Cube::around(&bounds, &lattice).ok().filter(|_| !bounds.is_empty())?;
         let frame = RecordFrame { stride: schema.stride, cube, origin };
         let kept: Vec<usize> = (0..schema.attributes.len()).collect();
-        let encoder = PayloadEncoder::new(OutputLayout::new(&schema, &kept, &frame), Encoding::Default);
+        let encoder = PayloadEncoder::new(OutputLayout::new(&schema, &kept, &frame), Encoding::Default, &Silent);
         Some(Self { frame, records, points: Vec::new(), scratch: OrderScratch::default(), encoder })
     }
 

@@ -34,14 +34,45 @@ pub fn convert_on(
     events: &dyn Events,
 ) -> Result<Report, ConvertError> {
     let mut clock = Clock::start(events);
-    let peak_before = peak_resident_bytes();
-    clock.begin(Phase::Probe, 0);
+    clock.begin(Phase::Probe, plan.inputs.len() as u64);
     outputs::check(plan, targets)?;
-    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk))?;
-    let sources = Sources::open(plan, events)?;
+    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?;
+    staged.warnings.iter().for_each(|w| events.warning(w));
+    events.works_in(staged.path());
+    let written = write(plan, targets, events, &staged, disk, &mut clock);
+    events.settling();
+    match written {
+        Ok(mut report) => {
+            if let Some(left) = staged.finish(events)? {
+                events.warning(&left);
+                report.warnings.push(left);
+            }
+            Ok(report)
+        }
+        Err(error) => {
+            events.phase(Phase::CleanUp, 0); // removing many files takes its time
+            drop(staged);
+            Err(error)
+        }
+    }
+}
+
+/// All passes, up to an output that is complete but for its name.
+fn write(
+    plan: &Plan,
+    targets: &[Target],
+    events: &dyn Events,
+    staged: &StagedFolder,
+    disk: Arc<dyn Disk>,
+    clock: &mut Clock<'_>,
+) -> Result<Report, ConvertError> {
+    let peak_before = peak_resident_bytes();
+    let mut sources = Sources::open(plan, events)?;
+    let mut warnings = std::mem::take(&mut sources.warnings);
+    warnings.extend(staged.warnings.iter().cloned());
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
-    let least = least(targets, &sources, &intake);
+    let least = least(targets, &sources, &intake)?;
     let budget = Budget::new(plan, intake.schema.stride, least)?;
     resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
@@ -49,7 +80,7 @@ pub fn convert_on(
 
     let demand = Demand { moments: wants.moments, uses: targets.len() as u32 };
     let reading = rt.budget.reading(&rt.memory)?;
-    let cloud = gather(plan, &sources, &intake, demand, &rt, &mut clock)?;
+    let cloud = gather(plan, &sources, &intake, demand, warnings, &rt, clock)?;
     drop(reading);
 
     let mut outputs = Vec::new();
@@ -76,22 +107,23 @@ pub fn convert_on(
         phases: clock.finish(),
         seconds: clock.seconds(),
     };
-    let mut report = report::report(&cloud, account)?;
+    let mut report = report::report(cloud, account)?;
     if let Some(warning) = above_ceiling(plan, peak_before) {
         events.warning(&warning);
         report.warnings.push(warning);
     }
-    let text = serde_json::to_string_pretty(&report).map_err(|e| ConvertError::Internal(format!("report: {e}")))?;
-    staged.write_report(&text)?;
+    staged.write_report(&report)?;
     rt.check_stop()?;
-    staged.finish()?;
     Ok(report)
 }
 
 /// What the inputs and outputs need at least.
-pub(crate) fn least(targets: &[Target], sources: &Sources, intake: &Intake) -> Least {
-    let decoding = sources.all.iter().zip(&intake.sources).map(|(s, intake)| s.scan.decode_bytes(&intake.wanted));
-    Least::of(targets.iter().map(|t| t.output().least_points()), decoding.max().unwrap_or(0), 0)
+///
+/// # Errors
+/// A scan that had to be opened again cannot be.
+pub(crate) fn least(targets: &[Target], sources: &Sources, intake: &Intake) -> Result<Least, ConvertError> {
+    let decode_bytes = sources.decode_bytes(|source| &intake.of(source).wanted)?;
+    Ok(Least::of(targets.iter().map(|t| t.output().least_points()), decode_bytes, sources.bytes))
 }
 
 /// What there is to say if the process grew beyond the ceiling during this run.

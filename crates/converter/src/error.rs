@@ -33,6 +33,8 @@ pub enum ConvertError {
         doing: &'static str,
         /// The error of the operating system.
         error: io::Error,
+        /// True for a temporary file, false for what is written at the output.
+        is_temporary: bool,
     },
     /// The memory ceiling is too small for this run.
     Memory {
@@ -134,6 +136,11 @@ pub enum InputFault {
         /// Index of the point in the scan.
         point: u64,
     },
+    /// A file was changed between the read of its header and that of its points.
+    Changed {
+        /// The scan.
+        path: PathBuf,
+    },
     /// Colours declared as 8 bits deep have values above 255.
     DeepColours {
         /// The scan.
@@ -156,6 +163,8 @@ pub enum OutputFault {
     },
     /// It is not a dataset.
     NotADataset(PathBuf),
+    /// Another run writes in it.
+    Busy(PathBuf),
 }
 
 /// What needs more memory than is allowed.
@@ -181,7 +190,15 @@ pub enum MemoryNeed {
 impl ConvertError {
     /// Wraps an error of the operating system.
     pub(crate) fn io(path: impl AsRef<Path>, doing: &'static str, error: io::Error) -> Self {
-        Self::Io { path: path.as_ref().to_path_buf(), doing, error }
+        Self::Io { path: path.as_ref().to_path_buf(), doing, error, is_temporary: false }
+    }
+
+    /// The same for a temporary file, which can be put elsewhere.
+    pub(crate) fn temporary(self) -> Self {
+        match self {
+            Self::Io { path, doing, error, .. } => Self::Io { path, doing, error, is_temporary: true },
+            other => other,
+        }
     }
 
     /// The line without the advice: what and where.
@@ -192,7 +209,7 @@ impl ConvertError {
             Self::Unsupported(e) => e.to_string(),
             Self::Input(e) => e.to_string(),
             Self::Output(e) => e.to_string(),
-            Self::Io { path, doing, error } => format!("{}: {doing}: {}", path.display(), system_reason(error)),
+            Self::Io { path, doing, error, .. } => format!("{}: {doing}: {}", path.display(), system_reason(error)),
             Self::Memory { ceiling, why, .. } => {
                 format!("the memory ceiling of {} is too small: {why}", amount(*ceiling))
             }
@@ -209,10 +226,14 @@ impl ConvertError {
             Self::Unsupported(e) => e.advice(),
             Self::Input(e) => e.advice(),
             Self::Output(e) => Some(e.advice()),
-            Self::Io { error, .. } => {
-                let is_full = matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
-                is_full.then_some(Advice::FreeDisk)
-            }
+            Self::Io { error, is_temporary, .. } => match error.kind() {
+                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded if *is_temporary => {
+                    Some(Advice::FreeTemporaryDisk)
+                }
+                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Some(Advice::FreeDisk),
+                io::ErrorKind::FileTooLarge => Some(Advice::AllowLargerFiles),
+                _ => None,
+            },
             Self::Memory { needed, .. } => Some(Advice::RaiseMemory { mib: (needed >> 20) + 1 }),
             Self::Read(_) | Self::Plan(_) | Self::Interrupted | Self::Internal(_) => None,
         }
@@ -315,6 +336,7 @@ impl InputFault {
             Self::FarPoints { .. } => Some(Advice::CutBounds { bounds: None }),
             Self::CostlyOutliers { others, .. } => Some(Advice::CutOutliers { bounds: *others }),
             Self::InvalidPosition { .. } => Some(Advice::SkipInvalid),
+            Self::Changed { .. } => Some(Advice::StopWriting),
             Self::DeepColours { .. } => Some(Advice::DetectRgbDepth),
             Self::NoneReadable | Self::NothingLeft { .. } => None,
         }
@@ -348,6 +370,9 @@ impl fmt::Display for InputFault {
             Self::InvalidPosition { path, point } => {
                 write!(f, "{}: point {point} has no finite position", path.display())
             }
+            Self::Changed { path } => {
+                write!(f, "{}: the file was changed while it was being read", path.display())
+            }
             Self::DeepColours { path } => {
                 write!(f, "{}: has colour values above 255, so they cannot be 8 bits deep", path.display())
             }
@@ -361,6 +386,7 @@ impl OutputFault {
             Self::Exists(_) => Advice::ReplaceOutput,
             Self::Foreign { .. } => Advice::MoveAway,
             Self::NotADataset(_) => Advice::OtherOutput,
+            Self::Busy(_) => Advice::WaitForRun,
         }
     }
 }
@@ -371,13 +397,14 @@ impl fmt::Display for OutputFault {
             Self::Exists(output) => write!(f, "{}: the output exists already", output.display()),
             Self::Foreign { output, file } => write!(
                 f,
-                "{}: {} in it is not part of a dataset, so the output is not replaced",
+                "{}: {} in it is not part of a dataset of ours, so the output is not replaced",
                 output.display(),
                 file.display()
             ),
             Self::NotADataset(output) => {
-                write!(f, "{}: exists and is not a dataset, so it is not replaced", output.display())
+                write!(f, "{}: exists and is not a dataset of ours, so it is not replaced", output.display())
             }
+            Self::Busy(output) => write!(f, "{}: another run is writing there", output.display()),
         }
     }
 }

@@ -19,12 +19,12 @@ const JSON_BYTES: u64 = 16 << 10;
 /// Inputs that cannot be opened, settings that cannot be used, or a memory ceiling that is too small.
 pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertError> {
     outputs::check(plan, targets)?;
-    let sources = Sources::open(plan, &Silent)?;
+    let mut sources = Sources::open(plan, &Silent)?;
+    let mut warnings = std::mem::take(&mut sources.warnings);
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
     let schema = &intake.schema;
-    let budget = Budget::new(plan, schema.stride, least(targets, &sources, &intake))?;
-    let mut warnings = sources.warnings.clone();
+    let budget = Budget::new(plan, schema.stride, least(targets, &sources, &intake)?)?;
     let crs = resolve_crs_of_all(plan, &sources.all, &mut warnings)?;
     let lattice = from_headers(plan, &sources)?;
     // Which attributes are constant is not known before the points are read.

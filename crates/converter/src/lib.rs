@@ -53,10 +53,10 @@ pub use convert::{convert, convert_on};
 pub use error::{ConvertError, InputFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
 pub use octree::Sampling;
-pub use outputs::Target;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
 pub use outputs::potree2::{Encoding, Potree2Settings};
+pub use outputs::{StagedFiles, Target, resolve_path};
 pub use plan::{
     AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault, RgbDepth,
     ScaleChoice, Setting,
@@ -67,6 +67,6 @@ pub use report::{
     How, InputReport, Integers, Merged, Metres, MissingValues, OtherFilesReport, OutputReport, PhaseReport,
     PointsReport, PositionErrors, Report, SharedPlaceReport, TreeReport,
 };
-pub use runtime::{Disk, DiskOperation, Events, Phase, Silent, SystemDisk};
+pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
 pub use sources::{ResolvedCrs, resolve_crs};
 pub use warning::{CrsNote, Proj4Fault, Warning};

@@ -27,6 +27,18 @@ pub enum Warning {
         /// All of them, in order of path.
         files: Vec<PathBuf>,
     },
+    /// A run was ended while it replaced an output; the old one was put back.
+    OldOutputBack {
+        /// The output.
+        output: PathBuf,
+    },
+    /// Something that this or an earlier run has left stays.
+    Leftover {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why it is not removed.
+        why: String,
+    },
     /// An input that cannot be read was skipped.
     InputSkipped {
         /// The input.
@@ -266,6 +278,8 @@ impl Warning {
         match self {
             Self::Scan { .. } => "scan",
             Self::OtherFiles { .. } => "other_files",
+            Self::OldOutputBack { .. } => "old_output_back",
+            Self::Leftover { .. } => "leftover",
             Self::InputSkipped { .. } => "input_skipped",
             Self::PointsSkipped { .. } => "points_skipped",
             Self::ReadAgain => "read_again",
@@ -311,6 +325,11 @@ impl Warning {
         match self {
             Self::Scan { path, warning } => format!("{}: {warning}", path.display()),
             Self::OtherFiles { files } => other_files(files),
+            Self::OldOutputBack { output } => format!(
+                "{}: a run was ended while it replaced this output; the dataset before it is back in its place",
+                output.display()
+            ),
+            Self::Leftover { path, why } => format!("{}: left over, and not removed: {why}", path.display()),
             Self::InputSkipped { error, .. } => format!("input skipped: {error}"),
             Self::PointsSkipped { points, error, .. } => format!("{points} points skipped: {error}"),
             Self::ReadAgain => "the points lie outside the bounds that were declared or sampled, or their extent does \

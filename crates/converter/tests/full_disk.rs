@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill_converter::{
     AttributeChoice, BatchesSettings, BintreeSettings, ConvertError, Disk, DiskOperation, Encoding, Plan,
-    Potree2Settings, Silent, Target, convert_on,
+    Potree2Settings, Replacing, Silent, Target, convert_on,
 };
 use pointmill_format::bintree::Layout;
 
@@ -19,15 +19,16 @@ use pointmill_format::bintree::Layout;
 struct FailingDisk {
     fails_at: u64,
     asked: AtomicU64,
+    replacing: Replacing,
 }
 
 impl FailingDisk {
-    fn at(operation: u64) -> Arc<Self> {
-        Arc::new(Self { fails_at: operation, asked: AtomicU64::new(0) })
+    fn at(operation: u64, replacing: Replacing) -> Arc<Self> {
+        Arc::new(Self { fails_at: operation, asked: AtomicU64::new(0), replacing })
     }
 
     fn never() -> Arc<Self> {
-        Self::at(u64::MAX)
+        Self::at(u64::MAX, Replacing::AtOnce)
     }
 }
 
@@ -38,6 +39,10 @@ impl Disk for FailingDisk {
         } else {
             Ok(())
         }
+    }
+
+    fn replacing(&self) -> Replacing {
+        self.replacing
     }
 }
 
@@ -61,7 +66,8 @@ fn points(count: u32) -> String {
     (0..count).map(|i| format!("{} {} {} {}\n", i * 7919 % 10_007, i * 104_729 % 9_973, i % 7, i % 256)).collect()
 }
 
-/// About this many operations are tried for one kind of run, spread evenly, and the last eight.
+/// About this many operations are tried for one kind of run, spread evenly, and the last, which replace the old
+/// output.
 const TRIES: u64 = 40;
 
 fn check(what: &str, targets: &[Target], change: impl Fn(&mut Plan)) {
@@ -74,17 +80,22 @@ fn check(what: &str, targets: &[Target], change: impl Fn(&mut Plan)) {
     change(&mut plan);
     let run = |disk: Arc<FailingDisk>| convert_on(disk, &plan, targets, &Silent);
 
-    let counting = FailingDisk::never();
+    let ways = [Replacing::AtOnce, Replacing::InTwoSteps, Replacing::EntryByEntry];
+    let counting = FailingDisk::at(u64::MAX, Replacing::EntryByEntry); // the most operations
     run(Arc::clone(&counting)).unwrap();
     let operations = counting.asked.load(Ordering::Relaxed);
     let step = (operations / TRIES).max(1);
-    for operation in (0..operations).step_by(step as usize).chain(operations.saturating_sub(8)..operations) {
+    for operation in (0..operations).step_by(step as usize).chain(operations.saturating_sub(24)..operations) {
         fs::remove_dir_all(&out).unwrap();
         fs::create_dir(&out).unwrap();
         // an old dataset, and one that the new one differs from
-        fs::write(out.join("metadata.json"), format!("{{\"hierarchy\": {operation}}}")).unwrap();
+        fs::write(
+            out.join("metadata.json"),
+            format!("{{\"hierarchy\": {{}}, \"pointmill\": {{\"is\": {operation}}}}}"),
+        )
+        .unwrap();
         let old = contents(&out);
-        let disk = FailingDisk::at(operation);
+        let disk = FailingDisk::at(operation, ways[operation as usize % ways.len()]);
         match run(Arc::clone(&disk)) {
             Err(ConvertError::Io { error, .. }) => assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{what}"),
             Err(other) => panic!("{what}, at {operation} of {operations}: {other}"),

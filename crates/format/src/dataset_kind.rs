@@ -1,12 +1,13 @@
 //! The kinds of datasets: names, files, and how each is recognised. A new format is one row here.
 
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
 use crate::ReadError;
+use crate::bytes::open_file;
 use crate::names::named;
 
 /// A kind of dataset.
@@ -173,11 +174,21 @@ impl Located {
 /// Finds the dataset at `path`, a folder or its marker file, by the names of files alone: a damaged one is found too.
 ///
 /// # Errors
-/// `path` leads to nothing, or to nothing that is named like a dataset.
+/// `path` leads to nothing, or to nothing that is named like a dataset; or what is named like one is no file, or may not be
+/// looked at.
 pub fn locate(path: impl AsRef<Path>) -> Result<Located, ReadError> {
     let path = path.as_ref();
     fs::metadata(path).map_err(|e| ReadError::io(path, "opening", e))?;
-    find(path).ok_or_else(|| ReadError::unsupported(path, "not a dataset of any known kind").advise(advice()))
+    if let Some(located) = find(path) {
+        return Ok(located);
+    }
+    for marker in DatasetKind::ALL.iter().map(|kind| path.join(kind.marker_file())).filter(|_| path.is_dir()) {
+        match open_file(&marker) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(ReadError::io(marker, "opening", e)),
+            _ => {}
+        }
+    }
+    Err(ReadError::unsupported(path, "not a dataset of any known kind").advise(advice()))
 }
 
 fn find(path: &Path) -> Option<Located> {
@@ -209,7 +220,7 @@ fn advice() -> String {
 
 fn starts_with_mark(file: &Path, mark: &str) -> bool {
     let mut start = Vec::new();
-    let read = File::open(file).and_then(|f| f.take(MARK_WITHIN_BYTES).read_to_end(&mut start));
+    let read = open_file(file).and_then(|f| f.take(MARK_WITHIN_BYTES).read_to_end(&mut start));
     read.is_ok() && start.windows(mark.len()).any(|w| w == mark.as_bytes())
 }
 

@@ -21,6 +21,8 @@ pub enum WriteError {
     Input(String),
     #[error("compressing: {0}")]
     Compress(String),
+    #[error("stopped by request")]
+    Stopped,
     #[error("writing: {0}")]
     Io(#[from] io::Error),
 }

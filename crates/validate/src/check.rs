@@ -51,11 +51,12 @@ pub enum Check {
     Colours,
     Originals,
     Errors,
+    Report,
 }
 
 impl Check {
     /// Checks of all formats together; [`Self::index`] is below it.
-    pub(crate) const COUNT: usize = Self::Errors as usize + 1;
+    pub(crate) const COUNT: usize = Self::Report as usize + 1;
 
     /// The checks of datasets of that kind, in the order of reports.
     pub const fn of(kind: DatasetKind) -> &'static [Self] {
@@ -86,6 +87,7 @@ impl Check {
         Self::Spacing,
         Self::Coverage,
         Self::Against,
+        Self::Report,
         Self::Accuracy,
     ];
 
@@ -105,6 +107,7 @@ impl Check {
         Self::Sides,
         Self::Degenerate,
         Self::Against,
+        Self::Report,
         Self::Accuracy,
     ];
 
@@ -126,6 +129,7 @@ impl Check {
         Self::Errors,
         Self::AttributeRanges,
         Self::Against,
+        Self::Report,
         Self::Accuracy,
     ];
 
@@ -181,6 +185,7 @@ impl Check {
             Self::Colours => "colours",
             Self::Originals => "originals",
             Self::Errors => "errors",
+            Self::Report => "report",
         }
     }
 
@@ -234,6 +239,7 @@ impl Check {
             Self::Levels => "exactly the points nearest to the centres of cells of level 0, 1, 2 have that level",
             Self::Colours => "points below level 3 show the mean of their cell, greys follow from intensities",
             Self::Originals => "originals ascend and are those of points below level 3 that show another colour",
+            Self::Report => "the report of the conversion names this dataset, with its points and nodes",
             Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }
     }

@@ -30,10 +30,12 @@ mod batches;
 mod bintree;
 mod check;
 mod finding;
+mod memory;
 mod options;
 mod outcome;
 mod place;
 mod potree2;
+mod report;
 
 use std::path::Path;
 
@@ -46,6 +48,7 @@ pub use options::{Options, Progress, ProgressFn};
 pub use outcome::{AgainstSummary, LeafQuality, LevelQuality, Outcome};
 pub use place::{BinaryNode, Place};
 pub use pointmill_format::{DatasetKind, Located, locate};
+pub use report::{Several, several};
 
 /// Checks the dataset at `dataset`, whose format [`locate`] finds. What does not conform is a finding, not an error.
 ///
@@ -56,12 +59,7 @@ pub use pointmill_format::{DatasetKind, Located, locate};
 /// to its end.
 pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
     let Located { kind, path, .. } = locate(dataset)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads)
-        .thread_name(|i| format!("validate-{i}"))
-        .build()
-        .map_err(|e| ReadError::io(dataset, "starting threads", std::io::Error::other(e)))?;
-    pool.install(|| match kind {
+    memory::pool(options.threads, dataset)?.install(|| match kind {
         DatasetKind::Potree2 => potree2::run(&path, options, progress),
         DatasetKind::Bintree => bintree::run(&path, options, progress),
         DatasetKind::Batches => batches::run(&path, options, progress),

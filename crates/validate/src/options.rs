@@ -13,7 +13,8 @@ pub struct Options {
     pub open: OpenOptions,
     /// Worker threads; 0: one per core.
     pub threads: usize,
-    /// Memory for caches and for the search for differing records, bytes. A guide, not a limit of the process.
+    /// Ceiling of the resident set of the process, bytes. What does not fit is shared out, looked at in parts, or refused
+    /// with [`pointmill_format::Advice::MoreMemory`].
     pub memory_bytes: u64,
     /// Maximum problems listed per check; all are counted.
     pub max_problems: usize,

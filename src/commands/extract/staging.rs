@@ -5,18 +5,33 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use crate::exit::Failure;
-use crate::interrupt::stop_flag;
+use pointmill_converter::{Events, StagedFiles};
+
+use crate::exit::{Failure, print_line};
+use crate::flags::warning_line;
+use crate::interrupt::{self, stop_flag};
 
 /// Takes the bytes of a file, in order.
 pub(super) type ByteSink<'a> = dyn FnMut(&[u8]) -> Result<(), Failure> + 'a;
 
-/// Complete files on their way into a folder: they are written into another beside it. It is removed in the end, come
-/// what may.
+/// Complete files on their way into a folder. They are removed in the end, come what may.
 pub(super) struct Staging {
-    folder: tempfile::TempDir,
+    files: StagedFiles,
     target: PathBuf,
     names: Vec<String>,
+}
+
+/// The request to stop, and what a stop removes.
+struct Stop;
+
+impl Events for Stop {
+    fn works_in(&self, folder: &Path) {
+        interrupt::works_in(folder);
+    }
+
+    fn stop_requested(&self) -> bool {
+        stop_flag().load(Ordering::Relaxed)
+    }
 }
 
 impl Staging {
@@ -32,12 +47,9 @@ impl Staging {
         if !parent.is_dir() {
             return Err(Failure::Usage(format!("{}: no such folder for the output", parent.display())));
         }
-        let name = target.file_name().map_or_else(|| "extract".into(), |name| name.to_string_lossy());
-        let folder = tempfile::Builder::new()
-            .prefix(&format!(".{name}.part-"))
-            .tempdir_in(parent)
-            .map_err(|e| Failure::io(target, "making the folder", &e))?;
-        Ok(Self { folder, target: target.to_path_buf(), names: Vec::new() })
+        let files = StagedFiles::new(target, &Stop)?;
+        files.warnings().iter().for_each(|warning| print_line(&format!("warning: {}", warning_line(warning))));
+        Ok(Self { files, target: target.to_path_buf(), names: Vec::new() })
     }
 
     /// Writes a file of that name: one component, which nothing else has here.
@@ -48,7 +60,7 @@ impl Staging {
     ) -> Result<(), Failure> {
         let shown = self.target.join(name);
         let io = |e: io::Error| Failure::io(&shown, "writing", &e);
-        let mut file = File::create_new(self.folder.path().join(name)).map_err(io)?;
+        let mut file = File::create_new(self.files.folder().join(name)).map_err(io)?;
         fill(&mut |bytes| {
             if stop_flag().load(Ordering::Relaxed) {
                 return Err(Failure::Interrupted("interrupted; nothing was written".to_owned()));
@@ -64,24 +76,28 @@ impl Staging {
     pub(super) fn forget(&mut self, name: &str) {
         self.names.retain(|kept| kept != name);
         // what stays is removed with the folder
-        let _ = fs::remove_file(self.folder.path().join(name));
+        let _ = fs::remove_file(self.files.folder().join(name));
     }
 
     /// Moves all files into the folder. With `overwrite` files of the same names are replaced, else nothing is moved if
     /// there is one.
     pub(super) fn finish(self, overwrite: bool) -> Result<(), Failure> {
-        let target = &self.target;
-        let is_there = |name: &&String| fs::symlink_metadata(target.join(name)).is_ok();
-        if let Some(name) = self.names.iter().find(is_there).filter(|_| !overwrite) {
-            let path = target.join(name);
-            let line = format!("{}: is there already; choose another folder, or pass --overwrite", path.display());
-            return Err(Failure::Usage(line));
-        }
-        fs::create_dir_all(target).map_err(|e| Failure::io(target, "making the folder", &e))?;
+        interrupt::settling();
+        let mut replaced = Vec::new();
         for name in &self.names {
-            let to = target.join(name);
-            fs::rename(self.folder.path().join(name), &to).map_err(|e| Failure::io(&to, "writing", &e))?;
+            let path = self.target.join(name);
+            let there = fs::symlink_metadata(&path);
+            let line = match &there {
+                Err(_) => continue,
+                Ok(meta) if meta.is_dir() => "is there already, a folder; choose another folder",
+                Ok(_) if !overwrite => "is there already; choose another folder, or pass --overwrite",
+                Ok(_) => {
+                    replaced.push(name.clone());
+                    continue;
+                }
+            };
+            return Err(Failure::Usage(format!("{}: {line}", path.display())));
         }
-        Ok(())
+        Ok(self.files.place(&replaced)?)
     }
 }

@@ -36,13 +36,23 @@ fn datasets(path: &Path) -> Vec<Located> {
     locate(path).map_or_else(|_| datasets::inside(path), |one| vec![one])
 }
 
+/// What is named like the first file of a dataset and cannot be read: a pipe, or what may not be looked at.
+fn unreadable_marker(path: &Path) -> Option<Failure> {
+    let error = locate(path).err().filter(|error| error.is_io() && error.path() != path)?;
+    Some(error.into())
+}
+
 /// Describes every path; the exit code is that of the first failure.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     args.reading.placing.refuse_idle_crs()?;
     let options = args.reading.options()?;
     check_choice(&args.paths, &options)?;
-    let mut out = Output { json: args.json, objects: Vec::new(), first_failure: None };
+    let mut out = Output { json: args.json, objects: 0, first_failure: None };
     for path in &args.paths {
+        if let Some(failure) = unreadable_marker(path) {
+            out.fail(failure);
+            continue;
+        }
         let datasets = datasets(path);
         for dataset in &datasets {
             out.show(describe_dataset(dataset))?;
@@ -61,9 +71,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
             }
         }
     }
-    if args.json {
-        emit(&to_json(&Value::Array(out.objects))?)?;
-    }
+    out.end()?;
     out.first_failure.map_or(Ok(()), Err)
 }
 
@@ -79,10 +87,11 @@ fn check_choice(paths: &[PathBuf], options: &OpenOptions) -> Result<(), Failure>
     if files.is_empty() { Ok(()) } else { text_choice::check(&files, options) }
 }
 
-/// The output so far.
+/// The output so far: of very many scans nothing is kept.
 struct Output {
     json: bool,
-    objects: Vec<Value>,
+    /// Objects of the array that were written.
+    objects: usize,
     first_failure: Option<Failure>,
 }
 
@@ -91,7 +100,8 @@ impl Output {
         match description {
             Ok(Description { text, json, fault }) => {
                 if self.json {
-                    self.objects.push(json);
+                    emit(&element(&json, self.objects == 0)?)?;
+                    self.objects += 1;
                 } else {
                     emit(&text)?;
                 }
@@ -102,11 +112,40 @@ impl Output {
         Ok(())
     }
 
+    /// Closes the array.
+    fn end(&self) -> Result<(), Failure> {
+        match (self.json, self.objects) {
+            (false, _) => Ok(()),
+            (true, 0) => emit("[]\n"),
+            (true, _) => emit("\n]\n"),
+        }
+    }
+
     /// Reports failures as they occur, except the first, which `main` reports and which gives the exit code.
     fn fail(&mut self, failure: Failure) {
         match self.first_failure {
             None => self.first_failure = Some(failure),
             Some(_) => failure.print(),
         }
+    }
+}
+
+/// The text of an element of an array that is written piece by piece.
+fn element(object: &Value, is_first: bool) -> Result<String, Failure> {
+    let lines = to_json(object)?.trim_end().replace('\n', "\n  "); // texts in JSON have no line breaks
+    Ok(format!("{}  {lines}", if is_first { "[\n" } else { ",\n" }))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn an_array_written_piece_by_piece_is_that_of_the_library() {
+        let objects = [json!({"a": [1, 2], "b": {"c": "x\ny"}}), json!({}), json!({"d": null})];
+        let pieces: String = objects.iter().enumerate().map(|(i, object)| element(object, i == 0).unwrap()).collect();
+        assert_eq!(pieces + "\n]\n", to_json(&objects).unwrap());
     }
 }

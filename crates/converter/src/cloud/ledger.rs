@@ -3,6 +3,7 @@
 use super::checksum::Checksum;
 use super::segments::Segment;
 use super::store::Store;
+use super::widening::Widening;
 use crate::error::ConvertError;
 
 /// Order-independent sums over the records that an output wrote.
@@ -67,19 +68,19 @@ impl Ledger {
         Err(ConvertError::Internal(format!("points were lost on the way: read {read:?}, written {written:?}")))
     }
 
-    /// Appends the records of a segment to `records`, with colours of the depth that outputs have. `widen_rgb`: for each
-    /// source the byte offset of a colour that is 8 bits deep and becomes 16.
+    /// Appends the records of a segment to `records`, with colours of the depth that outputs have: `widening` has those
+    /// of 8 bits, which become 16.
     pub(crate) fn load(
         &mut self,
         store: &Store,
         segment: Segment,
         stride: usize,
-        widen_rgb: &[Option<usize>],
+        widening: &Widening,
         records: &mut Vec<u8>,
     ) -> Result<(), ConvertError> {
         let start = records.len();
-        let source = store.take(segment, records)?;
-        if let Some(rgb) = widen_rgb[source as usize] {
+        let group = store.take(segment, records)?;
+        if let Some(rgb) = widening.of(group) {
             let fresh = &mut records[start..];
             self.narrow.add_all(fresh, stride);
             for record in fresh.chunks_exact_mut(stride) {

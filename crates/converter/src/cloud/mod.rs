@@ -4,6 +4,7 @@
 mod big_sort;
 mod cell;
 mod checksum;
+mod colour_range;
 mod cube;
 mod facts;
 mod frames;
@@ -20,6 +21,7 @@ mod segments;
 mod shortfall;
 mod stats;
 mod store;
+mod widening;
 
 pub(crate) use big_sort::BigSort;
 pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, xyz};
@@ -28,7 +30,7 @@ pub(crate) use cube::{ANCHOR_BITS, Cube, MOST_STEPS, TREE_BITS, tidy_world};
 pub(crate) use facts::Facts;
 pub(crate) use frames::{JobBounds, JobColumns, JobPoint, StoredOrigin, StoredPoint, TreePoint};
 pub(crate) use grouping::{CellHash, Grouping};
-pub(crate) use intake::Intake;
+pub(crate) use intake::{Intake, LayoutIntake};
 pub(crate) use lattice::JobLattice;
 pub(crate) use ledger::Ledger;
 pub(crate) use moments::Moments;
@@ -37,8 +39,9 @@ pub(crate) use record::{RecordFrame, copy_record, position};
 pub(crate) use regroup::Regrouper;
 pub(crate) use segments::{Segment, Segments};
 pub(crate) use shortfall::Shortfall;
-pub(crate) use stats::{Change, Range, Stats};
+pub(crate) use stats::{Change, Range, SourceStats, Stats};
 pub(crate) use store::{BLOCK_BYTES, Store};
+pub(crate) use widening::{Group, Widening};
 
 use std::sync::Arc;
 
@@ -150,7 +153,7 @@ impl<'a> Cloud<'a> {
 
     /// Least step of the coordinates of the sources, world units; that of the lattice where a source states none.
     pub(crate) fn source_step(&self) -> [f64; 3] {
-        let step = |source: &crate::sources::Source, a: usize| match source.survey.fineness[a] {
+        let step = |source: &crate::sources::Source, a: usize| match source.stored.fineness[a] {
             Fineness::Grid { grid, .. } => grid.step,
             Fineness::Step(step) => step,
             Fineness::Single | Fineness::Double => self.lattice.lattice.scale[a],

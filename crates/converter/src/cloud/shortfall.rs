@@ -5,6 +5,7 @@ use pointmill_format::Changes;
 
 use super::intake::Intake;
 use super::stats::Stats;
+use crate::sources::Sources;
 use crate::warning::Warning;
 
 /// Of one attribute.
@@ -19,12 +20,12 @@ pub(crate) struct Shortfall {
 }
 
 /// By index of the schema.
-pub(super) fn shortfalls(intake: &Intake, stats: &Stats) -> Vec<Shortfall> {
+pub(super) fn shortfalls(sources: &Sources, intake: &Intake, stats: &Stats) -> Vec<Shortfall> {
     let of_attribute = |attribute: usize| {
         let mut sum = Shortfall::default();
-        for (source, seen) in intake.sources.iter().zip(&stats.sources) {
+        for (source, seen) in sources.all.iter().zip(&stats.sources) {
             let changes = seen.changes.get(attribute).copied().unwrap_or_default();
-            let missing = if source.has(Some(attribute)) { changes.missing } else { seen.kept };
+            let missing = if intake.of(source).has(Some(attribute)) { changes.missing } else { seen.kept };
             sum.missing_points += missing;
             sum.missing_files += u64::from(missing > 0);
             sum.changes.merge(&Changes { missing: 0, ..changes });

@@ -3,6 +3,7 @@
 use pointmill_format::{Aabb, Changes, Column, with_column};
 
 use super::checksum::Checksum;
+use super::colour_range::ColourRange;
 use super::frames::JobBounds;
 use crate::sources::Schema;
 use crate::warning::Warning;
@@ -20,6 +21,7 @@ pub(crate) struct Stats {
     pub(crate) odd_classes: Changes,
     /// 64-bit integers that doubles do not hold: by attribute of the schema, empty where there are none.
     pub(crate) doubled: Vec<Changes>,
+    /// By source; empty while a pass goes on, since there may be very many ([`SourceStats`] are kept apart).
     pub(crate) sources: Vec<SourceStats>,
     /// Of the records as they are stored.
     pub(crate) checksum: Checksum,
@@ -116,16 +118,43 @@ pub(crate) struct SourceStats {
     pub(crate) bounds: Aabb,
     /// Axes on which a point contradicts the grid that the file, or a sample, claims.
     pub(crate) off_grid: [bool; 3],
-    /// Range of the colour of the points that go in.
-    pub(crate) rgb: Range,
-    /// Range of the colour of batches that the filter cut, points that it omitted included.
-    pub(crate) rgb_unfiltered: Range,
+    /// Of the points that go in.
+    pub(crate) rgb: ColourRange,
+    /// Of batches that the filter cut, points that it omitted included.
+    pub(crate) rgb_unfiltered: ColourRange,
     /// Values that could not stay as they were, of all points that were read: by attribute of the schema, empty where
     /// there are none.
     pub(crate) changes: Vec<Changes>,
 }
 
+impl Default for SourceStats {
+    fn default() -> Self {
+        Self {
+            read: 0,
+            kept: 0,
+            at_origin: 0,
+            bounds: Aabb::EMPTY,
+            off_grid: [false; 3],
+            rgb: ColourRange::default(),
+            rgb_unfiltered: ColourRange::default(),
+            changes: Vec::new(),
+        }
+    }
+}
+
 impl SourceStats {
+    /// Adds what another thread has seen of the same input.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.read += other.read;
+        self.kept += other.kept;
+        self.at_origin += other.at_origin;
+        self.bounds = self.bounds.union(&other.bounds);
+        self.off_grid = std::array::from_fn(|axis| self.off_grid[axis] || other.off_grid[axis]);
+        self.rgb.merge(&other.rgb);
+        self.rgb_unfiltered.merge(&other.rgb_unfiltered);
+        other.changes.iter().enumerate().for_each(|(attribute, changes)| self.count_changes(attribute, changes));
+    }
+
     /// Adds to what changed of an attribute of the schema.
     pub(crate) fn count_changes(&mut self, attribute: usize, changes: &Changes) {
         count(&mut self.changes, attribute, changes);
@@ -253,24 +282,15 @@ macro_rules! floats {
 floats!(f32, f64);
 
 impl Stats {
-    pub(crate) fn new(schema: &Schema, sources: usize) -> Self {
-        let source = SourceStats {
-            read: 0,
-            kept: 0,
-            at_origin: 0,
-            bounds: Aabb::EMPTY,
-            off_grid: [false; 3],
-            rgb: Range::new(3),
-            rgb_unfiltered: Range::new(3),
-            changes: Vec::new(),
-        };
+    /// Nothing of any source yet.
+    pub(crate) fn new(schema: &Schema) -> Self {
         Self {
             bounds: JobBounds::EMPTY,
             ranges: schema.attributes.iter().map(|a| Range::new(a.elements)).collect(),
             classes: vec![0; 256],
             odd_classes: Changes::default(),
             doubled: Vec::new(),
-            sources: vec![source; sources],
+            sources: Vec::new(),
             checksum: Checksum::default(),
             change: Change::default(),
             points: 0,
@@ -293,22 +313,13 @@ impl Stats {
         count(&mut self.doubled, attribute, changes);
     }
 
+    /// Adds what another thread has seen, sources aside.
     pub(crate) fn merge(&mut self, other: &Self) {
         self.bounds.union(&other.bounds);
         self.ranges.iter_mut().zip(&other.ranges).for_each(|(a, b)| a.merge(b));
         self.classes.iter_mut().zip(&other.classes).for_each(|(a, b)| *a += b);
         self.odd_classes.merge(&other.odd_classes);
         other.doubled.iter().enumerate().for_each(|(attribute, changes)| self.count_doubled(attribute, changes));
-        for (a, b) in self.sources.iter_mut().zip(&other.sources) {
-            a.read += b.read;
-            a.kept += b.kept;
-            a.at_origin += b.at_origin;
-            a.bounds = a.bounds.union(&b.bounds);
-            a.off_grid = std::array::from_fn(|axis| a.off_grid[axis] || b.off_grid[axis]);
-            a.rgb.merge(&b.rgb);
-            a.rgb_unfiltered.merge(&b.rgb_unfiltered);
-            b.changes.iter().enumerate().for_each(|(attribute, changes)| a.count_changes(attribute, changes));
-        }
         self.checksum.merge(&other.checksum);
         self.change.merge(&other.change);
         self.points += other.points;

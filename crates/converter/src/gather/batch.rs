@@ -8,8 +8,9 @@ use pointmill_format::{Column, PointBatch, Positions};
 use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{Collected, Context};
+use super::visit::Visit;
 use super::{exact, moved, partition, ranges, select};
-use crate::cloud::{BLOCK_BYTES, Grouping, JobBounds, JobColumns, Segment, Stats};
+use crate::cloud::{BLOCK_BYTES, Group, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Reservation, os_hints};
 use crate::sources::{MARK_BYTES, POSITION_BYTES, Recast};
@@ -51,14 +52,14 @@ pub(super) struct Worker<'a> {
 
 struct OpenBlock {
     index: u32,
-    source: usize,
+    group: Group,
 }
 
 impl<'a> Worker<'a> {
     pub(super) fn new(pass: &'a Context<'a>) -> Self {
         Self {
             pass,
-            stats: Stats::new(&pass.intake.schema, pass.sources.all.len()),
+            stats: Stats::new(&pass.intake.schema),
             collected: Collected::default(),
             room: Reservation::new(pass.memory, Consumer::Cells),
             q: JobColumns::default(),
@@ -78,15 +79,15 @@ impl<'a> Worker<'a> {
         Ok((self.stats, self.collected, self.room))
     }
 
-    /// Takes one batch of `source`: filter, lattice, ranges, cells, records.
-    pub(super) fn take(&mut self, source: usize, batch: &PointBatch) -> Result<(), ConvertError> {
-        let filtered = select::select(self.pass, source, batch, &mut self.stats, &mut self.selection)?;
-        self.stats.sources[source].read += batch.len() as u64;
-        self.note_changes(source, batch);
-        let recast = self.recast(source, batch);
+    /// Takes one batch of a source: filter, lattice, ranges, cells, records.
+    pub(super) fn take(&mut self, visit: &mut Visit<'_>, batch: &PointBatch) -> Result<(), ConvertError> {
+        let filtered = select::select(self.pass, visit, batch, &mut self.stats, &mut self.selection)?;
+        visit.seen.read += batch.len() as u64;
+        note_changes(visit, batch);
+        let recast = recast(visit, batch);
         let columns = stored_columns(batch, &recast);
         if filtered {
-            ranges::unfiltered_colour(self.pass, source, &columns, &mut self.stats);
+            ranges::unfiltered_colour(self.pass, visit, &columns);
         }
         let kept = if filtered { self.selection.len() } else { batch.len() };
         if kept == 0 {
@@ -101,7 +102,7 @@ impl<'a> Worker<'a> {
             let range = start..if is_scattered { kept } else { (start + SLICE_POINTS).min(kept) };
             start = range.end;
             let rows = if filtered { Rows::Selected(&selection[range]) } else { Rows::Consecutive(range) };
-            outcome = self.take_slice(source, batch, &columns, &rows, is_scattered);
+            outcome = self.take_slice(visit, batch, &columns, &rows, is_scattered);
             if outcome.is_err() {
                 break;
             }
@@ -109,42 +110,20 @@ impl<'a> Worker<'a> {
         self.selection = selection;
         if !self.pass.misled.load(Ordering::Relaxed) {
             let selection = filtered.then_some(&self.selection[..]);
-            ranges::add(self.pass, source, &columns, batch.len(), selection, &mut self.stats);
+            ranges::add(self.pass, visit, &columns, batch.len(), selection, &mut self.stats);
         }
         outcome
     }
 
-    /// Adds what the reader could not keep.
-    fn note_changes(&mut self, source: usize, batch: &PointBatch) {
-        for (column, changes) in batch.changes() {
-            if let Some(place) = self.pass.intake.sources[source].columns[column] {
-                self.stats.sources[source].count_changes(place, changes);
-            }
-        }
-    }
-
-    /// The columns that are not stored as they were read, by index.
-    fn recast(&mut self, source: usize, batch: &PointBatch) -> Vec<(usize, Column)> {
-        let intake = &self.pass.intake.sources[source];
-        let recast = |(i, recast): &(usize, Recast)| {
-            let (column, changes) = recast.apply(&batch.columns[*i]);
-            if let Some(place) = intake.columns[*i] {
-                self.stats.sources[source].count_changes(place, &changes);
-            }
-            (*i, column)
-        };
-        intake.recasts.iter().map(recast).collect()
-    }
-
     fn take_slice(
         &mut self,
-        source: usize,
+        visit: &mut Visit<'_>,
         batch: &PointBatch,
         columns: &[&Column],
         rows: &Rows<'_>,
         is_scattered: bool,
     ) -> Result<(), ConvertError> {
-        let bounds = self.quantize(source, batch, rows);
+        let bounds = self.quantize(visit, batch, rows);
         self.stats.bounds.union(&bounds);
         if !self.pass.partition.holds(&bounds) {
             self.pass.misled.store(true, Ordering::Relaxed);
@@ -153,20 +132,12 @@ impl<'a> Worker<'a> {
             return Ok(()); // the pass will be repeated with the bounds that this one finds
         }
         if self.pass.intake.mark.is_some() {
-            let own = self.pass.sources.all[source].scan.info().lattice.as_ref();
-            exact::marks(
-                &self.pass.maps[source],
-                own,
-                &self.pass.lattice,
-                batch,
-                &self.q,
-                |i| rows.row(i),
-                &mut self.marks,
-            );
+            let (own, job) = (visit.lattice(), &self.pass.lattice);
+            exact::marks(&visit.map, own, job, batch, &self.q, |i| rows.row(i), &mut self.marks);
         }
         let points = self.q.len();
         self.stats.points += points as u64;
-        self.stats.sources[source].kept += points as u64;
+        visit.seen.kept += points as u64;
         self.pass.partition.cells(&self.q, &mut self.cells);
         self.grouping.count(&self.cells);
         let is_loose = is_scattered && self.grouping.groups.len() * LOOSE_POINTS_PER_SEGMENT > points;
@@ -175,8 +146,8 @@ impl<'a> Worker<'a> {
         } else {
             self.grouping.arrange(partition::morton_of);
         }
-        let (block, start) = self.room_for(source, points)?;
-        self.assemble(source, columns, rows);
+        let (block, start) = self.room_for(visit.group, points)?;
+        self.assemble(&visit.intake.columns, columns, rows);
         if is_loose {
             self.collected.loose.push(Segment { block, start, count: points as u32 });
             let census = &mut self.collected.census;
@@ -187,11 +158,11 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// The block that takes the next `points` records of `source`, and the number of records it has.
-    fn room_for(&mut self, source: usize, points: usize) -> Result<(u32, u32), ConvertError> {
+    /// The block that takes the next `points` records of a group, and the number of records it has.
+    fn room_for(&mut self, group: Group, points: usize) -> Result<(u32, u32), ConvertError> {
         let stride = self.pass.intake.schema.stride;
         let is_full = self.records.len() + points * stride > BLOCK_BYTES;
-        if is_full || self.open.as_ref().is_some_and(|b| b.source != source) {
+        if is_full || self.open.as_ref().is_some_and(|b| b.group != group) {
             self.close_block()?;
         }
         if self.records.capacity() < BLOCK_BYTES {
@@ -200,8 +171,8 @@ impl<'a> Worker<'a> {
         let index = match &self.open {
             Some(block) => block.index,
             None => {
-                let index = self.pass.store.open(source as u32)?;
-                self.open = Some(OpenBlock { index, source });
+                let index = self.pass.store.open(group.0)?;
+                self.open = Some(OpenBlock { index, group });
                 index
             }
         };
@@ -216,15 +187,15 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Builds the records in the order of their cells.
-    fn assemble(&mut self, source: usize, columns: &[&Column], slice: &Rows<'_>) {
+    /// Builds the records in the order of their cells; `places`: where each column goes in the schema.
+    fn assemble(&mut self, places: &[Option<usize>], columns: &[&Column], slice: &Rows<'_>) {
         let schema = &self.pass.intake.schema;
         let stride = schema.stride;
         let order = &self.grouping.order;
         let origin = self.pass.partition.origin();
         let start = self.records.len();
         self.records.resize(start + order.len() * stride, 0);
-        let parts = Part::of(columns, &self.pass.intake.sources[source].columns, schema);
+        let parts = Part::of(columns, places, schema);
         let mut rows = [0u32; TILE_POINTS];
         for (tile, order) in self.records[start..].chunks_mut(TILE_POINTS * stride).zip(order.chunks(TILE_POINTS)) {
             for (record, &i) in tile.chunks_exact_mut(stride).zip(order) {
@@ -257,15 +228,15 @@ impl<'a> Worker<'a> {
     }
 
     /// Puts the positions of some rows on the job lattice, measures how far they move, and returns their bounds there.
-    fn quantize(&mut self, source: usize, batch: &PointBatch, rows: &Rows<'_>) -> JobBounds {
-        let map = &self.pass.maps[source];
+    fn quantize(&mut self, visit: &mut Visit<'_>, batch: &PointBatch, rows: &Rows<'_>) -> JobBounds {
+        let map = visit.map;
         let mut bounds = JobBounds::EMPTY;
         let mut moved = [Moved::By(0.0); 3];
         for (a, moved) in moved.iter_mut().enumerate() {
             let (q, change) = (&mut self.q.0[a], &mut self.change[a]);
             q.clear();
             change.clear();
-            *moved = quantize_axis(map, a, &batch.positions, rows, q, change);
+            *moved = quantize_axis(&map, a, &batch.positions, rows, q, change);
             bounds.min[a] = q.iter().copied().min().unwrap_or(i64::MAX);
             bounds.max[a] = q.iter().copied().max().unwrap_or(i64::MIN);
         }
@@ -275,16 +246,17 @@ impl<'a> Worker<'a> {
             Moved::Each => Err(&self.change[a][..]),
         });
         self.stats.change.add(points, axes);
-        if let Some(own) = &self.pass.sources.all[source].scan.info().lattice {
+        if let Some(own) = visit.lattice() {
             self.stats.integers_lost += moved::integers_lost(&axes, own, points);
         }
         if !self.stats.moves {
             self.stats.moves = moved::is_more_than_rounding(&axes, &self.q, &bounds, &self.pass.lattice);
         }
-        for (a, by) in axes.iter().enumerate().filter(|(a, _)| self.pass.claims[source][*a]) {
-            let rounding = self.pass.rounding(source, a, &bounds);
-            if by.is_err_and(|column| column.iter().any(|v| v.abs() > rounding)) {
-                self.stats.sources[source].off_grid[a] = true;
+        let is_world = visit.lattice().is_none();
+        for a in (0..3).filter(|a| visit.claims[*a]) {
+            let rounding = if is_world { self.pass.rounding(a, &bounds) } else { 0.0 };
+            if axes[a].is_err_and(|column| column.iter().any(|v| v.abs() > rounding)) {
+                visit.seen.off_grid[a] = true;
             }
         }
         bounds
@@ -312,6 +284,28 @@ impl<'a> Worker<'a> {
             start += count;
         }
     }
+}
+
+/// Adds what the reader could not keep.
+fn note_changes(visit: &mut Visit<'_>, batch: &PointBatch) {
+    for (column, changes) in batch.changes() {
+        if let Some(place) = visit.intake.columns[column] {
+            visit.seen.count_changes(place, changes);
+        }
+    }
+}
+
+/// The columns that are not stored as they were read, by index.
+fn recast(visit: &mut Visit<'_>, batch: &PointBatch) -> Vec<(usize, Column)> {
+    let Visit { intake, seen, .. } = visit;
+    let recast = |(i, recast): &(usize, Recast)| {
+        let (column, changes) = recast.apply(&batch.columns[*i]);
+        if let Some(place) = intake.columns[*i] {
+            seen.count_changes(place, &changes);
+        }
+        (*i, column)
+    };
+    intake.recasts.iter().map(recast).collect()
 }
 
 /// The columns of a batch as they are stored; `recast`: those that are not as they were read.

@@ -1,18 +1,15 @@
 //! What all threads of a pass share.
 
 use std::collections::HashMap;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
-use pointmill_format::Lattice;
+use pointmill_format::{Aabb, Lattice};
 
-use super::axis::SourceMap;
 use super::census::Counts;
-use super::cut::Cut;
 use super::lattice::ulp;
-use super::origins::Origins;
 use super::partition::Partition;
-use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segment, Segments, Store};
+use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segment, Segments, SourceStats, Store};
 use crate::plan::Plan;
 use crate::runtime::Pool;
 use crate::sources::Sources;
@@ -34,16 +31,10 @@ pub(super) struct Context<'a> {
     pub(super) plan: &'a Plan,
     pub(super) sources: &'a Sources,
     pub(super) intake: &'a Intake,
-    /// From the coordinates of each source to the lattice of the pass.
-    pub(super) maps: Vec<SourceMap>,
-    /// The filter's box, for each source.
-    pub(super) cuts: Vec<Option<Cut>>,
-    /// Where the scanners of each source stood.
-    pub(super) origins: Vec<Origins>,
-    /// Axes of each source on which every point has to prove the claim that a grid holds it.
-    pub(super) claims: Vec<[bool; 3]>,
-    /// Points outside, in the terms of each source, are outliers, which are dropped.
-    pub(super) far_cuts: Vec<Option<Cut>>,
+    /// Points outside are outliers, which are dropped.
+    pub(super) far_cut: Option<Aabb>,
+    /// By source: what was seen of it by threads that have left it.
+    pub(super) seen: Mutex<Vec<SourceStats>>,
     /// The lattice of the pass.
     pub(super) lattice: Lattice,
     pub(super) partition: Partition,
@@ -55,11 +46,8 @@ pub(super) struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// What the arithmetic of doubles may move coordinates of a source within `bounds` by.
-    pub(super) fn rounding(&self, source: usize, axis: usize, bounds: &JobBounds) -> f64 {
-        if self.sources.all[source].scan.info().lattice.is_some() {
-            return 0.0; // in integers
-        }
+    /// What the arithmetic of doubles may move world coordinates within `bounds` by.
+    pub(super) fn rounding(&self, axis: usize, bounds: &JobBounds) -> f64 {
         let world = |q: i64| (q as f64 * self.lattice.scale[axis] + self.lattice.offset[axis]).abs();
         let far = world(bounds.min[axis]).max(world(bounds.max[axis])).max(self.lattice.offset[axis].abs());
         8.0 * ulp(far)

@@ -24,6 +24,7 @@ mod pass;
 mod places;
 mod ranges;
 mod select;
+mod visit;
 
 use pointmill_format::{Aabb, AxisGrid, Lattice, ReadError};
 
@@ -38,7 +39,6 @@ use crate::sources::{Fineness, Sources, far_out, intersection};
 use crate::warning::Warning;
 use far::FarPoints;
 use lattice::Loss;
-use origins::Origins;
 use pass::{Pass, PassEnd};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
@@ -54,16 +54,16 @@ const FEWEST_STEPS: f64 = (1 << 20) as f64;
 /// The same where the sources are known to resolve more.
 const FEWEST_KNOWN_STEPS: f64 = (1 << 22) as f64;
 
-/// Reads every point once; again only if the headers were wrong about the bounds.
+/// Reads every point once; again only if the headers were wrong about the bounds. `warnings`: those so far.
 pub(crate) fn gather<'a>(
     plan: &'a Plan,
     sources: &'a Sources,
     intake: &'a Intake,
     demand: Demand,
+    mut warnings: Vec<Warning>,
     rt: &Runtime<'_>,
     clock: &mut Clock<'_>,
 ) -> Result<Cloud<'a>, ConvertError> {
-    let mut warnings = sources.warnings.clone();
     let mut lattice = from_headers(plan, sources)?;
     let hint = sources.bounds_hint(plan.filter.bounds.as_ref());
     let mut hint = hint.map(|bounds| quantized(&lattice.lattice, &bounds));
@@ -75,19 +75,20 @@ pub(crate) fn gather<'a>(
             rt.warn(&warning);
             warnings.push(warning);
         };
-        let (stats, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, rt).run()? {
+        let (misled, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, rt).run()? {
             PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
-            PassEnd::Misled(stats) => (stats, None),
+            PassEnd::Misled(stats) => (Some(stats), None),
             PassEnd::Complete(mut gathered) => {
                 // a step that was requested may put points together that the sources have apart
                 if gathered.is_lossless || !matches!(plan.scale, ScaleChoice::Fixed(_)) {
                     gathered.shared_places = places::find(&mut gathered)?;
                 }
-                (Box::new(gathered.stats.clone()), Some(gathered))
+                (None, Some(gathered))
             }
         };
-        let settled = lattice::settled(plan, sources, &lattice, &stats);
-        let read = Read { lattice: &lattice, stats: &stats, complete: complete.as_deref(), settled: settled.as_ref() };
+        let Some(stats) = misled.as_deref().or(complete.as_deref().map(|gathered| &gathered.stats)) else { continue };
+        let settled = lattice::settled(plan, sources, &lattice, stats);
+        let read = Read { lattice: &lattice, stats, complete: complete.as_deref(), settled: settled.as_ref() };
         if far_cut.is_none()
             && let Some((others, points, without)) = read.without_outliers(plan, sources, rt)?
         {
@@ -97,20 +98,21 @@ pub(crate) fn gather<'a>(
             continue;
         }
         read.refuse_far_out()?;
+        let bounds = settled.as_ref().map_or(stats.bounds, |other| measured(plan, &other.lattice, stats, far_cut));
         match (settled, complete) {
             (Some(other), None) => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(measured(plan, &other.lattice, &stats, far_cut));
+                hint = Some(bounds);
                 lattice = other;
             }
             (Some(other), Some(_)) if pass < MAX_PASSES => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(measured(plan, &other.lattice, &stats, far_cut));
+                hint = Some(bounds);
                 lattice = other;
             }
             (None, None) => {
                 warn(Warning::ReadAgain);
-                hint = Some(stats.bounds);
+                hint = Some(bounds);
             }
             (_, Some(mut gathered)) => {
                 if let Some(mark) = intake.mark {
@@ -138,8 +140,8 @@ fn finishing_warnings(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Ve
         warnings.push(outliers.warning(gathered.lattice.is_held_back()));
     }
     for (source, stats) in sources.all.iter().zip(&gathered.stats.sources) {
-        if let Some(resolution) = source.survey.coarse_single(&stats.bounds) {
-            warnings.push(Warning::CoarseSingle { path: source.scan.info().path.clone(), resolution });
+        if let Some(resolution) = source.stored.coarse_single(&stats.bounds) {
+            warnings.push(Warning::CoarseSingle { path: source.path.to_path_buf(), resolution });
         }
     }
     warnings
@@ -147,21 +149,23 @@ fn finishing_warnings(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Ve
 
 /// What there is to say of points at the origins of scans, and of places that very many points share.
 fn odd_places(plan: &Plan, sources: &Sources, gathered: &Gathered) -> Vec<Warning> {
-    let origins: Vec<Origins> = sources.all.iter().map(|s| Origins::of(s.scan.info())).collect();
-    let (known, unknown): (Vec<_>, Vec<_>) =
-        origins.iter().zip(&gathered.stats.sources).partition(|(origins, _)| origins.are_known);
+    let seen = sources.all.iter().zip(&gathered.stats.sources);
+    let known = seen.clone().filter(|(source, _)| !source.origins.is_empty());
+    let (points, of) = known.fold((0, 0), |(points, of), (_, s)| (points + s.at_origin, of + s.read));
     let mut warnings = Vec::new();
-    let (points, of) = known.iter().fold((0, 0), |(points, of), (_, s)| (points + s.at_origin, of + s.read));
     if plan.filter.origin_points == OriginPoints::Keep && places::are_many_at_origin(points, of) {
         warnings.push(Warning::OriginPoints { points, of });
     }
     // What was just said is not said again.
     let step = gathered.lattice.lattice.scale;
-    let is_new = |place: &&SharedPlace| known.iter().all(|(origins, _)| !origins.are_near(place.position, step));
+    let is_near = |place: [f64; 3], origin: &[f64; 3]| (0..3).all(|a| (place[a] - origin[a]).abs() <= step[a]);
+    let origins = sources.all.iter().flat_map(|source| &source.origins);
+    let is_new = |place: &&SharedPlace| !origins.clone().any(|origin| is_near(place.position, origin));
     let new: Vec<&SharedPlace> = gathered.shared_places.iter().filter(is_new).collect();
     if let Some((SharedPlace { position, points }, more)) = new.split_first() {
         let (position, points, of, more) = (*position, *points, gathered.stats.points, more.len());
-        let at_origin = position == [0.0; 3] && unknown.iter().any(|(_, s)| s.at_origin > 0);
+        let mut unknown = seen.filter(|(source, _)| source.origins.is_empty());
+        let at_origin = position == [0.0; 3] && unknown.any(|(_, s)| s.at_origin > 0);
         warnings.push(Warning::SharedPlace { position, points, of, more, at_origin });
     }
     warnings
@@ -285,7 +289,7 @@ pub(crate) fn is_lossless(sources: &Sources, lattice: &JobLattice) -> bool {
         Fineness::Grid { grid, .. } => AxisGrid { step: scale[a], offset: offset[a] }.holds(&grid),
         Fineness::Step(_) | Fineness::Single | Fineness::Double => false,
     };
-    sources.all.iter().all(|s| (0..3).all(|a| is_held(a, s.survey.fineness[a])))
+    sources.all.iter().all(|s| (0..3).all(|a| is_held(a, s.stored.fineness[a])))
 }
 
 /// A box of the world on a lattice.
@@ -298,13 +302,12 @@ fn nothing_to_convert(sources: &Sources, stats: &Stats) -> ConvertError {
     let read: u64 = stats.sources.iter().map(|s| s.read).sum();
     match sources.all.as_slice() {
         [first, others @ ..] if read == 0 => {
-            let info = first.scan.info();
             let others = match others.len() {
                 0 => String::new(),
                 n => format!(", nor do {n} more inputs"),
             };
             let what = format!("holds no points up to its end{others}");
-            ReadError::broken(&info.path, info.file_bytes, what).advise("there is nothing to convert").into()
+            ReadError::broken(&first.path, first.file_bytes, what).advise("there is nothing to convert").into()
         }
         _ => {
             let Stats { outside_bounds, other_class, thinned, invalid, origin_skipped: at_origin, .. } = *stats;

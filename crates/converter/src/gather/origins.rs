@@ -7,9 +7,6 @@ use pointmill_format::{PointBatch, Positions, ScanInfo};
 pub(super) struct Origins {
     /// Index in the file of the first point of each scan, ascending, and its origin.
     parts: Vec<(u64, Origin)>,
-    world: Vec<[f64; 3]>,
-    /// The file says where they stood; else it is (0, 0, 0), where a point may as well have been measured.
-    pub(super) are_known: bool,
 }
 
 /// An origin as the coordinates of its file have it.
@@ -35,12 +32,11 @@ impl Origins {
             }
         };
         if info.parts.is_empty() {
-            return Self { parts: vec![(0, origin([0.0; 3]))], world: vec![[0.0; 3]], are_known: false };
+            // the file does not say; a point may as well have been measured there
+            return Self { parts: vec![(0, origin([0.0; 3]))] };
         }
         let present = info.parts.iter().filter(|part| !part.range.is_empty());
-        let parts = present.map(|part| (part.range.start, origin(part.translation)));
-        let world = info.parts.iter().map(|part| part.translation).collect();
-        Self { parts: parts.collect(), world, are_known: true }
+        Self { parts: present.map(|part| (part.range.start, origin(part.translation))).collect() }
     }
 
     /// Points of a batch that lie exactly at their origin.
@@ -66,11 +62,6 @@ impl Origins {
 
     fn before(&self, part: usize) -> Option<&Origin> {
         self.parts.get(part.checked_sub(1)?).map(|(_, origin)| origin)
-    }
-
-    /// True if a place is one of them, by a step of the cloud's lattice.
-    pub(super) fn are_near(&self, place: [f64; 3], step: [f64; 3]) -> bool {
-        self.world.iter().any(|origin| (0..3).all(|a| (place[a] - origin[a]).abs() <= step[a]))
     }
 }
 

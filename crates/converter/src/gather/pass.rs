@@ -2,25 +2,24 @@
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
-use pointmill_format::{Aabb, Advice, AxisGrid, Lattice, NodeKey, Scratch};
+use pointmill_format::{Aabb, Advice, Lattice, NodeKey, Scratch};
 
-use super::axis::SourceMap;
 use super::batch::Worker;
 use super::context::{CellPart, Collected, Context, Demand};
-use super::cut::Cut;
 use super::lattice::ulp;
 use super::loose::Grouper;
-use super::origins::Origins;
 use super::partition::Partition;
+use super::visit::Visit;
 use crate::cloud::{
-    Cell, Census, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, Stats, Store, morton, xyz,
+    Cell, Census, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, SourceStats, Stats, Store,
+    morton, xyz,
 };
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
 use crate::runtime::{Consumer, Evict, Reservation, Runtime};
-use crate::sources::{Fineness, Source, Sources};
+use crate::sources::Sources;
 use crate::warning::{Warning, reason_of};
 
 /// The level of cells by which records are grouped that came in no order of space: of a volume there are 512 then.
@@ -59,10 +58,6 @@ impl<'a> Pass<'a> {
         far_cut: Option<Aabb>,
         rt: &'a Runtime<'a>,
     ) -> Self {
-        let map = |s: &Source| SourceMap::new(s.scan.info().lattice.as_ref(), &lattice.lattice);
-        let cuts = |bounds: Option<Aabb>| -> Vec<Option<Cut>> {
-            sources.all.iter().map(|s| bounds.map(|b| Cut::new(&b, s.scan.info()))).collect()
-        };
         let store = Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
         let evict: Arc<dyn Evict> = Arc::clone(&store) as _;
         rt.memory.evict_from(Arc::downgrade(&evict));
@@ -70,12 +65,9 @@ impl<'a> Pass<'a> {
             plan,
             sources,
             intake,
-            maps: sources.all.iter().map(map).collect(),
-            claims: sources.all.iter().map(|s| claims(s, &lattice.lattice)).collect(),
+            far_cut,
+            seen: Mutex::new(vec![SourceStats::default(); sources.all.len()]),
             lattice: lattice.lattice,
-            far_cuts: cuts(far_cut),
-            cuts: cuts(plan.filter.bounds),
-            origins: sources.all.iter().map(|s| Origins::of(s.scan.info())).collect(),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
             store,
             memory: &rt.memory,
@@ -125,18 +117,17 @@ impl<'a> Pass<'a> {
     }
 
     fn read(&self) -> Result<(Stats, Collected, Reservation), ConvertError> {
-        let pieces = |(s, source): (usize, &Source)| (0..source.scan.pieces().len()).map(move |p| (s, p));
-        let pieces: Vec<(usize, usize)> = self.context.sources.all.iter().enumerate().flat_map(pieces).collect();
+        let sources = self.context.sources;
         let parts = self.rt.in_parallel(
-            pieces.len(),
-            || (Worker::new(&self.context), Scratch::default()),
-            |(worker, scratch), unit| {
-                let (source, piece) = pieces[unit];
-                self.piece(source, piece, worker, scratch)
+            sources.pieces(),
+            || Reader { worker: Worker::new(&self.context), visit: None, scratch: Scratch::default() },
+            |reader, unit| {
+                let (source, piece) = sources.piece(unit);
+                self.piece(source, piece, reader)
             },
-            |(worker, _)| worker.finish(),
+            |reader| reader.finish(&self.context),
         )?;
-        let mut stats = Stats::new(&self.context.intake.schema, self.context.sources.all.len());
+        let mut stats = Stats::new(&self.context.intake.schema);
         let mut collected = Collected::default();
         let mut room = Reservation::new(&self.rt.memory, Consumer::Cells);
         for part in parts {
@@ -145,27 +136,31 @@ impl<'a> Pass<'a> {
             collected.merge(more);
             room.merge(taken);
         }
+        let mut seen = self.context.seen.lock().map_err(|_| ConvertError::Internal("a worker thread failed".into()))?;
+        stats.sources = std::mem::take(&mut seen);
         Ok((stats, collected, room))
     }
 
     /// Decodes one piece; what a broken piece held is counted or is an error, by policy.
-    fn piece(
-        &self,
-        source: usize,
-        piece: usize,
-        worker: &mut Worker<'_>,
-        scratch: &mut Scratch,
-    ) -> Result<(), ConvertError> {
-        let scan = &self.context.sources.all[source].scan;
+    fn piece<'s>(&'s self, source: usize, piece: usize, reader: &mut Reader<'s>) -> Result<(), ConvertError> {
+        let Reader { worker, visit, scratch } = reader;
+        if let Some(left) = visit.take_if(|visit| visit.index != source) {
+            left.end(&self.context)?;
+        }
+        let visit = match visit {
+            Some(visit) => visit,
+            None => visit.insert(Visit::begin(&self.context, source)?),
+        };
+        let scan = Arc::clone(&visit.scan);
         let mut outcome = Ok(());
         let mut points = 0u64;
-        let decoded = scan.decode(piece, &self.context.intake.sources[source].wanted, scratch, &mut |batch| {
+        let decoded = scan.decode(piece, &visit.intake.wanted, scratch, &mut |batch| {
             outcome = self.rt.check_stop();
             if outcome.is_err() {
                 return ControlFlow::Break(());
             }
             points += batch.len() as u64;
-            outcome = worker.take(source, batch);
+            outcome = worker.take(visit, batch);
             self.rt.advance(batch.len() as u64);
             if outcome.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
@@ -189,6 +184,22 @@ impl<'a> Pass<'a> {
             Err(error) if error.advice().is_none() => Err(error.advise(Advice::SkipUnreadable).into()),
             Err(error) => Err(error.into()),
         }
+    }
+}
+
+/// What a thread works with.
+struct Reader<'a> {
+    worker: Worker<'a>,
+    /// The source that was read last: the next piece may be one of it.
+    visit: Option<Visit<'a>>,
+    scratch: Scratch,
+}
+
+impl Reader<'_> {
+    /// Hands over everything that was gathered and measured.
+    fn finish(self, pass: &Context<'_>) -> Result<(Stats, Collected, Reservation), ConvertError> {
+        self.visit.map_or(Ok(()), |visit| visit.end(pass))?;
+        self.worker.finish()
     }
 }
 
@@ -226,15 +237,6 @@ fn finished(mut nodes: Vec<(NodeKey, CellPart)>) -> Vec<Cell> {
         Cell::new(key, part.segments, part.moments)
     };
     nodes.into_iter().map(cell).collect()
-}
-
-/// The axes on which the points of a source have to prove a claim: a lattice that does not hold the claimed grid moves
-/// them anyway.
-fn claims(source: &Source, lattice: &Lattice) -> [bool; 3] {
-    std::array::from_fn(|a| {
-        let job = AxisGrid { step: lattice.scale[a], offset: lattice.offset[a] };
-        matches!(source.survey.fineness[a], Fineness::Grid { grid, is_claim: true } if job.holds(&grid))
-    })
 }
 
 /// True if no coordinate moved by more than the rounding of doubles.

@@ -3,6 +3,7 @@
 use pointmill_format::{AttributeType, Changes, Column, with_column};
 
 use super::context::Context;
+use super::visit::Visit;
 use crate::cloud::Stats;
 use crate::sources::doubled;
 
@@ -10,12 +11,12 @@ use crate::sources::doubled;
 const GREATEST_CLASS: f64 = 16_777_216.0;
 
 /// What colour values mean is a property of the whole file: points that are omitted count as well.
-pub(super) fn unfiltered_colour(pass: &Context<'_>, source: usize, columns: &[&Column], stats: &mut Stats) {
-    let places = &pass.intake.sources[source].columns;
+pub(super) fn unfiltered_colour(pass: &Context<'_>, visit: &mut Visit<'_>, columns: &[&Column]) {
+    let places = &visit.intake.columns;
     let Some(rgb) = pass.intake.schema.rgb() else { return };
     let colour = columns.iter().zip(places).find(|(_, place)| **place == Some(rgb));
     if let Some((column, _)) = colour {
-        stats.sources[source].rgb_unfiltered.include(column, None);
+        visit.seen.rgb_unfiltered.include(column, None);
     }
 }
 
@@ -23,7 +24,7 @@ pub(super) fn unfiltered_colour(pass: &Context<'_>, source: usize, columns: &[&C
 /// they are stored.
 pub(super) fn add(
     pass: &Context<'_>,
-    source: usize,
+    visit: &mut Visit<'_>,
     read: &[&Column],
     points: usize,
     selection: Option<&[u32]>,
@@ -31,7 +32,7 @@ pub(super) fn add(
 ) {
     let schema = &pass.intake.schema;
     let rgb = schema.rgb();
-    let columns = &pass.intake.sources[source].columns;
+    let columns = &visit.intake.columns;
     for (column, place) in read.iter().zip(columns) {
         let Some(place) = *place else { continue };
         let attribute = &schema.attributes[place];
@@ -39,7 +40,7 @@ pub(super) fn add(
             stats.count_doubled(place, &doubled(column, attribute.elements, selection));
         }
         if Some(place) == rgb {
-            stats.sources[source].rgb.include(column, selection);
+            visit.seen.rgb.include(column, selection);
         } else {
             stats.ranges[place].include(column, selection);
         }
@@ -53,10 +54,10 @@ pub(super) fn add(
             }
         }
     }
-    for place in (0..schema.attributes.len()).filter(|p| !columns.contains(&Some(*p))) {
+    for place in (0..schema.attributes.len()).filter(|p| !visit.intake.has(Some(*p))) {
         // What this source does not have is stored as zeros.
         if Some(place) == rgb {
-            stats.sources[source].rgb.add(0.0);
+            visit.seen.rgb.add([0; 3]);
         } else {
             stats.ranges[place].add(0.0);
         }

@@ -3,6 +3,7 @@
 use pointmill_format::{Aabb, Column, Lattice, PointBatch, Positions, with_column};
 
 use super::context::Context;
+use super::visit::Visit;
 use crate::cloud::Stats;
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{OnFault, OriginPoints};
@@ -10,21 +11,18 @@ use crate::plan::{OnFault, OriginPoints};
 /// Fills `selection` with the points that pass the filter; false if all do.
 pub(super) fn select(
     pass: &Context<'_>,
-    source: usize,
+    visit: &mut Visit<'_>,
     batch: &PointBatch,
     stats: &mut Stats,
     selection: &mut Vec<u32>,
 ) -> Result<bool, ConvertError> {
-    let scan = &pass.sources.all[source].scan;
     let filter = &pass.plan.filter;
-    let bounds = world_bounds(scan.info().lattice.as_ref(), &batch.positions);
-    stats.sources[source].bounds = stats.sources[source].bounds.union(&bounds);
-    let cut = pass.cuts[source].as_ref();
-    let origins = &pass.origins[source];
-    let at_origin = origins.count(batch);
-    stats.sources[source].at_origin += at_origin;
+    let bounds = world_bounds(visit.lattice(), &batch.positions);
+    visit.seen.bounds = visit.seen.bounds.union(&bounds);
+    let at_origin = visit.origins.count(batch);
+    visit.seen.at_origin += at_origin;
     let skips_origin = filter.origin_points == OriginPoints::Skip && at_origin > 0;
-    let far_cut = pass.far_cuts[source].as_ref();
+    let (info, cut, far_cut) = (visit.info(), visit.cut.as_ref(), visit.far_cut.as_ref());
     let all_inside = [cut, far_cut].into_iter().flatten().all(|cut| cut.holds_all(&batch.positions));
     let all_finite = match &batch.positions {
         Positions::Quantized(_) => true,
@@ -33,7 +31,7 @@ pub(super) fn select(
     if filter.every < 2 && all_inside && filter.classes.is_none() && all_finite && !skips_origin {
         return Ok(false);
     }
-    let class_column = scan.info().attributes.iter().position(|a| a.name == "classification");
+    let class_column = info.attributes.iter().position(|a| a.name == "classification");
     let classes = class_column.map(|c| &batch.columns[c]).filter(|_| filter.classes.is_some()).map(whole_numbers);
     let is_finite = |i: usize| match &batch.positions {
         Positions::Quantized(_) => true,
@@ -47,11 +45,11 @@ pub(super) fn select(
         }
         if !is_finite(i) {
             if pass.plan.invalid == OnFault::Fail {
-                let path = scan.info().path.clone();
+                let path = info.path.clone();
                 return Err(InputFault::InvalidPosition { path, point: batch.first_point + i as u64 }.into());
             }
             stats.invalid += 1;
-        } else if skips_origin && origins.hold(batch, i) {
+        } else if skips_origin && visit.origins.hold(batch, i) {
             stats.origin_skipped += 1;
         } else if cut.is_some_and(|cut| !cut.holds(&batch.positions, i)) {
             stats.outside_bounds += 1;

@@ -91,7 +91,7 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
         self.records.clear();
         os_hints::reserve(&mut self.records, chunk.points.max(self.plan.usual_points) as usize * frame.stride);
         for segment in &chunk.segments {
-            ledger.load(store, *segment, frame.stride, &facts.widen_rgb, &mut self.records)?;
+            ledger.load(store, *segment, frame.stride, &facts.widening, &mut self.records)?;
         }
         Ok(())
     }

@@ -23,9 +23,7 @@ pub(super) fn build(
     let mut ledger = Ledger::default();
     // points of one place are in order of their bytes
     let mut sort = BigSort::new(rt, frame.stride, memory_bytes, |a: &[u8], b: &[u8]| a.cmp(b));
-    sort.fill(&chunk.segments, |segment, records| {
-        ledger.load(store, segment, frame.stride, &facts.widen_rgb, records)
-    })?;
+    sort.fill(&chunk.segments, |segment, records| ledger.load(store, segment, frame.stride, &facts.widening, records))?;
     let file = rt.temp.make()?;
     let is_dropped = plan.cloud.plan.duplicates == Duplicates::Drop;
     let (mut bytes, mut written, mut last) = (Vec::new(), 0u64, Vec::new());

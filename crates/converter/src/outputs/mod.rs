@@ -14,3 +14,4 @@ pub(crate) use attributes::choose as choose_attributes;
 pub use output::Target;
 pub(crate) use output::{DiskSize, check, wants};
 pub(crate) use staging::StagedFolder;
+pub use staging::{StagedFiles, resolve_path};

@@ -129,7 +129,7 @@ pub enum PlanFault {
         what: String,
     },
     /// WKT of a system without a name.
-    #[error("the WKT \"{0}\" has no name")]
+    #[error("the WKT \"{0}\" has no name in quotes")]
     EmptyWkt(String),
     /// A cell that the format of batches cannot have with this cloud.
     #[error("{0}")]

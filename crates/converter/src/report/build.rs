@@ -1,6 +1,9 @@
 //! Puts the account of a run together.
 
-use pointmill_format::{Aabb, DatasetKind};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use pointmill_format::{Aabb, Crs, DatasetKind};
 use serde_json::{Map, Value, json};
 
 use super::types::{
@@ -13,7 +16,7 @@ use crate::memory;
 use crate::plan::{AttributeChoice, Filter, OriginPoints, Plan};
 use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
-use crate::sources::{Sources, resolve_crs};
+use crate::sources::{Source, Sources, resolve_crs};
 
 /// What a run has to show for itself, beside the cloud.
 pub(crate) struct Account {
@@ -31,10 +34,12 @@ pub(crate) struct Account {
 ///
 /// # Errors
 /// Points that do not add up.
-pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
-    let stats = &cloud.stats;
+pub(crate) fn report(mut cloud: Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
     let Account { settings, other_files, outputs, temp_bytes, phases, seconds } = account;
-    let of_outputs = outputs.iter().flat_map(|o| &o.warnings);
+    let mut warnings = std::mem::take(&mut cloud.warnings);
+    cloud.cells = Vec::new();
+    warnings.extend(outputs.iter().flat_map(|o| &o.warnings).cloned());
+    let (cloud, stats) = (&cloud, &cloud.stats);
     Ok(Report {
         version: env!("CARGO_PKG_VERSION").into(),
         options: settings,
@@ -47,7 +52,7 @@ pub(crate) fn report(cloud: &Cloud<'_>, account: Account) -> Result<Report, Conv
         checksum_in: stats.checksum.to_string(),
         temp_bytes,
         output_bytes: outputs.iter().map(|o| o.bytes).sum(),
-        warnings: cloud.warnings.iter().chain(of_outputs).cloned().collect(),
+        warnings,
         outputs,
         phases: phases.iter().map(|p| phase_report(p, cloud.points())).collect(),
         seconds,
@@ -95,23 +100,23 @@ fn phase_report(time: &PhaseTime, points: u64) -> PhaseReport {
 /// The inputs as the headers (and, once they were read, the points) describe them.
 pub(crate) fn input_reports(sources: &Sources, cloud: Option<&Cloud<'_>>) -> Vec<InputReport> {
     let flat = |b: Aabb| [b.min[0], b.min[1], b.min[2], b.max[0], b.max[1], b.max[2]];
-    let report = |(i, source): (usize, &crate::sources::Source)| {
-        let info = source.scan.info();
+    // systems that scans share are resolved once
+    let mut labels: HashMap<*const Crs, Arc<str>> = HashMap::new();
+    let report = |(i, source): (usize, &Source)| {
         let seen = cloud.map(|c| &c.stats.sources[i]);
-        let coloured = cloud.filter(|c| c.intake.sources[i].has(c.schema().rgb()));
+        let coloured = cloud.filter(|c| c.intake.of(source).has(c.schema().rgb()));
+        let label = labels.entry(Arc::as_ptr(&source.crs)).or_insert_with(|| resolve_crs(&source.crs).label.into());
         InputReport {
-            path: info.path.clone(),
-            format: info.format.clone(),
-            points_declared: info.points_declared,
+            path: Arc::clone(&source.path),
+            format: Arc::clone(&source.format),
+            points_declared: source.points_declared,
             points_read: seen.map_or(0, |s| s.read),
             points_at_origin: seen.map_or(0, |s| s.at_origin),
-            bounds_declared: info.bounds_declared.map(flat),
+            bounds_declared: source.bounds_declared.map(flat),
             bounds_measured: seen.map(|s| s.bounds).filter(|b| !b.is_empty()).map(flat),
-            resolution: source
-                .survey
-                .resolution(&seen.map(|s| s.bounds).or(info.bounds_declared).unwrap_or(Aabb::EMPTY)),
-            crs: resolve_crs(&info.crs).label,
-            rgb_depth: coloured.map(|c| if c.facts.widen_rgb[i].is_some() { 8 } else { 16 }),
+            resolution: source.stored.steps(&seen.map(|s| s.bounds).or(source.bounds_declared).unwrap_or(Aabb::EMPTY)),
+            crs: Arc::clone(label),
+            rgb_depth: coloured.map(|c| if c.facts.widening.is_narrow(i) { 8 } else { 16 }),
         }
     };
     sources.all.iter().enumerate().map(report).collect()

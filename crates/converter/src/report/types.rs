@@ -1,6 +1,7 @@
 //! The account of a run as data. Serialises to the JSON of `report.json`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use pointmill_format::Changes;
 use serde::ser::SerializeStruct;
@@ -86,15 +87,16 @@ pub struct OutputReport {
     pub warnings: Vec<Warning>,
 }
 
-/// One input.
-#[derive(Debug, Clone, Default, Serialize)]
+/// One input. There may be very many: what they have in common they share.
+#[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct InputReport {
     /// The file; serialised as text, with U+FFFD for what is no Unicode in its name.
     #[serde(serialize_with = "lossy")]
-    pub path: PathBuf,
+    pub path: Arc<Path>,
     /// Its kind, for people.
-    pub format: String,
+    #[serde(serialize_with = "text")]
+    pub format: Arc<str>,
     /// Claimed by the header.
     pub points_declared: u64,
     /// Decoded.
@@ -109,7 +111,8 @@ pub struct InputReport {
     /// How finely the file stores these coordinates, per axis, world units; null: in doubles that show no step.
     pub resolution: [Option<f64>; 3],
     /// As found, shortened for people ("EPSG:2994", "WKT: NAD83 / …") or empty.
-    pub crs: String,
+    #[serde(serialize_with = "text")]
+    pub crs: Arc<str>,
     /// 8 or 16 where the file has colour.
     pub rgb_depth: Option<u8>,
 }
@@ -201,6 +204,10 @@ impl OtherFilesReport {
 /// File names need not be Unicode, JSON must be.
 fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
+}
+
+fn text<S: Serializer>(text: &Arc<str>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(text)
 }
 
 /// The lattice and the cube.

@@ -27,7 +27,7 @@ impl<'a> Clock<'a> {
         Self { events, start: now, phase_start: now, phase: None, done: Vec::new() }
     }
 
-    /// Ends the current phase and begins another; `total` is its size in points (0: unknown).
+    /// Ends the current phase and begins another; `total` is its size in its unit (0: unknown).
     pub(crate) fn begin(&mut self, phase: Phase, total: u64) {
         self.close();
         self.phase = Some(phase);

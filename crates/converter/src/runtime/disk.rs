@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill_format::bytes;
 
-use super::os_hints;
+use super::{os_files, os_hints};
 use crate::error::ConvertError;
 
 /// Something that is about to be done to the disk.
@@ -34,6 +34,23 @@ pub trait Disk: Debug + Send + Sync {
     /// # Errors
     /// What the operation fails with.
     fn permit(&self, operation: DiskOperation) -> io::Result<()>;
+
+    /// The best way in which an output can be replaced; what the file system cannot do is not done, whatever this says.
+    fn replacing(&self) -> Replacing {
+        Replacing::AtOnce
+    }
+}
+
+/// How a folder takes the place of another, from the best way to the worst.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Replacing {
+    /// The names change places.
+    AtOnce,
+    /// The old folder is moved aside, then the new one to its place.
+    InTwoSteps,
+    /// What is in the folder is moved, as in a mounted folder, which cannot be.
+    EntryByEntry,
 }
 
 /// The file system as it is.
@@ -57,26 +74,26 @@ pub(crate) struct DiskFile {
 }
 
 impl DiskFile {
-    /// Makes the file `path`.
-    pub(crate) fn create(path: &Path, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+    /// Makes the file `path`; errors name `shown`.
+    pub(crate) fn create(path: &Path, shown: PathBuf, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
         let create = || {
             disk.permit(DiskOperation::Create)?;
             File::options().read(true).write(true).create(true).truncate(true).open(path)
         };
-        let file = create().map_err(|e| ConvertError::io(path, "making the file", e))?;
-        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk), written: None })
+        let file = create().map_err(|e| ConvertError::io(&shown, "making the file", e))?;
+        Ok(Self { file, path: shown, disk: Arc::clone(disk), written: None })
     }
 
-    /// Opens the file `path`, which is there.
-    pub(crate) fn open(path: &Path, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+    /// Opens the file `path`, which is there; errors name `shown`.
+    pub(crate) fn open(path: &Path, shown: PathBuf, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
         let file = File::options().read(true).write(true).open(path);
-        let file = file.map_err(|e| ConvertError::io(path, "opening the file again", e))?;
-        Ok(Self { file, path: path.to_path_buf(), disk: Arc::clone(disk), written: None })
+        let file = file.map_err(|e| ConvertError::io(&shown, "opening the file again", e))?;
+        Ok(Self { file, path: shown, disk: Arc::clone(disk), written: None })
     }
 
     /// Writes all of `bytes` at `offset`; `doing` is for the error ("writing a leaf").
     pub(crate) fn write_at(&self, bytes: &[u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
-        self.try_write_at(bytes, offset).map_err(|e| ConvertError::io(&self.path, doing, e))
+        self.try_write_at(bytes, offset).map_err(|e| self.failed(doing, e))
     }
 
     fn try_write_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
@@ -89,7 +106,7 @@ impl DiskFile {
 
     /// Fills `buf` from `offset`.
     pub(crate) fn read_at(&self, buf: &mut [u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
-        bytes::read_exact_at(&self.file, buf, offset).map_err(|e| ConvertError::io(&self.path, doing, e))
+        bytes::read_exact_at(&self.file, buf, offset).map_err(|e| self.failed(doing, e))
     }
 
     /// Cuts or extends the file.
@@ -98,7 +115,7 @@ impl DiskFile {
             self.disk.permit(DiskOperation::Write)?;
             self.file.set_len(bytes)
         };
-        cut().map_err(|e| ConvertError::io(&self.path, doing, e))
+        cut().map_err(|e| self.failed(doing, e))
     }
 
     /// Waits until the file is safe.
@@ -107,12 +124,13 @@ impl DiskFile {
             self.disk.permit(DiskOperation::Sync)?;
             self.file.sync_all()
         };
-        sync().map_err(|e| ConvertError::io(&self.path, doing, e))
+        sync().map_err(|e| self.failed(doing, e))
     }
 
     /// The error of a writer on top of this file.
     pub(crate) fn failed(&self, doing: &'static str, error: io::Error) -> ConvertError {
-        ConvertError::io(&self.path, doing, error)
+        let error = ConvertError::io(&self.path, doing, error);
+        if self.written.is_some() { error.temporary() } else { error }
     }
 
     /// Asks the system to begin writing a range to the disk, without waiting.
@@ -145,7 +163,7 @@ impl TempFiles {
             self.disk.permit(DiskOperation::Create)?;
             tempfile::tempfile_in(&self.folder)
         };
-        let file = make().map_err(|e| ConvertError::io(&self.folder, "making a temporary file", e))?;
+        let file = make().map_err(|e| ConvertError::io(&self.folder, "making a temporary file", e).temporary())?;
         let written = Some(Arc::clone(&self.written));
         Ok(DiskFile { file, path: self.folder.clone(), disk: Arc::clone(&self.disk), written })
     }
@@ -208,4 +226,10 @@ pub(crate) fn create_folder(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
 pub(crate) fn rename(disk: &dyn Disk, from: &Path, to: &Path) -> io::Result<()> {
     disk.permit(DiskOperation::Rename)?;
     fs::rename(from, to)
+}
+
+/// What two paths lead to changes places; false: the file system cannot do that.
+pub(crate) fn exchange(disk: &dyn Disk, a: &Path, b: &Path) -> io::Result<bool> {
+    disk.permit(DiskOperation::Rename)?;
+    os_files::exchange(a, b)
 }

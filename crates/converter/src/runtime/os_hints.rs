@@ -1,4 +1,4 @@
-//! Hints to the operating system. The only `unsafe` code of the crate: calls that change no data.
+//! Hints to the operating system: calls that change no data.
 //!
 //! Large buffers in large pages: the kernel hands out memory in pages of 4 KiB, a fault for each; on the way from a LAS
 //! file to a dataset these faults were an eighth of all processor time. Asked for 2 MiB pages it faults 512 times less

@@ -5,10 +5,50 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::Runtime;
+use super::events::Events;
 use crate::error::ConvertError;
+use crate::warning::Warning;
 
-impl Runtime<'_> {
+/// The threads of a run, what they report, and the request that they stop.
+pub(crate) struct Workers<'a> {
+    /// Worker threads, ≥ 1.
+    pub(crate) threads: usize,
+    events: &'a dyn Events,
+    pool: rayon::ThreadPool,
+}
+
+impl<'a> Workers<'a> {
+    /// Starts the threads, at least one.
+    pub(crate) fn start(threads: usize, events: &'a dyn Events) -> Result<Self, ConvertError> {
+        let threads = threads.max(1);
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|i| format!("pointmill-{i}"))
+            .build()
+            .map_err(|e| ConvertError::Internal(format!("starting threads: {e}")))?;
+        Ok(Self { threads, events, pool })
+    }
+
+    /// Fails if the run was asked to stop.
+    pub(crate) fn check_stop(&self) -> Result<(), ConvertError> {
+        if self.events.stop_requested() { Err(ConvertError::Interrupted) } else { Ok(()) }
+    }
+
+    /// Where the request to stop comes from, for what outlives a borrow of this.
+    pub(crate) fn events(&self) -> &'a dyn Events {
+        self.events
+    }
+
+    /// Reports that `steps` more are done in the current phase.
+    pub(crate) fn advance(&self, steps: u64) {
+        self.events.advance(steps);
+    }
+
+    /// Reports something that the user should know at once.
+    pub(crate) fn warn(&self, warning: &Warning) {
+        self.events.warning(warning);
+    }
+
     /// Does units `0..count` in ascending order on all threads, each thread with a state; returns what became of the
     /// states.
     ///
@@ -77,21 +117,15 @@ fn panicked(unit: usize, count: usize, panic: &(dyn Any + Send)) -> ConvertError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Plan;
-    use crate::runtime::{Budget, Least, Silent, SystemDisk, TempFiles};
-    use std::sync::Arc;
+    use crate::runtime::Silent;
 
-    fn runtime(threads: usize) -> Runtime<'static> {
-        let mut plan = Plan::new(vec![], "out".into());
-        plan.threads = threads;
-        plan.memory_bytes = 1 << 30;
-        let budget = Budget::new(&plan, 38, Least::of([], 0, 0)).unwrap();
-        Runtime::start(&plan, budget, TempFiles::new(".".into(), Arc::new(SystemDisk)), &Silent).unwrap()
+    fn workers(threads: usize) -> Workers<'static> {
+        Workers::start(threads, &Silent).unwrap()
     }
 
     #[test]
     fn every_unit_is_done_once() {
-        let sums = runtime(3)
+        let sums = workers(3)
             .in_parallel(
                 1000,
                 || 0,
@@ -116,11 +150,11 @@ mod tests {
                 4..8 => panic!("four"),
                 _ => Ok(()),
             };
-            let error = runtime(4).in_parallel(100, || (), work, |()| ()).unwrap_err();
+            let error = workers(4).in_parallel(100, || (), work, |()| ()).unwrap_err();
             assert!(error.to_string().contains("three"), "{error}");
         }
         let error =
-            runtime(2).in_parallel(9, || (), |(), unit| if unit == 5 { panic!("five") } else { Ok(()) }, |()| ());
+            workers(2).in_parallel(9, || (), |(), unit| if unit == 5 { panic!("five") } else { Ok(()) }, |()| ());
         assert!(error.unwrap_err().to_string().contains("unit 5 of 9 panicked: five"));
     }
 }

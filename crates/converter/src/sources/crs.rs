@@ -14,6 +14,9 @@ mod resolved;
 mod vertical;
 mod wkt;
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use pointmill_format::Crs;
 
 use super::Source;
@@ -41,19 +44,13 @@ pub(crate) fn resolve_all(
         warnings.extend(target.notes.iter().cloned().map(Warning::Crs));
         return Ok(target);
     }
-    let mut found: Vec<&Crs> = Vec::new();
-    for source in sources {
-        let crs = &source.scan.info().crs;
-        if *crs != Crs::default() && !found.contains(&crs) {
-            found.push(crs);
-        }
-    }
-    let mut resolved: Vec<ResolvedCrs> = Vec::new();
-    for one in found.iter().copied().map(resolve_crs) {
-        if !resolved.iter().any(|r| r.is_same(&one)) {
-            resolved.push(one);
-        }
-    }
+    // scans that declare the same share it
+    let mut seen = HashSet::new();
+    let systems = sources.iter().map(|source| &source.crs).filter(|crs| seen.insert(Arc::as_ptr(crs)));
+    let found: Vec<&Crs> = systems.map(|crs| &**crs).filter(|crs| **crs != Crs::default()).collect();
+    let mut kinds = HashSet::new();
+    let resolved = found.iter().copied().map(resolve_crs);
+    let mut resolved: Vec<ResolvedCrs> = resolved.filter(|one| kinds.insert(one.kind())).collect();
     let one = match (&plan.crs, resolved.len()) {
         (Some(text), _) => given(text.trim(), &found, &resolved)?,
         (None, 0) => ResolvedCrs::default(),
@@ -109,6 +106,7 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
     }
     match wkt::is_wkt(text) {
         true if !wkt::is_whole(text) => fault(PlanFault::CutWkt),
+        true if !wkt::has_quoted_name(text) => fault(PlanFault::EmptyWkt),
         true if wkt::is_followed(text) => fault(PlanFault::LongWkt),
         true if wkt::read(text).is_some_and(|system| system.name.trim().is_empty()) => fault(PlanFault::EmptyWkt),
         true => Ok(resolve_crs(&Crs::new(Some(text.to_owned()), None, None))),

@@ -2,9 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{Aabb, AxisGrid, PointBatch, Positions, Scan, ScanInfo, Scratch, Wanted};
+use pointmill_format::{Aabb, AxisGrid, Lattice, PointBatch, Positions, Scan, Scratch, Wanted};
 
 use super::decimals::{PARTS_OF_EXTENT, tidy_product};
+use super::open_scans::OpenScans;
+use super::source::Source;
+use super::survey::Fineness;
+use crate::error::ConvertError;
 
 /// Integers of 32 bits have no larger power of ten in common.
 const MOST_TENS: u64 = 1_000_000_000;
@@ -36,14 +40,27 @@ pub(super) struct Divisors(Vec<[Integers; 3]>);
 
 impl Divisors {
     /// Looks at the first points of some of the scans.
-    pub(super) fn of(scans: &[Box<dyn Scan>]) -> Self {
-        let with_lattice: Vec<_> = scans.iter().filter(|s| is_worth_a_look(s.info())).collect();
+    pub(super) fn of(sources: &[Source], open: &OpenScans) -> Result<Self, ConvertError> {
+        let with_lattice: Vec<usize> = (0..sources.len()).filter(|i| is_worth_a_look(&sources[*i])).collect();
         let step = with_lattice.len().div_ceil(SCANS).max(1);
-        Self(with_lattice.into_iter().step_by(step).filter_map(|s| sample(&**s)).collect())
+        let mut samples = Vec::new();
+        for i in with_lattice.into_iter().step_by(step) {
+            samples.extend(sample(&*open.get(i, &sources[i])?));
+        }
+        Ok(Self(samples))
+    }
+
+    /// How finely coordinates on a lattice are stored, on each axis.
+    pub(super) fn fineness(&self, lattice: &Lattice) -> [Fineness; 3] {
+        std::array::from_fn(|a| {
+            let grid = AxisGrid { step: lattice.scale[a], offset: lattice.offset[a] };
+            let coarser = self.grid(a, grid);
+            Fineness::Grid { grid: coarser.unwrap_or(grid), is_claim: coarser.is_some() }
+        })
     }
 
     /// The coarser grid that the integers of files with that `grid` lie on, if there is one.
-    pub(super) fn grid(&self, axis: usize, grid: AxisGrid) -> Option<AxisGrid> {
+    fn grid(&self, axis: usize, grid: AxisGrid) -> Option<AxisGrid> {
         let same = || self.0.iter().filter(|s| s.iter().any(|i| i.scale == grid.step));
         // one step for all axes that have one in the file, or the cube would be skewed
         let all = || same().flatten().filter(|i| i.scale == grid.step);
@@ -61,10 +78,10 @@ impl Divisors {
     }
 }
 
-fn is_worth_a_look(info: &ScanInfo) -> bool {
-    let Some(lattice) = info.lattice else { return false };
+fn is_worth_a_look(source: &Source) -> bool {
+    let Some(lattice) = source.stored.lattice else { return false };
     let many = |b: Aabb| (0..3).any(|a| (b.max[a] - b.min[a]) / lattice.scale[a] > MANY_STEPS);
-    info.points_declared <= FEW_POINTS || info.bounds_declared.is_none_or(many)
+    source.points_declared <= FEW_POINTS || source.bounds_declared.is_none_or(many)
 }
 
 /// The first batch of a scan.

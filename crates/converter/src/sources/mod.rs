@@ -1,42 +1,56 @@
-//! What the headers say, put together: open scans and the union of their attributes. Nothing changes it later.
+//! What the headers say, put together: all scans and the union of their attributes. Nothing changes it later.
 
+mod bytes;
 mod crs;
 mod decimals;
 mod divisor;
+mod open_scans;
+mod opener;
+mod probe;
 mod recast;
+mod same;
 mod schema;
+mod shared;
+mod source;
 mod survey;
 mod union;
 
-use pointmill_format::{Aabb, Advice, ErrorKind, ReadError, Scan};
+use std::cmp::Reverse;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use pointmill_format::{Aabb, Attribute, Scan, Wanted};
 
 pub(crate) use crs::resolve_all as resolve_crs_of_all;
 pub use crs::{ResolvedCrs, resolve_crs};
 pub(crate) use decimals::tidy_product;
 pub(crate) use recast::{Recast, doubled};
 pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema};
+pub(crate) use source::Source;
 #[cfg(test)]
-pub(crate) use survey::Extent;
-pub(crate) use survey::{Fineness, Survey, far_out, intersection, single_step};
-pub(crate) use union::{Placed, Union};
+pub(crate) use source::Stored;
+pub(crate) use survey::{Fineness, far_out, intersection, single_step};
+pub(crate) use union::Layout;
 
 use self::divisor::Divisors;
+use self::open_scans::OpenScans;
+use self::opener::Opener;
+use self::probe::{Outcome, Probe, Probed};
+use self::shared::Shared;
+use self::union::Union;
 use crate::error::{ConvertError, InputFault};
-use crate::plan::{OnFault, Plan};
-use crate::runtime::Events;
-use crate::warning::{Warning, reason_of};
+use crate::plan::Plan;
+use crate::runtime::{Events, Workers};
+use crate::warning::Warning;
 
-/// The description of one file may take this part of the memory while it is opened.
-const DESCRIPTION_SHARE: u64 = 4;
+/// Inputs whose headers are looked at before what they have in common is put together.
+const AT_ONCE: usize = 1024;
 
-/// A scan, and where its columns are among all attributes.
-pub(crate) struct Source {
-    pub(crate) scan: Box<dyn Scan>,
-    /// Where each of its columns is in [`Sources::attributes`], and how it gets there.
-    pub(crate) columns: Vec<Placed>,
-    /// Where its points are, and how finely they are stored, as far as is known before they are read.
-    pub(crate) survey: Survey,
-}
+/// Scans that are asked what decoding takes; of others it is what decoding all columns takes.
+const MOST_ASKED: usize = 16;
+
+/// Threads that read headers: more only wait for the disk.
+const MOST_THREADS: usize = 32;
 
 /// Everything known before the first point is decoded.
 pub(crate) struct Sources {
@@ -44,70 +58,146 @@ pub(crate) struct Sources {
     pub(crate) all: Vec<Source>,
     /// The union of the attributes of all scans.
     pub(crate) attributes: Schema,
+    /// Where the columns of scans are among them: once for all scans that have the same.
+    pub(crate) layouts: Vec<Layout>,
     /// Points in the pieces of all scans.
     pub(crate) points_declared: u64,
     /// Points declared by headers but not there.
     pub(crate) points_missing: u64,
     pub(crate) warnings: Vec<Warning>,
+    /// What all inputs take of the memory until the end of the run, bytes; open scans aside: of these there are few.
+    pub(crate) bytes: u64,
+    open: OpenScans,
+}
+
+/// Headers as they come in.
+#[derive(Default)]
+struct Found {
+    all: Vec<Source>,
+    /// By source.
+    attributes: Vec<Arc<[Attribute]>>,
+    points_declared: u64,
+    points_missing: u64,
+    warnings: Vec<Warning>,
+}
+
+impl Found {
+    /// Adds the next input.
+    fn add(&mut self, outcome: Outcome, open: &OpenScans) -> Result<(), ConvertError> {
+        let mut probed = match outcome {
+            Outcome::Open(probed) => probed,
+            Outcome::Skipped(warning) => {
+                self.warnings.push(*warning);
+                return Ok(());
+            }
+        };
+        if let Some(scan) = probed.scan.take() {
+            open.keep(self.all.len(), scan)?;
+        }
+        let Probed { source, attributes, points, points_missing, mut warnings, .. } = *probed;
+        let first_unit = self.all.last().map_or(0, |last| last.first_unit + u64::from(last.pieces));
+        self.all.push(Source { first_unit, ..source });
+        self.attributes.push(attributes);
+        self.points_declared = self.points_declared.saturating_add(points);
+        self.points_missing = self.points_missing.saturating_add(points_missing);
+        self.warnings.append(&mut warnings);
+        Ok(())
+    }
+
+    fn combine(self, open: OpenScans) -> Result<Sources, ConvertError> {
+        let Self { mut all, attributes, points_declared, points_missing, mut warnings } = self;
+        if all.is_empty() {
+            return Err(InputFault::NoneReadable.into());
+        }
+        let union = Union::of(&attributes);
+        warnings.extend(union.warnings);
+        all.iter_mut().zip(union.layout_of).for_each(|(source, layout)| source.layout = layout);
+        let divisors = Divisors::of(&all, &open)?;
+        settle_fineness(&mut all, &divisors);
+        let (attributes, layouts) = (union.schema, union.layouts);
+        let bytes = bytes::of(&all, &layouts, warnings.len());
+        Ok(Sources { bytes, all, attributes, layouts, points_declared, points_missing, warnings, open })
+    }
 }
 
 impl Sources {
-    /// Opens all inputs of the plan, in order of path.
+    /// Looks at the headers of all inputs of the plan, in order of path, on its threads.
+    ///
+    /// # Errors
+    /// That of the first input that cannot be read, a ceiling of memory that is too small for so many, or the request to
+    /// stop.
     pub(crate) fn open(plan: &Plan, events: &dyn Events) -> Result<Self, ConvertError> {
-        let mut paths = plan.inputs.clone();
-        paths.sort();
+        let mut paths: Vec<&Path> = plan.inputs.iter().map(PathBuf::as_path).collect();
+        paths.sort_unstable();
         paths.dedup();
-        let mut warnings = Vec::new();
+        bytes::check(plan, bytes::least_bytes(&paths))?;
+        let workers = Workers::start(plan.threads.min(paths.len()).min(MOST_THREADS), events)?;
+        let open = OpenScans::new(Opener::new(plan, workers.threads), plan.threads);
+        let probe = Probe { open: &open, unreadable: plan.unreadable, shared: Mutex::new(Shared::default()) };
+        let mut found = Found { all: Vec::with_capacity(paths.len()), ..Found::default() };
         if !plan.other_files.is_empty() {
-            warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
+            found.warnings.push(Warning::OtherFiles { files: plan.other_files.clone() });
         }
-        warnings.extend(plan.skipped_inputs.iter().map(|(path, why)| Warning::InputSkipped {
+        found.warnings.extend(plan.skipped_inputs.iter().map(|(path, why)| Warning::InputSkipped {
             path: path.clone(),
             error: format!("{}: {why}", path.display()),
         }));
-        let mut scans: Vec<Box<dyn Scan>> = Vec::new();
-        let mut points_missing = 0u64;
-        let mut options = plan.open.clone();
-        options.description_bytes.get_or_insert(plan.memory_bytes / DESCRIPTION_SHARE);
-        for path in &paths {
-            let opened = pointmill_format::open_scan(path, &options);
-            match opened.and_then(|scan| Ok((missing_points(&*scan, plan.unreadable)?, scan))) {
-                Ok((missing, scan)) => {
-                    let noticed = scan.info().warnings.iter();
-                    warnings.extend(noticed.map(|w| Warning::Scan { path: path.clone(), warning: w.clone() }));
-                    points_missing = points_missing.saturating_add(missing);
-                    scans.push(scan);
-                }
-                Err(error) if plan.unreadable == OnFault::Skip && !matches!(error.kind(), ErrorKind::Unsupported) => {
-                    warnings.push(Warning::InputSkipped { path: path.clone(), error: reason_of(&error) });
-                }
-                Err(error) => return Err(error.into()),
+        for (round, some) in paths.chunks(AT_ONCE).enumerate() {
+            for outcome in probe.some(round * AT_ONCE, some, &workers)? {
+                found.add(outcome, &open)?;
             }
         }
-        if scans.is_empty() {
-            return Err(InputFault::NoneReadable.into());
-        }
-        let sources = Self::combine(scans, points_missing, warnings);
+        drop(probe);
+        let sources = found.combine(open)?;
+        bytes::check(plan, sources.bytes)?;
         sources.warnings.iter().for_each(|w| events.warning(w));
         Ok(sources)
     }
 
-    fn combine(scans: Vec<Box<dyn Scan>>, points_missing: u64, mut warnings: Vec<Warning>) -> Self {
-        let infos: Vec<_> = scans.iter().map(|s| s.info()).collect();
-        let union = Union::of(&infos);
-        warnings.extend(union.warnings);
-        let points_declared = scans.iter().flat_map(|s| s.pieces()).map(|p| p.points).sum();
-        let divisors = Divisors::of(&scans);
-        let sources = scans.into_iter().zip(union.columns).map(|(scan, columns)| {
-            let survey = Survey::of(&*scan, Some(&divisors));
-            Source { scan, columns, survey }
-        });
-        Self { all: sources.collect(), attributes: union.schema, points_declared, points_missing, warnings }
+    /// The scan of a source, open.
+    ///
+    /// # Errors
+    /// The file cannot be opened again, or was changed since its header was read.
+    pub(crate) fn scan(&self, source: usize) -> Result<Arc<dyn Scan>, ConvertError> {
+        self.open.get(source, &self.all[source])
+    }
+
+    /// The most that decoding takes on one thread, bytes. `wanted`: the columns that are read of a source.
+    ///
+    /// # Errors
+    /// As [`Self::scan`].
+    pub(crate) fn decode_bytes<'w>(&self, wanted: impl Fn(&Source) -> &'w Wanted) -> Result<u64, ConvertError> {
+        // scans that take the same for the same columns are alike: one of each is asked, those that take most first
+        let mut kinds: Vec<(u64, u32, usize)> =
+            self.all.iter().enumerate().map(|(i, s)| (s.decode_bytes, s.layout, i)).collect();
+        kinds.sort_unstable_by_key(|(bytes, layout, i)| (Reverse(*bytes), *layout, *i));
+        kinds.dedup_by_key(|(bytes, layout, _)| (*bytes, *layout));
+        let mut most = 0;
+        for (asked, (bytes, _, i)) in kinds.into_iter().enumerate() {
+            if bytes <= most {
+                break;
+            }
+            let own = if asked < MOST_ASKED { self.scan(i)?.decode_bytes(wanted(&self.all[i])) } else { bytes };
+            most = own.max(most);
+        }
+        Ok(most)
+    }
+
+    /// The number of pieces of all scans.
+    pub(crate) fn pieces(&self) -> usize {
+        self.all.last().map_or(0, |last| (last.first_unit + u64::from(last.pieces)) as usize)
+    }
+
+    /// The source of the piece with that number among those of all scans, and which of its pieces it is.
+    pub(crate) fn piece(&self, number: usize) -> (usize, usize) {
+        // sources without pieces begin where the next one does
+        let source = self.all.partition_point(|s| s.first_unit <= number as u64).saturating_sub(1);
+        (source, number - self.all.get(source).map_or(0, |s| s.first_unit as usize))
     }
 
     /// What the headers claim (or a sample shows) of where the points are, cut by the filter; a hint.
     pub(crate) fn bounds_hint(&self, cut: Option<&Aabb>) -> Option<Aabb> {
-        let extents = self.all.iter().filter_map(|s| s.survey.extent.as_ref());
+        let extents = self.all.iter().filter_map(|s| s.extent.as_ref());
         let all = extents.fold(Aabb::EMPTY, |all, e| all.union(&e.bounds));
         let hint = match cut {
             Some(cut) if !all.is_empty() => intersection(&all, cut),
@@ -117,14 +207,28 @@ impl Sources {
     }
 }
 
-/// Points that the header declares and the file does not hold; an error if the policy says so.
-fn missing_points(scan: &dyn Scan, policy: OnFault) -> Result<u64, ReadError> {
-    let info = scan.info();
-    let found: u64 = scan.pieces().iter().map(|p| p.points).sum();
-    let missing = info.points_declared.saturating_sub(found);
-    if missing > 0 && policy == OnFault::Fail {
-        let fault = pointmill_format::Fault::PointsMissing { declared: info.points_declared, found };
-        return Err(ReadError::broken(&info.path, info.file_bytes, fault).advise(Advice::SkipUnreadable));
+#[cfg(test)]
+impl Sources {
+    /// Sources whose headers alone matter.
+    pub(crate) fn of_headers(all: Vec<Source>) -> Self {
+        let open = OpenScans::new(Opener::new(&Plan::new(Vec::new(), "out".into()), 1), 1);
+        let attributes = Schema::new(Vec::new());
+        let (layouts, warnings) = (Vec::new(), Vec::new());
+        Self { all, attributes, layouts, points_declared: 0, points_missing: 0, warnings, bytes: 0, open }
     }
-    Ok(missing)
+}
+
+/// Takes the coarser grids that integers were found to lie on. Neighbours that store coordinates alike share how.
+fn settle_fineness(sources: &mut [Source], divisors: &Divisors) {
+    let mut last: Option<Arc<source::Stored>> = None;
+    for source in sources {
+        let Some(lattice) = &source.stored.lattice else { continue };
+        let fineness = divisors.fineness(lattice);
+        if fineness != source.stored.fineness {
+            let stored = source::Stored { fineness, ..(*source.stored).clone() };
+            let same = last.filter(|last| **last == stored);
+            source.stored = same.unwrap_or_else(|| Arc::new(stored));
+            last = Some(Arc::clone(&source.stored));
+        }
+    }
 }

@@ -6,7 +6,6 @@ use std::ops::ControlFlow;
 use pointmill_format::{Aabb, AxisGrid, Lattice, PointBatch, Positions, Resolution, Scan, Scratch, Wanted};
 
 use super::decimals::Decimals;
-use super::divisor::Divisors;
 
 /// Points looked at in each of three places of a scan without a lattice.
 const SAMPLE_POINTS: usize = 131_072;
@@ -42,6 +41,18 @@ pub(crate) enum Fineness {
     Double,
 }
 
+impl Fineness {
+    /// Differs where the fineness does.
+    pub(super) fn bits(self) -> [u64; 3] {
+        match self {
+            Self::Grid { grid, is_claim } => [1 + u64::from(is_claim), grid.step.to_bits(), grid.offset.to_bits()],
+            Self::Step(step) => [3, step.to_bits(), 0],
+            Self::Single => [4, 0, 0],
+            Self::Double => [5, 0, 0],
+        }
+    }
+}
+
 /// What is known of a source before it is read.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Survey {
@@ -50,43 +61,17 @@ pub(crate) struct Survey {
     pub(crate) fineness: [Fineness; 3],
 }
 
-/// Single precision that divides the longest side of a scan into fewer steps than this is worth a warning.
-const FEW_STEPS: f64 = 16_384.0;
-
 impl Survey {
-    /// How finely the file stores the coordinates of points within `bounds`, by axis; `None`: as doubles.
-    pub(crate) fn resolution(&self, bounds: &Aabb) -> [Option<f64>; 3] {
-        std::array::from_fn(|a| match self.fineness[a] {
-            Fineness::Grid { grid, .. } => Some(grid.step),
-            Fineness::Step(step) => Some(step),
-            Fineness::Single => single_step(bounds.min[a].abs().max(bounds.max[a].abs())),
-            Fineness::Double => None,
-        })
-    }
-
-    /// The resolution, where single precision makes it so coarse that the user should know.
-    pub(crate) fn coarse_single(&self, bounds: &Aabb) -> Option<[f64; 3]> {
-        if bounds.is_empty() || !self.fineness.contains(&Fineness::Single) {
-            return None;
-        }
-        let longest = bounds.extent().into_iter().fold(0.0, f64::max);
-        let steps = self.resolution(bounds).map(Option::unwrap_or_default);
-        let is_coarse =
-            |(step, fineness): (&f64, &Fineness)| *fineness == Fineness::Single && longest < step * FEW_STEPS;
-        (longest > 0.0 && steps.iter().zip(&self.fineness).any(is_coarse)).then_some(steps)
-    }
-
     /// Declared bounds, else those of a sample of the points; the lattice or resolution that the file states, else the
-    /// decimals of a sample. `divisors`: of the integers of scans with a lattice.
-    pub(super) fn of(scan: &dyn Scan, divisors: Option<&Divisors>) -> Self {
+    /// decimals of a sample. `stops`: true once the run is to end, and the result no longer matters.
+    pub(super) fn of(scan: &dyn Scan, stops: &dyn Fn() -> bool) -> Self {
         let info = scan.info();
         let declared = info.bounds_declared.filter(|b| info.lattice.is_some() || !far_out(b));
         let declared = declared.map(|bounds| Extent { bounds, is_sampled: false });
         if let Some(lattice) = info.lattice {
             let fineness = std::array::from_fn(|a| {
                 let grid = AxisGrid { step: lattice.scale[a], offset: lattice.offset[a] };
-                let coarser = divisors.and_then(|d| d.grid(a, grid));
-                Fineness::Grid { grid: coarser.unwrap_or(grid), is_claim: coarser.is_some() }
+                Fineness::Grid { grid, is_claim: false }
             });
             return Self { extent: declared, fineness };
         }
@@ -94,7 +79,7 @@ impl Survey {
         if declared.is_some() && !info.resolution.iter().any(is_open) {
             return Self { extent: declared, fineness: info.resolution.map(|r| stated(r, None)) };
         }
-        let Sample { bounds, decimals, is_whole } = sample(scan);
+        let Sample { bounds, decimals, is_whole } = sample(scan, stops);
         let sampled = (!bounds.is_empty()).then_some(Extent { bounds, is_sampled: !is_whole });
         let longest = [0, 1, 2].map(|a| bounds.max[a] - bounds.min[a]).into_iter().fold(0.0, f64::max);
         let fineness = std::array::from_fn(|a| stated(info.resolution[a], decimals[a].grid(longest)));
@@ -120,7 +105,7 @@ struct Sample {
 }
 
 /// Points from the start, the middle and the end. Pieces that cannot be decoded are reported later.
-fn sample(scan: &dyn Scan) -> Sample {
+fn sample(scan: &dyn Scan, stops: &dyn Fn() -> bool) -> Sample {
     let pieces = scan.pieces().len();
     let mut places = vec![0, pieces / 2, pieces.saturating_sub(1)];
     places.dedup();
@@ -139,7 +124,7 @@ fn sample(scan: &dyn Scan) -> Sample {
                 }
             }
             seen += batch.len();
-            if seen < SAMPLE_POINTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            if seen < SAMPLE_POINTS && !stops() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         sample.is_whole &= decoded.is_ok() && seen as u64 == scan.pieces()[place].points;
     }
@@ -159,16 +144,5 @@ mod tests {
     fn single_precision_has_its_step_at_the_largest_coordinate() {
         assert_eq!([500_000.0, 5_400_000.0, 100.0].map(single_step), [Some(0.031_25), Some(0.5), Some(2f64.powi(-17))]);
         assert_eq!(single_step(0.0), None);
-    }
-
-    #[test]
-    fn coarse_single_precision_is_worth_a_warning_and_a_fine_one_is_not() {
-        let survey = Survey { extent: None, fineness: [Fineness::Single; 3] };
-        let far = Aabb { min: [500_000.0, 5_400_000.0, 100.0], max: [500_100.0, 5_400_100.0, 110.0] };
-        assert_eq!(survey.coarse_single(&far), Some([0.031_25, 0.5, 2f64.powi(-17)]));
-        let near = Aabb { min: [-50.0; 3], max: [50.0; 3] };
-        assert_eq!(survey.coarse_single(&near), None);
-        let doubles = Survey { extent: None, fineness: [Fineness::Double; 3] };
-        assert_eq!((doubles.coarse_single(&far), doubles.resolution(&far)), (None, [None; 3]));
     }
 }

@@ -1,6 +1,9 @@
 //! The union of the attributes of all scans: which of them are the same quantity, and the type that holds it.
 
-use pointmill_format::{Attribute, AttributeType, ScanInfo};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use pointmill_format::{Attribute, AttributeType};
 
 use super::recast::{Linear, Recast, common_type};
 use super::schema::Schema;
@@ -35,10 +38,21 @@ const SCAN_ANGLE_STEP: f64 = 0.006;
 #[derive(Debug)]
 pub(crate) struct Union {
     pub(crate) schema: Schema,
-    /// By scan: its columns.
-    pub(crate) columns: Vec<Vec<Placed>>,
+    /// The columns of scans, once for those that have the same.
+    pub(crate) layouts: Vec<Layout>,
+    /// By scan: index of its layout.
+    pub(crate) layout_of: Vec<u32>,
     /// Attributes of one name that cannot be one.
     pub(crate) warnings: Vec<Warning>,
+}
+
+/// The columns of a scan.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Layout {
+    /// As the scan has them.
+    pub(crate) attributes: Arc<[Attribute]>,
+    /// Where each of them goes.
+    pub(crate) columns: Vec<Placed>,
 }
 
 /// Where a column goes.
@@ -53,31 +67,78 @@ pub(crate) struct Placed {
 impl Union {
     /// Attributes are the same if they mean the same quantity and have the same number of elements. Where type, scale or
     /// unit differ, the attribute gets a type that holds the values of all. The result depends on the order of `scans`
-    /// alone.
-    pub(crate) fn of(scans: &[&ScanInfo]) -> Self {
+    /// alone. Lists that scans share are looked at about once.
+    pub(crate) fn of<'a>(scans: impl IntoIterator<Item = &'a Arc<[Attribute]>>) -> Self {
         let mut entries: Vec<Entry> = Vec::new();
-        let place = |a: &Attribute| (Form::of(a), a.clone());
-        let forms: Vec<Vec<(Form, Attribute)>> =
-            scans.iter().map(|s| s.attributes.iter().map(place).collect()).collect();
-        let maps: Vec<Vec<usize>> = forms
-            .iter()
-            .map(|columns| {
-                let mut taken = Vec::new();
-                columns.iter().map(|(form, attribute)| join(&mut entries, form, attribute, &mut taken)).collect()
-            })
-            .collect();
+        let mut drafts: Vec<Draft> = Vec::new();
+        let mut latest: HashMap<*const Attribute, usize> = HashMap::new();
+        let mut layout_of = Vec::new();
+        for attributes in scans {
+            let known = latest.get(&attributes.as_ptr()).copied().filter(|draft| drafts[*draft].is_of(attributes));
+            let layout = match known {
+                Some(draft) if drafts[draft].settled_with == Some(entries.len()) => draft,
+                _ => {
+                    let draft = Draft::join(attributes, &mut entries);
+                    match known.filter(|known| drafts[*known].places == draft.places) {
+                        Some(known) => {
+                            drafts[known].settled_with = draft.settled_with;
+                            known
+                        }
+                        None => {
+                            drafts.push(draft);
+                            drafts.len() - 1
+                        }
+                    }
+                }
+            };
+            latest.insert(attributes.as_ptr(), layout);
+            layout_of.push(layout as u32);
+        }
         let rank = |e: &Entry| USUAL_ORDER.iter().position(|n| *n == e.name).unwrap_or(USUAL_ORDER.len());
         let mut order: Vec<usize> = (0..entries.len()).collect();
         order.sort_by_key(|&i| (rank(&entries[i]), i));
         let mut places = vec![0; entries.len()];
         order.iter().enumerate().for_each(|(new, &old)| places[old] = new);
-        let placed = |(entry, (form, _)): (&usize, &(Form, Attribute))| Placed {
+        let placed = |(entry, attribute): (&usize, &Attribute)| Placed {
             attribute: places[*entry],
-            recast: form.recast(&entries[*entry].form),
+            recast: Form::of(attribute).recast(&entries[*entry].form),
         };
-        let columns = maps.iter().zip(&forms).map(|(map, forms)| map.iter().zip(forms).map(placed).collect()).collect();
+        let layout = |Draft { attributes, places, .. }: &Draft| {
+            let columns = places.iter().zip(&**attributes).map(placed).collect();
+            Layout { attributes: Arc::clone(attributes), columns }
+        };
+        let layouts = drafts.iter().map(layout).collect();
         let warnings = entries.iter().filter_map(|e| e.apart.clone()).collect();
-        Self { schema: Schema::new(order.iter().map(|&i| entries[i].attribute()).collect()), columns, warnings }
+        let schema = Schema::new(order.iter().map(|&i| entries[i].attribute()).collect());
+        Self { schema, layouts, layout_of, warnings }
+    }
+}
+
+/// A list of attributes while the union is put together.
+struct Draft {
+    attributes: Arc<[Attribute]>,
+    /// By column: index in the entries.
+    places: Vec<usize>,
+    /// So many entries were there before the list joined them, and none more afterwards: as long as this is so, the same
+    /// list goes to the same places and changes nothing.
+    settled_with: Option<usize>,
+}
+
+impl Draft {
+    /// Adds a list to the union.
+    fn join(attributes: &Arc<[Attribute]>, entries: &mut Vec<Entry>) -> Self {
+        let before = entries.len();
+        let mut places = Vec::with_capacity(attributes.len());
+        for attribute in attributes.iter() {
+            let place = join(entries, &Form::of(attribute), attribute, &places);
+            places.push(place);
+        }
+        let settled_with = (entries.len() == before).then_some(before);
+        Self { attributes: Arc::clone(attributes), places, settled_with }
+    }
+
+    fn is_of(&self, attributes: &Arc<[Attribute]>) -> bool {
+        Arc::ptr_eq(&self.attributes, attributes)
     }
 }
 
@@ -167,7 +228,7 @@ impl Form {
 
 /// Index in `entries` of the attribute with the same meaning, added if there is none. `taken`: those that other columns
 /// of the scan have.
-fn join(entries: &mut Vec<Entry>, form: &Form, attribute: &Attribute, taken: &mut Vec<usize>) -> usize {
+fn join(entries: &mut Vec<Entry>, form: &Form, attribute: &Attribute, taken: &[usize]) -> usize {
     let is_colour = |a: &Attribute| a.ty == AttributeType::UInt16 && a.elements == 3;
     // The name of the colour is taken, for three `u16`.
     let is_false_colour = attribute.name == "rgb" && !is_colour(attribute);
@@ -182,7 +243,7 @@ fn join(entries: &mut Vec<Entry>, form: &Form, attribute: &Attribute, taken: &mu
         entries.iter().enumerate().position(|(i, e)| named(e) && is_same((i, e)))
     };
     let found = same(true).or_else(|| same(false));
-    let index = match found {
+    match found {
         Some(i) => {
             let entry = &mut entries[i];
             entry.form = entry.form.with(form);
@@ -196,9 +257,7 @@ fn join(entries: &mut Vec<Entry>, form: &Form, attribute: &Attribute, taken: &mu
             entries.push(Entry { name, form: form.alone(), first: attribute.clone(), apart });
             entries.len() - 1
         }
-    };
-    taken.push(index);
-    index
+    }
 }
 
 /// The name of an attribute, with a number if that is another one's; then also a warning.
@@ -223,20 +282,38 @@ mod tests {
     use super::*;
     use AttributeType as T;
 
-    fn scan(attributes: Vec<Attribute>) -> ScanInfo {
-        let mut info = ScanInfo::new("x", "", 0);
-        info.attributes = attributes.into();
-        info
-    }
-
     fn shown(union: &Union) -> String {
         let shown = |a: &Attribute| format!("{} {}x{}", a.name, a.ty, a.elements);
         union.schema.attributes.iter().map(shown).collect::<Vec<_>>().join(", ")
     }
 
     fn union(scans: &[Vec<Attribute>]) -> Union {
-        let scans: Vec<ScanInfo> = scans.iter().cloned().map(scan).collect();
-        Union::of(&scans.iter().collect::<Vec<_>>())
+        let scans: Vec<Arc<[Attribute]>> = scans.iter().map(|s| s.clone().into()).collect();
+        Union::of(&scans)
+    }
+
+    impl Union {
+        fn columns(&self, scan: usize) -> &[Placed] {
+            &self.layouts[self.layout_of[scan] as usize].columns
+        }
+    }
+
+    #[test]
+    fn lists_that_scans_share_go_where_they_would_go_one_by_one() {
+        let named =
+            |names: &[&str]| -> Vec<Attribute> { names.iter().map(|n| Attribute::new(*n, T::Float64, 1)).collect() };
+        // "timestamp" joins "time" until a scan has both
+        let lists = [named(&["time"]), named(&["timestamp"]), named(&["time", "timestamp"]), named(&["h"])];
+        let mut random = pointmill_testkit::Random::new(7);
+        for _ in 0..50 {
+            let order: Vec<usize> = (0..12).map(|_| random.below(4) as usize).collect();
+            let shared: Vec<Arc<[Attribute]>> = lists.iter().map(|l| l.clone().into()).collect();
+            let fast = Union::of(order.iter().map(|i| &shared[*i]));
+            let plain = union(&order.iter().map(|i| lists[*i].clone()).collect::<Vec<_>>());
+            assert_eq!(shown(&fast), shown(&plain));
+            (0..12).for_each(|i| assert_eq!(fast.columns(i), plain.columns(i), "{order:?} {i}"));
+            assert!(fast.layouts.len() <= 6 && plain.layouts.len() == 12);
+        }
     }
 
     #[test]
@@ -250,10 +327,10 @@ mod tests {
             ],
         ]);
         assert_eq!(shown(&u), "rgb uint16x3, intensity uint16x1, height doublex1");
-        let places: Vec<Vec<usize>> = u.columns.iter().map(|c| c.iter().map(|p| p.attribute).collect()).collect();
+        let places = [0, 1].map(|i| u.columns(i).iter().map(|p| p.attribute).collect::<Vec<_>>());
         assert_eq!(places, [vec![1, 2], vec![2, 0, 1]]);
-        assert_eq!(u.columns[0][1].recast, Some(Recast { ty: T::Float64, linear: None }));
-        assert!(u.columns[1].iter().all(|p| p.recast.is_none()) && u.warnings.is_empty());
+        assert_eq!(u.columns(0)[1].recast, Some(Recast { ty: T::Float64, linear: None }));
+        assert!(u.columns(1).iter().all(|p| p.recast.is_none()) && u.warnings.is_empty());
         assert_eq!((u.schema.offsets, u.schema.stride), (vec![12, 18, 20], 28));
     }
 
@@ -281,9 +358,9 @@ mod tests {
         assert_eq!(shown(&union(&[fine(), fine()])), "scan angle int16x1");
         let both = union(&[rank(), fine(), fine()]);
         assert_eq!(shown(&both), "scan angle doublex1");
-        let unit = |i: usize| both.columns[i][0].recast.as_ref().and_then(|r| Some(r.linear.as_ref()?.unit));
+        let unit = |i: usize| both.columns(i)[0].recast.as_ref().and_then(|r| Some(r.linear.as_ref()?.unit));
         assert_eq!((unit(0), unit(1), unit(2)), (None, Some(0.006), Some(0.006)));
-        assert_eq!(both.columns[0][0].recast, Some(Recast { ty: T::Float64, linear: None }));
+        assert_eq!(both.columns(0)[0].recast, Some(Recast { ty: T::Float64, linear: None }));
     }
 
     #[test]
@@ -292,7 +369,7 @@ mod tests {
         scaled.scale = vec![0.01];
         let u = union(&[vec![scaled.clone()], vec![Attribute::new("NormalX", T::Float32, 1)]]);
         assert_eq!((shown(&u), u.schema.attributes[0].scale.clone()), ("NormalX floatx1".to_owned(), vec![1.0]));
-        assert!(u.columns[0][0].recast.is_some() && u.columns[1][0].recast.is_none());
+        assert!(u.columns(0)[0].recast.is_some() && u.columns(1)[0].recast.is_none());
         scaled.name = "height".to_owned();
         let same = union(&[vec![scaled.clone()], vec![scaled.clone()]]);
         assert_eq!((shown(&same), same.schema.attributes[0].scale[0]), ("height int8x1".to_owned(), 0.01));

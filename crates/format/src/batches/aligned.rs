@@ -4,6 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::ReadError;
+use crate::bytes::open_file;
 
 /// A buffer whose start is aligned to 8 bytes, as the sections of [`super::Batches`] need it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -20,7 +21,7 @@ impl AlignedBytes {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = path.as_ref();
         let io = |doing: &'static str| move |e| ReadError::io(path, doing, e);
-        let mut file = std::fs::File::open(path).map_err(io("opening"))?;
+        let mut file = open_file(path).map_err(io("opening"))?;
         let size = file.metadata().map_err(io("asking for the size"))?.len();
         let mut bytes = Self::with_size(size, path)?;
         file.read_exact(bytes.as_mut()).map_err(io("reading"))?;

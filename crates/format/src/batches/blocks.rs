@@ -79,6 +79,9 @@ mod zstd_blocks {
     /// (RFC 8878, section 3.1.1.2).
     const MAX_RATIO: u64 = 32_768;
 
+    /// The largest block that is decompressed: 256 batches of 200 bytes a point.
+    const MAX_BLOCK_BYTES: u64 = 512 << 20;
+
     impl BlockScratch {
         /// The raw bytes of `slot`, out of a checked compressed `section` with `size` bytes per point; the pair says which
         /// section it is.
@@ -120,6 +123,9 @@ mod zstd_blocks {
             }
             if raw > (frame.len() as u64).saturating_mul(MAX_RATIO) {
                 return Err(broken(format!("claims {raw} bytes, more than {} compressed bytes can hold", frame.len())));
+            }
+            if raw > MAX_BLOCK_BYTES {
+                return Err(broken(format!("has {raw} bytes, at most {MAX_BLOCK_BYTES} are decompressed at once")));
             }
             let fits = usize::try_from(raw).ok().filter(|len| self.bytes.try_resize(*len).is_ok());
             fits.ok_or_else(|| broken(format!("has {raw} bytes, which do not fit memory")))?;

@@ -1,12 +1,12 @@
 //! The one place of this crate with `unsafe`: a file as a slice, without reading it.
 #![allow(unsafe_code)]
 
-use std::fs::File;
 use std::path::Path;
 
 use memmap2::Mmap;
 
 use crate::ReadError;
+use crate::bytes::open_file;
 
 use super::Batches;
 use super::read::file_at;
@@ -32,7 +32,7 @@ impl Batches<MappedFile> {
     /// The file cannot be opened or mapped, or those of [`Batches::from_bytes`].
     pub fn map(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = &file_at(path.as_ref());
-        let file = File::open(path).map_err(|e| ReadError::io(path, "opening", e))?;
+        let file = open_file(path).map_err(|e| ReadError::io(path, "opening", e))?;
         // SAFETY: the map is only read, and only as integers and floats, of which every bit pattern is one. What the
         // type system cannot exclude is another process that changes the file meanwhile; lengths and offsets were
         // checked at the start and are kept outside the map, so that changed bytes give wrong points, not wrong

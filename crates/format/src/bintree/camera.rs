@@ -61,13 +61,16 @@ pub struct Frustum {
     pub planes: [[f64; 4]; 6],
 }
 
+/// Directions are parallel below this square of the sine between them.
+const PARALLEL: f64 = 1e-24;
+
 impl Frustum {
     /// All planes: which of them a box may still be cut by.
     pub(super) const ALL: u8 = 0b11_1111;
 
     /// The frustum of a perspective camera at `position`.
     ///
-    /// `forward` and `up`: any length, not parallel. `fov_v`: vertical field of view, radians, below π. `aspect`: width
+    /// `forward` and `up`: any length; where they are parallel, as straight down, up is chosen. `fov_v`: vertical field of view, radians, below π. `aspect`: width
     /// over height. `near`, `far`: distances along `forward`, world units.
     #[must_use]
     pub fn perspective(
@@ -79,7 +82,15 @@ impl Frustum {
         [near, far]: [f64; 2],
     ) -> Self {
         let forward = unit(forward);
-        let right = unit(cross(forward, up));
+        let sideways = |up| cross(forward, unit(up));
+        let right = match sideways(up) {
+            across if dot(across, across) > PARALLEL => across,
+            _ => {
+                let least = (0..3).fold(0, |a, b| if forward[b].abs() < forward[a].abs() { b } else { a });
+                sideways(std::array::from_fn(|a| if a == least { 1.0 } else { 0.0 }))
+            }
+        };
+        let right = unit(right);
         let up = cross(right, forward);
         let slope = (fov_v / 2.0).tan();
         // A side plane holds the camera; its normal leans from the side towards the view.
@@ -170,6 +181,18 @@ mod tests {
         let choose = |range| Material::choose(range, 10.0);
         assert_eq!([[10.1, 20.0], [1.0, 9.9]].map(choose), [Material::Far, Material::Near]);
         assert_eq!([[10.0, 20.0], [1.0, 10.0], [0.0, 30.0]].map(choose), [Material::Both; 3]);
+    }
+
+    #[test]
+    fn a_camera_that_looks_straight_down_sees_what_is_below() {
+        let up = [0.0, 0.0, 1.0];
+        for (down, below) in [([0.0, 0.0, -3.0], -10.0), ([0.0, 0.0, 1.0], 10.0)] {
+            let f = Frustum::perspective([5.0, 5.0, 0.0], down, up, 90f64.to_radians(), 1.0, [1.0, 50.0]);
+            assert!(f.planes.iter().flatten().all(|v| v.is_finite()), "{f:?}");
+            assert!(
+                f.contains([5.0, 5.0, below]) && f.contains([14.0, 14.0, below]) && !f.contains([5.0, 5.0, -below])
+            );
+        }
     }
 
     #[test]

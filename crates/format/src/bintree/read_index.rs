@@ -9,20 +9,24 @@ use crate::bytes::ByteSource;
 use crate::{Aabb, ReadError};
 
 /// The header and all nodes in preorder. Memory: that of the nodes; the text is not kept.
-pub(super) fn read_index(source: &dyn ByteSource) -> Result<(Header, Vec<Node>), ReadError> {
-    parse(source).map_err(|fault| {
+/// More than `most_nodes` are not read.
+pub(super) fn read_index(source: &dyn ByteSource, most_nodes: usize) -> Result<(Header, Vec<Node>), ReadError> {
+    parse(source, most_nodes).map_err(|fault| {
         let path = source.locate(INDEX_FILE);
         let advice = "convert the sources again, or copy the folder again if it was whole elsewhere";
         match fault {
             Fault::Broken(at, what) => ReadError::broken(path, at, what).advise(advice),
             Fault::Unsupported(at, what) => ReadError::unsupported(path, what).at(at),
+            Fault::Memory(at) => {
+                ReadError::memory(path, format!("has more than {most_nodes} nodes, the most that fit memory")).at(at)
+            }
             Fault::Io(e) => ReadError::io(path, "reading", e)
                 .advise("a binary tree is a folder with index.json and leaves.bin or one file per leaf"),
         }
     })
 }
 
-fn parse(source: &dyn ByteSource) -> Result<(Header, Vec<Node>), Fault> {
+fn parse(source: &dyn ByteSource, most_nodes: usize) -> Result<(Header, Vec<Node>), Fault> {
     let mut json = Json::new(source, INDEX_FILE)?;
     let (mut header, mut nodes) = (HeaderText::default(), None);
     json.expect(b'{')?;
@@ -31,8 +35,8 @@ fn parse(source: &dyn ByteSource) -> Result<(Header, Vec<Node>), Fault> {
         first = false;
         match key {
             "nodes" | "root" if nodes.is_some() => return json.broken("the nodes stand there twice"),
-            "nodes" => nodes = Some(flat_nodes(&mut json)?),
-            "root" => nodes = Some(nested_nodes(&mut json)?),
+            "nodes" => nodes = Some(flat_nodes(&mut json, most_nodes)?),
+            "root" => nodes = Some(nested_nodes(&mut json, most_nodes)?),
             key => match known_key(key) {
                 Some(key) => header.take(key, &mut json)?,
                 None => json.skip()?,
@@ -191,7 +195,7 @@ impl Tree {
 }
 
 /// The array of the key `nodes`.
-fn flat_nodes(json: &mut Json) -> Result<Tree, Fault> {
+fn flat_nodes(json: &mut Json, most: usize) -> Result<Tree, Fault> {
     let mut tree = Tree::default();
     json.expect(b'[')?;
     while json.another(b']', tree.order.len() == 0)? {
@@ -203,6 +207,9 @@ fn flat_nodes(json: &mut Json) -> Result<Tree, Fault> {
             first = false;
             let key = node_key(key);
             text.take(key, json)?;
+        }
+        if tree.nodes.len() == most {
+            return Err(Fault::Memory(text.at));
         }
         tree.push(text)?;
     }
@@ -220,14 +227,14 @@ struct Open {
 }
 
 /// The node of the key `root` and all below. The path to the current node is a stack of ours, not of the machine.
-fn nested_nodes(json: &mut Json) -> Result<Tree, Fault> {
+fn nested_nodes(json: &mut Json, most: usize) -> Result<Tree, Fault> {
     // Keys of a node may stand behind its children, so that nodes are complete in another order than they begin.
     let mut texts: Vec<NodeText> = Vec::new();
     let mut path: Vec<Open> = Vec::new();
     if json.null()? {
         return Ok(Tree::default());
     }
-    open(json, &mut texts, &mut path)?;
+    open(json, &mut texts, &mut path, most)?;
     while let Some(node) = path.last_mut() {
         if let Some(begun) = node.children_begun {
             if !json.another(b']', begun == 0)? {
@@ -244,7 +251,7 @@ fn nested_nodes(json: &mut Json) -> Result<Tree, Fault> {
                 _ => return json.broken("a node has more than 2 children"),
             }
             node.children_begun = Some(begun + 1);
-            open(json, &mut texts, &mut path)?;
+            open(json, &mut texts, &mut path, most)?;
             continue;
         }
         match json.key(node.first)? {
@@ -270,8 +277,12 @@ fn nested_nodes(json: &mut Json) -> Result<Tree, Fault> {
     tree.finish(json.position())
 }
 
-fn open(json: &mut Json, texts: &mut Vec<NodeText>, path: &mut Vec<Open>) -> Result<(), Fault> {
+fn open(json: &mut Json, texts: &mut Vec<NodeText>, path: &mut Vec<Open>, most: usize) -> Result<(), Fault> {
     json.peek()?;
+    // the texts of nested nodes are kept beside the nodes that they become
+    if texts.len() >= most.div_ceil(3) {
+        return Err(Fault::Memory(json.position()));
+    }
     if path.len() > MAX_DEPTH {
         return json.broken(format!("nodes are nested more than {MAX_DEPTH} deep"));
     }

@@ -1,8 +1,9 @@
 //! A dataset that is open for reading.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::bytes::{ByteSource, Folder};
+use crate::bytes::{ByteSource, Folder, try_resize};
 use crate::{NodePoints, ReadError};
 
 use super::read_index::read_index;
@@ -31,7 +32,11 @@ pub struct Bintree {
     source: Box<dyn ByteSource>,
     header: Header,
     nodes: Vec<Node>,
+    max_leaf_bytes: u64,
 }
+
+/// Default of [`Bintree::set_max_leaf_bytes`].
+const MAX_LEAF_BYTES: u64 = 512 << 20;
 
 impl Bintree {
     /// Opens the dataset in the folder `path` (or beside the `index.json` that is named) and reads its index, flat or nested.
@@ -48,10 +53,24 @@ impl Bintree {
     /// # Errors
     /// As [`Self::open`].
     pub fn from_source(source: impl ByteSource + 'static) -> Result<Self, ReadError> {
-        let (header, nodes) = read_index(&source)?;
-        let tree = Self { source: Box::new(source), header, nodes };
+        Self::from_source_within(source, u32::MAX as usize)
+    }
+
+    /// As [`Self::from_source`], of at most `most_nodes` nodes: about 100 bytes each, 300 while the nested form is read,
+    /// of which a third is accepted.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; more nodes ([`crate::Advice::MoreMemory`]).
+    pub fn from_source_within(source: impl ByteSource + 'static, most_nodes: usize) -> Result<Self, ReadError> {
+        let (header, nodes) = read_index(&source, most_nodes)?;
+        let tree = Self { source: Box::new(source), header, nodes, max_leaf_bytes: MAX_LEAF_BYTES };
         tree.check_ranges()?;
         Ok(tree)
+    }
+
+    /// The largest leaf that [`Self::read_leaf`] accepts, in bytes as stored; 512 MiB if nothing is set.
+    pub fn set_max_leaf_bytes(&mut self, bytes: u64) {
+        self.max_leaf_bytes = bytes;
     }
 
     /// Everything in the index but the nodes.
@@ -117,7 +136,8 @@ impl Bintree {
     /// Reads the records of a leaf as stored; replaces the contents of `out`.
     ///
     /// # Errors
-    /// An index that is no leaf's; a file that is missing, or not as long as the leaf's points.
+    /// An index that is no leaf's; a file that is missing, or not as long as the leaf's points; more bytes than
+    /// [`Self::set_max_leaf_bytes`] allows, or than there is memory for ([`crate::Advice::MoreMemory`]).
     pub fn read_leaf_bytes(&self, index: u32, out: &mut Vec<u8>) -> Result<(), ReadError> {
         let Some(&Node { kind: NodeKind::Leaf { start, .. }, count, .. }) = self.node(index) else {
             let what = format!("node {index} is no leaf: only leaves have points");
@@ -125,7 +145,7 @@ impl Bintree {
         };
         out.clear();
         let file = if start.is_some() { PACKED_FILE.to_owned() } else { self.leaf_name(index) };
-        let io = |e| ReadError::io(self.locate(&file), &format!("reading leaf {index}"), e).advise(COPY_AGAIN);
+        let io = |e| unread(&self.locate(&file), &format!("reading leaf {index}"), e);
         let (start, needed) = (start.unwrap_or(0), u128::from(count) * self.header.record.stride() as u128);
         // In layout packed the range was checked when the index was read.
         if file != PACKED_FILE {
@@ -138,10 +158,15 @@ impl Bintree {
                 return Err(ReadError::broken(self.locate(&file), at, what).advise(COPY_AGAIN));
             }
         }
-        let len = usize::try_from(needed).map_err(|_| {
-            ReadError::unsupported(self.locate(&file), format!("the {needed} bytes of leaf {index} do not fit memory"))
+        let room = u64::try_from(needed).ok().filter(|len| *len <= self.max_leaf_bytes);
+        let room = room.and_then(|len| try_resize(out, len).ok());
+        room.ok_or_else(|| {
+            let allowed = self.max_leaf_bytes;
+            let why =
+                if needed > allowed.into() { format!("{allowed} are allowed") } else { "which is not there".into() };
+            let what = format!("leaf {index} would take {needed} bytes of memory, {why}");
+            ReadError::memory(self.locate(&file), what)
         })?;
-        out.resize(len, 0);
         self.source.read_at(&file, start, out).map_err(io)
     }
 
@@ -175,7 +200,7 @@ impl Bintree {
             return Ok(());
         }
         let path = self.locate(PACKED_FILE);
-        let size = self.source.size(PACKED_FILE).map_err(|e| ReadError::io(&path, "opening", e).advise(COPY_AGAIN))?;
+        let size = self.source.size(PACKED_FILE).map_err(|e| unread(&path, "opening", e))?;
         ranges.sort_unstable();
         let (mut last_end, mut last) = (0, 0);
         for (start, end, index) in ranges {
@@ -197,6 +222,15 @@ impl Bintree {
 }
 
 const COPY_AGAIN: &str = "the file was cut short or belongs to another dataset; copy or convert it again";
+
+/// A file of leaves that is not there is a fault of the dataset, not of the system.
+fn unread(path: &Path, doing: &str, error: io::Error) -> ReadError {
+    match error.kind() {
+        io::ErrorKind::NotFound => ReadError::broken(path, None, "is missing"),
+        _ => ReadError::io(path, doing, error),
+    }
+    .advise(COPY_AGAIN)
+}
 
 impl std::fmt::Debug for Bintree {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

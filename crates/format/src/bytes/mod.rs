@@ -1,11 +1,14 @@
 //! Where bytes come from: sources of a dataset's files, and positioned reads and writes of open files, which any number
-//! of threads share without a cursor.
+//! of threads share without a cursor; files that are opened and memory that is taken on the word of a dataset.
 
+mod room;
 mod source;
 
 use std::fs::File;
 use std::io;
 
+pub(crate) use room::STEP;
+pub use room::{open_file, read_file, try_resize};
 pub use source::{ByteSource, Folder, Memory};
 
 /// Fills `buf` with the bytes of `file` from `offset` on.

@@ -6,7 +6,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use super::read_exact_at;
+use super::{open_file, read_exact_at};
 
 /// Ranges of a dataset's files, wherever they are: in a folder, in memory, on a web server, in an archive.
 ///
@@ -87,7 +87,7 @@ const KEPT_FILES: usize = 4;
 /// A dataset in a folder, read with positioned reads: threads share it without a lock.
 ///
 /// The first four files requested stay open, others are open while they are read. Names with a path in them
-/// are refused, so that a hostile index does not lead out of the folder.
+/// are refused, so that a hostile index does not lead out of the folder; so is what is no file.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -116,7 +116,7 @@ impl Folder {
         if !matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name) {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file in a dataset's folder"));
         }
-        let mut opened = (name.to_owned(), File::open(self.path.join(name))?);
+        let mut opened = (name.to_owned(), open_file(self.path.join(name))?);
         let result = read(&opened.1);
         for place in &self.kept {
             match place.set(opened) {

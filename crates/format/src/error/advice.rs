@@ -32,8 +32,8 @@ pub enum Advice {
     Supported(String),
     /// Cut short or damaged, or of another kind than those that this build reads.
     CopyOrSupported(String),
-    /// The description of the file is larger than the memory that it may take
-    /// ([`crate::OpenOptions::description_bytes`]).
+    /// It takes more memory than there is or than it may take ([`crate::OpenOptions::description_bytes`],
+    /// [`crate::potree2::Dataset::set_max_node_bytes`]).
     MoreMemory,
     /// The coordinate reference system of the scan can be named, in place of what the file declares.
     NameCrs,

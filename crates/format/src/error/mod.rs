@@ -72,6 +72,11 @@ impl ReadError {
         self
     }
 
+    /// What would take more memory than there is, or than is allowed.
+    pub(crate) fn memory(path: impl AsRef<Path>, what: impl Into<Fault>) -> Self {
+        Self::unsupported(path, what).advise(Advice::MoreMemory)
+    }
+
     /// Adds the place in the file, in bytes from its start.
     #[must_use]
     pub fn at(mut self, offset: u64) -> Self {

@@ -64,7 +64,8 @@ impl NodeKey {
     #[must_use]
     pub fn ancestor(self, level: u8) -> Option<Self> {
         let up = self.level.checked_sub(level)?;
-        Some(Self { level, x: self.x >> up, y: self.y >> up, z: self.z >> up })
+        let above = |cell: u32| cell.checked_shr(up.into()).unwrap_or(0);
+        Some(Self { level, x: above(self.x), y: above(self.y), z: above(self.z) })
     }
 
     /// Parses a Potree name: `r` and one digit 0–7 per level.
@@ -90,8 +91,9 @@ impl fmt::Display for NodeKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("r")?;
         for level in 1..=self.level {
-            let up = self.level - level;
-            let digit = (self.x >> up & 1) << 2 | (self.y >> up & 1) << 1 | (self.z >> up & 1);
+            let up = u32::from(self.level - level);
+            let bit = |cell: u32| cell.checked_shr(up).unwrap_or(0) & 1;
+            let digit = bit(self.x) << 2 | bit(self.y) << 1 | bit(self.z);
             write!(f, "{digit}")?;
         }
         Ok(())
@@ -111,6 +113,13 @@ mod tests {
         assert_eq!(key.ancestor(1).unwrap().to_string(), "r0");
         assert_eq!(NodeKey::from_name("r8"), None);
         assert_eq!(NodeKey::from_name("042"), None);
+    }
+
+    #[test]
+    fn a_level_beyond_all_bits_does_no_harm() {
+        let key = NodeKey { level: 40, x: 5, y: 0, z: 1 };
+        assert_eq!(key.to_string(), format!("r{}405", "0".repeat(37)));
+        assert_eq!(key.ancestor(3), Some(NodeKey { level: 3, x: 0, y: 0, z: 0 }));
     }
 
     #[test]

@@ -40,11 +40,27 @@ pub fn encode_brotli(
     scratch: &mut BrotliScratch,
     out: &mut Vec<u8>,
 ) -> Result<(), WriteError> {
+    encode_brotli_while(attributes, records, quality, scratch, &|| true, out)
+}
+
+/// [`encode_brotli`] that can be stopped: `goes_on` is asked many times a second. High qualities take seconds for a large
+/// node.
+///
+/// # Errors
+/// As [`encode_brotli`]; [`WriteError::Stopped`] once `goes_on` has said no, with `out` as it was.
+pub fn encode_brotli_while(
+    attributes: &[Attribute],
+    records: &[u8],
+    quality: u8,
+    scratch: &mut BrotliScratch,
+    goes_on: &dyn Fn() -> bool,
+    out: &mut Vec<u8>,
+) -> Result<(), WriteError> {
     let record_len: usize = attributes.iter().map(Attribute::size).sum();
     check(attributes, records.len(), record_len)?;
     scratch.sort(records, record_len);
     scratch.planarise(attributes, record_len);
-    brotli::compress(&scratch.planar, quality, out)
+    brotli::compress(&scratch.planar, quality, goes_on, out)
 }
 
 fn check(attributes: &[Attribute], len: usize, record_len: usize) -> Result<(), WriteError> {

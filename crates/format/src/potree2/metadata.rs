@@ -140,7 +140,7 @@ impl Metadata {
         for level in (0..key.level).rev() {
             for (axis, cell) in [key.x, key.y, key.z].into_iter().enumerate() {
                 let mid = cube.min[axis] + (cube.max[axis] - cube.min[axis]) / 2.0;
-                if cell >> level & 1 == 1 {
+                if cell.checked_shr(level.into()).unwrap_or(0) & 1 == 1 {
                     cube.min[axis] = mid;
                 } else {
                     cube.max[axis] = mid;

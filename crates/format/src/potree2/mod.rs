@@ -38,10 +38,11 @@ mod metadata_json;
 mod metadata_parse;
 mod morton;
 mod node_points;
+mod payload;
 mod record;
 
 pub use dataset::Dataset;
-pub use encode_brotli::{BrotliScratch, encode_brotli};
+pub use encode_brotli::{BrotliScratch, encode_brotli, encode_brotli_while};
 pub use encode_hierarchy::{HierarchyBytes, NodeEntry, encode_hierarchy};
 pub use hierarchy::Hierarchy;
 pub use metadata::{AttributeStats, Encoding, Metadata};

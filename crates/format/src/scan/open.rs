@@ -330,7 +330,7 @@ fn starts_with_number(first: &[u8]) -> bool {
 /// The start of a regular file; nothing of anything else: opening a pipe would wait for somebody who writes to it.
 fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let io = |e| ReadError::io(path, "reading the first bytes", e);
-    let mut first = Vec::new();
+    let mut first = Vec::with_capacity(SNIFF_BYTES as usize); // or many small reads
     if fs::metadata(path).map_err(io)?.is_file() {
         File::open(path).map_err(io)?.take(SNIFF_BYTES).read_to_end(&mut first).map_err(io)?;
     }

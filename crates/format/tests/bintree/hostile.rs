@@ -1,6 +1,6 @@
 //! Bytes that lie: an error that says what is wrong, never a panic, never memory without end.
 
-use pointmill_format::bintree::Layout;
+use pointmill_format::bintree::{Bintree, Layout};
 use pointmill_format::bytes::Memory;
 use pointmill_testkit::Random;
 use pointmill_testkit::damage::{hit, peak_memory_bytes};
@@ -130,10 +130,10 @@ fn leaves_that_are_short_long_or_missing_are_named_with_their_file() {
     }
     let mut files = load("files");
     files.remove("n101.bin");
-    assert_fault(&files, "memory/n101.bin: reading leaf 13");
+    assert_fault(&files, "memory/n101.bin: is missing");
     files = load("packed");
     files.remove("leaves.bin");
-    assert_fault(&files, "memory/leaves.bin: opening");
+    assert_fault(&files, "memory/leaves.bin: is missing");
     files.remove("index.json");
     assert_fault(&files, "memory/index.json: reading");
 }
@@ -269,5 +269,19 @@ fn leaves_of_any_bytes_are_read_and_picked_from() {
     for _ in 0..300 {
         let bytes: Vec<u8> = (0..85).flat_map(|_| random.next_u64().to_le_bytes()).collect();
         assert_eq!(exercise(&index, &bytes).unwrap(), 17);
+    }
+}
+
+#[test]
+fn more_nodes_than_fit_are_refused_with_what_to_do() {
+    for layout in ["files", "nested"] {
+        let mut files = load(if layout == "nested" { "packed" } else { layout });
+        files.insert("index.json".into(), std::fs::read(golden(layout).join("index.json")).unwrap());
+        let nodes = open(&files).unwrap().nodes().len();
+        let within = |most| Bintree::from_source_within(files.clone(), most).map(|tree| tree.nodes().len());
+        let enough = if layout == "nested" { 3 * nodes } else { nodes };
+        assert_eq!(within(enough).unwrap(), nodes);
+        let fault = within(nodes - 1).unwrap_err();
+        assert_eq!(fault.advice(), Some(&pointmill_format::Advice::MoreMemory), "{fault}");
     }
 }

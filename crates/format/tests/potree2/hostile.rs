@@ -222,3 +222,54 @@ fn what_json_cannot_say_is_never_written() {
     assert_eq!(read, made);
     assert!(read.attributes[2].max[0].is_sign_negative());
 }
+
+/// The golden dataset in a folder, where a file has no more bytes than it needs but is as long as it likes.
+fn sparse(change: impl Fn(&mut Memory), file: &str, len: u64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut files = load(&golden("default"));
+    change(&mut files);
+    for (name, bytes) in &files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    std::fs::File::options().write(true).open(folder.path().join(file)).unwrap().set_len(len).unwrap();
+    folder
+}
+
+#[test]
+fn files_of_holes_are_not_read_into_memory() {
+    let chunk = 4_000_000_000u64 * 22;
+    let text = |files: &mut Memory| {
+        let text = String::from_utf8(files[METADATA_FILE].clone()).unwrap();
+        let at = text.find("\"firstChunkSize\":").unwrap() + 17;
+        let digits = text[at..].find(|c: char| !c.is_ascii_digit() && c != ' ').unwrap();
+        let text = format!("{}{chunk}{}", &text[..at], &text[at + digits..]);
+        files.insert(METADATA_FILE.into(), text.into_bytes());
+    };
+    let folder = sparse(text, HIERARCHY_FILE, chunk);
+    let fault = Dataset::open(folder.path()).unwrap().read_root_chunk().unwrap_err().to_string();
+    assert!(fault.contains("has 4000000000 records, its child masks"), "{fault}");
+
+    let all = |r: &mut NodeRecord| (r.points, r.byte_offset, r.byte_size) = (u32::MAX, 0, 33 * u64::from(u32::MAX));
+    let folder = sparse(|files| change_record(files, 0, all), OCTREE_FILE, 200 << 30);
+    let dataset = Dataset::open(folder.path()).unwrap();
+    let root = dataset.read_root_chunk().unwrap()[0];
+    let fault = dataset.read_points(&root, &mut NodePoints::default()).unwrap_err();
+    assert!(fault.to_string().contains("would take 141733920735 bytes of memory"), "{fault}");
+    assert_eq!(fault.advice(), Some(&pointmill_format::Advice::MoreMemory));
+
+    let folder = sparse(|_| (), METADATA_FILE, 2 << 30);
+    assert!(Dataset::open(folder.path()).unwrap_err().to_string().contains("too many for metadata"));
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_not_waited_for() {
+    for file in [METADATA_FILE, HIERARCHY_FILE, OCTREE_FILE] {
+        let folder = sparse(|_| (), file, 0);
+        std::fs::remove_file(folder.path().join(file)).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(folder.path().join(file)).status();
+        assert!(made.is_ok_and(|status| status.success()));
+        let fault = Dataset::open(folder.path()).unwrap_err();
+        assert!(fault.is_io() && fault.to_string().contains("no file, but a pipe"), "{fault}");
+    }
+}

@@ -16,8 +16,8 @@ pub(crate) struct Deviation {
 }
 
 impl Deviation {
-    /// Takes in a point that is meant to be at `meant`.
-    pub(crate) fn add(&mut self, difference: [f64; 3], meant: [f64; 3]) {
+    /// Takes in a point. `size`: the largest coordinates that were added up to tell where it is.
+    pub(crate) fn add(&mut self, difference: [f64; 3], size: [f64; 3]) {
         self.points += 1;
         let mut distance = 0.0;
         for a in 0..3 {
@@ -25,7 +25,7 @@ impl Deviation {
             self.max[a] = self.max[a].max(d.abs());
             self.sum[a] += d;
             self.squares[a] += d * d;
-            self.size[a] = self.size[a].max(meant[a].abs());
+            self.size[a] = self.size[a].max(size[a].abs());
             distance += d * d;
         }
         self.farthest = self.farthest.max(distance);

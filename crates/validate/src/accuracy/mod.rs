@@ -11,31 +11,34 @@ mod figures;
 mod known;
 mod reported;
 
-use std::path::Path;
-
 pub(crate) use deviation::{Deviation, Ordered};
 pub use figures::{Accuracy, Integers, Merged, PositionErrors};
 pub(crate) use known::{Known, Side};
 
 use crate::check::Check;
-use crate::finding::Findings;
+use crate::finding::{Finding, Findings};
+use crate::report;
+use reported::Reported;
 
-/// The accuracy of the dataset at `path`; what its report says else is a finding.
-pub(crate) fn judge(path: &Path, known: &Known<'_>, findings: &Findings) -> Accuracy {
+/// The accuracy of a dataset; what its report says else is a finding.
+pub(crate) fn judge(report: Option<&report::Reported>, known: &Known<'_>, findings: &Findings) -> Accuracy {
     let found = Accuracy::of(known);
-    let kind = findings.format();
-    match reported::find(path, kind) {
-        Some(report) => {
-            compare::check(&report, &found, known, findings);
-            let missing = match (&known.lattice, &known.format) {
-                (Some(_), Some(_)) => None,
-                (None, Some(_)) => Some("without the sources, what the lattice did is not known"),
-                (Some(_), None) => Some("what the format did is not known"),
-                (None, None) => Some("neither what the lattice nor what the format did is known"),
-            };
-            missing.into_iter().for_each(|why| findings.note(Check::Accuracy, why));
-        }
-        None => findings.skip(Check::Accuracy, "there is no report of the conversion beside the dataset"),
-    }
+    let Some(report) = report else {
+        findings.skip(Check::Accuracy, "there is no report of the conversion beside the dataset");
+        return found;
+    };
+    let Some(stated) = &report.accuracy else {
+        findings.checked(Check::Accuracy, 1);
+        findings.push(Finding::new(Check::Accuracy, "accuracy in the report", "figures", "none"));
+        return found;
+    };
+    compare::check(&Reported::new(stated), &found, known, findings);
+    let missing = match (&known.lattice, &known.format) {
+        (Some(_), Some(_)) => None,
+        (None, Some(_)) => Some("without the sources, what the lattice did is not known"),
+        (Some(_), None) => Some("what the format did is not known"),
+        (None, None) => Some("neither what the lattice nor what the format did is known"),
+    };
+    missing.into_iter().for_each(|why| findings.note(Check::Accuracy, why));
     found
 }

@@ -1,14 +1,8 @@
 //! What the report of the conversion says of a dataset.
 
-use std::fs;
-use std::path::Path;
-
-use pointmill_format::DatasetKind;
 use serde_json::Value;
 
 use super::figures::{Merged, PositionErrors};
-
-const REPORT_FILE: &str = "report.json";
 
 /// The accuracy that the report states.
 #[derive(Debug, Default)]
@@ -33,31 +27,8 @@ pub(super) struct Figures {
     pub(super) is_rounding: bool,
 }
 
-/// The statement on the dataset at `path`, from the report beside it or in the folder above.
-pub(super) fn find(path: &Path, kind: DatasetKind) -> Option<Reported> {
-    let folder = if path.is_dir() { path } else { path.parent()? };
-    let beside = || output_of(folder, |output| output["folder"] == "" && is_of(output, kind));
-    let above = || {
-        let name = folder.file_name()?.to_str()?;
-        output_of(folder.parent()?, |output| output["folder"] == name && is_of(output, kind))
-    };
-    let output = beside().or_else(above)?;
-    output.get("accuracy").map(Reported::new)
-}
-
-fn is_of(output: &Value, kind: DatasetKind) -> bool {
-    output["format"] == kind.name()
-}
-
-/// The first output of the report in `folder` that is the one.
-fn output_of(folder: &Path, is_it: impl Fn(&Value) -> bool) -> Option<Value> {
-    let bytes = fs::read(folder.join(REPORT_FILE)).ok()?;
-    let report: Value = serde_json::from_slice(&bytes).ok()?;
-    report["outputs"].as_array()?.iter().find(|output| is_it(output)).cloned()
-}
-
 impl Reported {
-    fn new(accuracy: &Value) -> Self {
+    pub(super) fn new(accuracy: &Value) -> Self {
         let figures = |key: &str| Figures::new(&accuracy[key]);
         Self {
             lattice: figures("lattice"),

@@ -33,15 +33,17 @@ pub(super) struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
+    /// `memory_bytes`: of which half may be used.
     pub(super) fn new(rules: &'a Rules, points: u64, memory_bytes: u64) -> Self {
-        let counts_merged = rules.stored.is_some() && points.saturating_mul(size_of::<Row>() as u64) <= memory_bytes;
+        let rows = if rules.stored.is_some() { room(points, memory_bytes / 4) } else { None };
+        let places = room(points, memory_bytes / 4);
         Self {
             rules,
             by_block: Ordered::default(),
-            rows: Mutex::default(),
-            counts_merged,
-            places: Mutex::default(),
-            counts_fallen: points.saturating_mul(size_of::<([i64; 3], u64)>() as u64) <= memory_bytes,
+            counts_merged: rows.is_some(),
+            rows: Mutex::new(rows.unwrap_or_default()),
+            counts_fallen: places.is_some(),
+            places: Mutex::new(places.unwrap_or_default()),
             moves: AtomicBool::new(false),
         }
     }
@@ -96,6 +98,13 @@ impl<'a> Parts<'a> {
         format.merged = self.counts_merged.then(|| merged(rows));
         Measured { lattice, format: self.rules.stored.is_some().then_some(format) }
     }
+}
+
+/// Memory for so many values, if it is within `most` bytes. It is touched as it is filled, and does not grow.
+fn room<T>(values: u64, most: u64) -> Option<Vec<T>> {
+    let mut room = Vec::new();
+    let fits = values.saturating_mul(size_of::<T>() as u64) <= most;
+    (fits && room.try_reserve_exact(usize::try_from(values).ok()?).is_ok()).then_some(room)
 }
 
 /// Points that share their point of the lattice with another position of the sources.

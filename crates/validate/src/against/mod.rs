@@ -11,8 +11,10 @@ mod exact;
 mod meaning;
 mod measured;
 mod narrow;
+mod opened;
 pub(crate) mod rules;
 mod selection;
+mod shelf;
 mod sides;
 mod sources;
 
@@ -23,6 +25,7 @@ use pointmill_format::ReadError;
 
 use crate::check::Check;
 use crate::finding::Finding;
+use crate::memory::on_threads;
 use crate::outcome::AgainstSummary;
 use measured::Parts;
 use rules::RgbDepth;
@@ -63,9 +66,16 @@ impl Against {
     /// # Errors
     /// A source that cannot be decoded to its end: nothing can be proven then.
     pub(crate) fn compare(&self, context: &Context<'_>) -> Result<AgainstSummary, ReadError> {
+        let mut budget = context.budget.clone();
+        let threads = budget.threads(self.sources.thread_bytes())?;
+        let context = Context { budget: &budget, ..*context };
+        on_threads(threads, budget.path(), || self.compare_within(&context))
+    }
+
+    fn compare_within(&self, context: &Context<'_>) -> Result<AgainstSummary, ReadError> {
         let rules = &self.sums.rules;
         let position_rules = if rules.foreign { &POSITION_RULES[..] } else { &POSITION_RULES[..1] };
-        let parts = Parts::new(rules, self.sources.points, context.memory_bytes);
+        let parts = Parts::new(rules, self.sources.points, context.budget.left());
         let files = self.sum_sources(position_rules, &parts, context)?;
         if let Ok(mut measured) = self.measured.lock() {
             *measured = Some(parts.finish());
@@ -86,7 +96,7 @@ impl Against {
             }
             _ => narrow::narrow(self, &colours, context)?,
         }
-        for (name, count) in self.sources.deviating() {
+        for (name, count) in self.sources.deviating(rules) {
             let expected = "one value throughout, as stated in attributesDropped";
             let finding = Finding::new(Check::Against, format!("dropped attribute {name}"), expected, "other values");
             context.findings.push(finding.points(count));
@@ -97,7 +107,7 @@ impl Against {
             points_found: found.count,
             sum_expected: format!("{:032x}", expected.hash),
             sum_found: format!("{:032x}", found.hash),
-            attributes_not_in_dataset: self.sources.not_in_dataset(rules),
+            attributes_not_in_dataset: self.sources.not_in_dataset(),
         })
     }
 
@@ -114,7 +124,7 @@ impl Against {
             .list
             .iter()
             .map(|source| {
-                let is_wide = rules.rgb.is_none() || source.declares_16_bit_colour();
+                let is_wide = rules.rgb.is_none() || source.declares_16_bit_colour;
                 FileSums { sums: Mutex::default(), wide: AtomicBool::new(is_wide) }
             })
             .collect();

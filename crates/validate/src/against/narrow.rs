@@ -25,8 +25,8 @@ pub(super) fn narrow(against: &Against, colours: &[Colour], context: &Context<'_
     if total == 0 {
         return Ok(());
     }
-    let row_bytes = 8 * (3 + against.sums.rules.attributes.iter().map(|a| a.elements).sum::<usize>()) + 96;
-    let budget = context.memory_bytes / 4 / row_bytes as u64;
+    let row_bytes = 8 * (3 + against.sums.rules.attributes.iter().map(|a| a.elements).sum::<usize>()) + 192;
+    let budget = context.budget.left() / 4 / row_bytes as u64;
     let mut chosen = vec![false; BUCKETS];
     let (mut rows, mut taken) = (0, 0);
     for (bucket, count) in differing.iter().enumerate().filter_map(|(b, d)| Some((b, (*d)?))) {
@@ -64,11 +64,13 @@ struct Balance {
 impl Pass<'_> {
     /// Buckets whose sums differ, with the number of records to look at.
     fn by_sum(&self) -> Result<Vec<Option<u64>>, ReadError> {
-        let sides: [Vec<Mutex<Vec<Sum>>>; 2] =
-            [(); 2].map(|()| (0..rayon::current_num_threads() + 1).map(|_| Mutex::default()).collect());
+        // some threads share their sums where memory is scarce
+        let most = self.context.budget.left() / 4 / (2 * BUCKETS * size_of::<Sum>()) as u64;
+        let shares = most.clamp(1, rayon::current_num_threads() as u64 + 1) as usize;
+        let sides: [Vec<Mutex<Vec<Sum>>>; 2] = [(); 2].map(|()| (0..shares).map(|_| Mutex::default()).collect());
         self.each_record(|side, block, i, _| {
             let thread = rayon::current_thread_index().map_or(0, |t| t + 1);
-            let Some(Ok(mut sums)) = sides[side].get(thread).map(Mutex::lock) else { return };
+            let Some(Ok(mut sums)) = sides[side].get(thread % shares).map(Mutex::lock) else { return };
             sums.resize(BUCKETS, Sum::default());
             let hash = self.hash(block, i);
             sums[bucket(block.position(i))].add(Sum { count: 1, hash });
@@ -87,9 +89,9 @@ impl Pass<'_> {
     /// Buckets whose sets of records differ; a record that the dataset has twice differs too. Takes as many passes as
     /// memory asks for.
     fn by_set(&self) -> Result<Vec<Option<u64>>, ReadError> {
-        let hash_bytes = size_of::<(u16, u128, u64)>() as u64;
+        let hash_bytes = 2 * size_of::<(u16, u128, u64)>() as u64; // vectors that grow take twice
         let needed = (self.against.sources.points + self.against.sums.total().count) * hash_bytes;
-        let passes = needed.div_ceil((self.context.memory_bytes / 4).max(1)).clamp(1, BUCKETS as u64) as usize;
+        let passes = needed.div_ceil((self.context.budget.left() / 4).max(1)).clamp(1, BUCKETS as u64) as usize;
         let mut differing = vec![None; BUCKETS];
         for pass in 0..passes {
             let buckets = BUCKETS * pass / passes..BUCKETS * (pass + 1) / passes;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use pointmill_format::{OpenOptions, ReadError};
 
@@ -10,6 +11,7 @@ use super::measured::Measured;
 use super::rules::Rules;
 use super::sources::Sources;
 use crate::finding::Findings;
+use crate::memory::Budget;
 use crate::options::ProgressFn;
 use crate::place::Place;
 
@@ -123,8 +125,8 @@ pub(crate) struct Context<'a> {
     pub(crate) records: &'a dyn Records,
     pub(crate) findings: &'a Findings,
     pub(crate) progress: &'a ProgressFn<'a>,
-    /// What later passes may use.
-    pub(crate) memory_bytes: u64,
+    /// What is left for the comparison.
+    pub(crate) budget: &'a Budget,
 }
 
 impl Against {
@@ -151,15 +153,21 @@ impl Against {
     /// # Errors
     /// A source that cannot be decoded to its end.
     pub(crate) fn positions(&self, count: u64, progress: &ProgressFn<'_>) -> Result<Option<Vec<[i64; 3]>>, ReadError> {
-        let all: Mutex<Vec<[i64; 3]>> = Mutex::default();
+        let mut room = Vec::new();
+        if room.try_reserve_exact(usize::try_from(count).unwrap_or(usize::MAX)).is_err() {
+            return Ok(None);
+        }
+        let all: Mutex<Vec<[i64; 3]>> = Mutex::new(room);
+        let more = AtomicBool::new(false);
         self.sources.each_block(&self.sums.rules, progress, "sources", |block, _| {
-            if let Ok(mut all) = all.lock()
-                && all.len() as u64 <= count
-            {
-                all.extend((0..block.len()).filter(|i| block.keep[*i]).map(|i| block.position(i)));
+            if let Ok(mut all) = all.lock() {
+                let mut kept = (0..block.len()).filter(|i| block.keep[*i]).map(|i| block.position(i));
+                let room = (count as usize).saturating_sub(all.len());
+                all.extend(kept.by_ref().take(room));
+                more.fetch_or(kept.next().is_some(), Relaxed);
             }
         })?;
         let all = all.into_inner().unwrap_or_default();
-        Ok((all.len() as u64 == count).then_some(all))
+        Ok((all.len() as u64 == count && !more.into_inner()).then_some(all))
     }
 }

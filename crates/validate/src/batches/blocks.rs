@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use pointmill_format::ReadError;
+use pointmill_format::bytes::try_resize;
+use pointmill_format::{Advice, ReadError};
 use rayon::prelude::*;
 
 use super::bytes::{Bytes, u32_at, u64_at};
@@ -13,9 +14,12 @@ use super::header::Header;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
-/// Decompressed blocks of all sections larger than this together are refused: it would be a hostile file, or one of
-/// kilobytes per point.
-const MAX_BLOCK_BYTES: u64 = 1 << 30;
+/// No zstd frame gives more bytes than this per compressed byte: a block of 128 KiB takes 4 bytes at least
+/// (RFC 8878, section 3.1.1.2).
+const MAX_RATIO: u64 = 32_768;
+
+/// Bytes that frames may have beyond what they hold, where it does not compress: more than any encoder adds.
+const FRAME_SLACK: u64 = 64 << 10;
 
 /// A section of one entry per point.
 #[derive(Debug)]
@@ -94,23 +98,6 @@ pub(crate) fn open(
         return Ok(None);
     }
     Ok(Some(column(last, Some(Table { batches_a_block: k, begins }))))
-}
-
-/// Refuses columns whose blocks would not fit into memory side by side.
-///
-/// # Errors
-/// They would not.
-pub(crate) fn require_memory(bytes: &Bytes, header: &Header, columns: &[&Column]) -> Result<(), ReadError> {
-    let block = |column: &&Column| {
-        let batches = column.table.as_ref().map_or(0, |t| t.batches_a_block.min(header.batches));
-        batches * BATCH * column.stride
-    };
-    let needed: u64 = columns.iter().map(block).sum();
-    if needed <= MAX_BLOCK_BYTES {
-        return Ok(());
-    }
-    let what = format!("the blocks of one place in all sections hold {needed} bytes, of {MAX_BLOCK_BYTES} allowed");
-    Err(ReadError::unsupported(&bytes.path, what).advise("write the file with fewer batches per block"))
 }
 
 /// Decompressed blocks by column and number; `None`: the block is broken.
@@ -205,6 +192,15 @@ impl<'a> Reported<'a> {
 }
 
 impl Column {
+    /// Batches that are decompressed to have `batches` in a row and those that are exchanged with them; none of a section
+    /// that is not compressed.
+    pub(crate) fn batches_decompressed_for(&self, batches: u64) -> u64 {
+        self.table.as_ref().map_or(0, |table| {
+            let k = table.batches_a_block;
+            2 * (batches.div_ceil(k) + 1) * k
+        })
+    }
+
     /// Block number `block`, if it decompresses to exactly its batches.
     fn decompress(
         &self,
@@ -219,13 +215,17 @@ impl Column {
         let points = (header.points - first.min(header.points)).min(table.batches_a_block * BATCH);
         let expected = points * self.stride;
         let mut frame = Vec::new();
-        bytes.read(self.offset + begin, end - begin, &mut frame)?;
+        let len = end - begin;
+        let is_read = len <= expected + expected / 64 + FRAME_SLACK;
+        bytes.read(self.offset + begin, if is_read { len } else { 0 }, &mut frame)?;
         let stated = zstd::zstd_safe::get_frame_content_size(&frame);
         let fault = |found: String| {
             reported.once(&self.name, block, format!("a zstd frame of {expected} bytes"), found);
             Ok(None)
         };
         match stated {
+            _ if !is_read => return fault(format!("{len} bytes, more than a frame of these takes")),
+            _ if expected > len * MAX_RATIO => return fault(format!("{len} bytes, which cannot hold that")),
             Ok(Some(stated)) if stated == expected => {}
             Ok(Some(stated)) => return fault(format!("{stated} bytes, by its header")),
             Ok(None) => return fault("a frame that does not state its size".into()),
@@ -236,7 +236,11 @@ impl Column {
             Ok(len) => return fault(format!("{} bytes behind the frame", frame.len() - len.min(frame.len()))),
             Err(_) => return fault("a frame that is cut short".into()),
         }
-        let mut out = vec![0; expected as usize];
+        let mut out = Vec::new();
+        try_resize(&mut out, expected).map_err(|_| {
+            let what = format!("{expected} bytes of a block do not fit memory");
+            ReadError::unsupported(&bytes.path, what).advise(Advice::MoreMemory)
+        })?;
         match zstd::bulk::decompress_to_buffer(&frame, &mut out[..]) {
             Ok(len) if len as u64 == expected => Ok(Some(out)),
             Ok(len) => fault(format!("{len} bytes")),

@@ -3,8 +3,8 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::ReadError;
-use pointmill_format::bytes::read_exact_at;
+use pointmill_format::bytes::{open_file, read_exact_at, try_resize};
+use pointmill_format::{Advice, ReadError};
 
 /// An open file of known length; threads share it without a cursor.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub(crate) struct Bytes {
 impl Bytes {
     pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
         let io = |e| ReadError::io(path, "opening", e);
-        let file = File::open(path).map_err(io)?;
+        let file = open_file(path).map_err(io)?;
         let len = file.metadata().map_err(io)?.len();
         Ok(Self { file, path: path.to_path_buf(), len })
     }
@@ -27,11 +27,14 @@ impl Bytes {
     /// read, and nothing is allocated for it: callers compare with [`Self::len`] first.
     pub(crate) fn read(&self, offset: u64, len: u64, out: &mut Vec<u8>) -> Result<(), ReadError> {
         let end = offset.checked_add(len).filter(|end| *end <= self.len);
-        let Some(len) = end.and_then(|_| usize::try_from(len).ok()) else {
+        if end.is_none() {
             let what = format!("{len} bytes expected, the file ends at byte {}", self.len);
             return Err(ReadError::broken(&self.path, offset, what));
-        };
-        out.resize(len, 0);
+        }
+        try_resize(out, len).map_err(|_| {
+            let what = format!("{len} bytes do not fit memory");
+            ReadError::unsupported(&self.path, what).at(offset).advise(Advice::MoreMemory)
+        })?;
         read_exact_at(&self.file, out, offset).map_err(|e| ReadError::io(&self.path, "reading", e))
     }
 }

@@ -10,6 +10,9 @@ use super::header::{HEADER_BYTES, Header};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 
+/// More JSON than this is no description.
+pub(crate) const MAX_BYTES: u64 = 16 << 20;
+
 /// Of the page.
 const MAX_ATTRIBUTES: usize = 256;
 
@@ -64,6 +67,10 @@ pub(crate) fn read(bytes: &Bytes, header: &Header, findings: &Findings) -> Resul
     if end.is_none() {
         let found = format!("bytes {at} to {}", at.saturating_add(len));
         fault(findings, "place", format!("inside the {} bytes of the file", bytes.len), found);
+        return Ok(None);
+    }
+    if len > MAX_BYTES {
+        fault(findings, "length", format!("at most {MAX_BYTES} bytes"), len);
         return Ok(None);
     }
     let mut raw = Vec::new();
@@ -209,13 +216,20 @@ fn errors(value: Option<&Value>, header: &Header, findings: &Findings) -> [Optio
 }
 
 impl Description {
-    /// The extra attribute that greys come from, if it is there as 16-bit integers.
+    /// The extra attribute that greys come from, if it is there as integers of 8 or 16 bits.
     pub(crate) fn intensity_column(&self) -> Option<usize> {
         let is = |extra: &Extra| {
             extra.attribute.name == "intensity"
-                && extra.attribute.ty == AttributeType::UInt16
+                && matches!(extra.attribute.ty, AttributeType::UInt8 | AttributeType::UInt16)
                 && extra.attribute.elements == 1
         };
         (self.colour == Colour::Intensity).then(|| self.attributes.iter().position(is)).flatten()
+    }
+
+    /// The extra attribute that greys come from, if it is there as numbers of another type.
+    pub(crate) fn wide_intensity_column(&self) -> Option<usize> {
+        let is = |extra: &Extra| extra.attribute.name == "intensity" && extra.attribute.elements == 1;
+        let is_wide = self.colour == Colour::Intensity && self.intensity_range.is_none();
+        is_wide.then(|| self.attributes.iter().position(is)).flatten()
     }
 }

@@ -1,5 +1,7 @@
 //! All checks of a batch that need no other batch.
 
+use pointmill_format::AttributeType;
+
 use super::batch::{Grid, Points, Raw};
 use super::boxes;
 use super::description::{Colour, Description};
@@ -7,6 +9,7 @@ use super::figures::Errors;
 use super::formulas::{BATCH, power};
 use super::order::Key;
 use super::positions::Axis;
+use super::ranges::number;
 use super::task::Task;
 use crate::accuracy::Side;
 use crate::against::rules::grey;
@@ -190,11 +193,15 @@ fn own_colours(task: &Task<'_>, raw: &Raw, original: &[u32], flags: &[u8]) {
         Colour::Rgb => return,
         Colour::None => Box::new(|_| 0xff_ffff),
         Colour::Intensity => {
-            let Some((bytes, range)) = intensities(task.description, raw) else { return };
-            Box::new(move |i| {
-                let v = u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]);
-                grey(u64::from(v), range) as u32 * 0x01_0101
-            })
+            if let Some((bytes, ty, range)) = intensities(task.description, raw) {
+                Box::new(move |i| {
+                    grey(number(&bytes[i * ty.size()..(i + 1) * ty.size()], ty) as u64, range) as u32 * 0x01_0101
+                })
+            } else if let Some((bytes, ty, range)) = wide_intensities(task.description, raw) {
+                Box::new(move |i| wide_grey(number(&bytes[i * ty.size()..(i + 1) * ty.size()], ty), range) * 0x01_0101)
+            } else {
+                return;
+            }
         }
     };
     task.findings.checked(Check::Colours, raw.len() as u64);
@@ -206,11 +213,32 @@ fn own_colours(task: &Task<'_>, raw: &Raw, original: &[u32], flags: &[u8]) {
     }
 }
 
-/// Raw intensities of the batch, if they are there as 16-bit integers.
-fn intensities<'a>(description: &Description, raw: &'a Raw) -> Option<(&'a [u8], [u64; 2])> {
+/// Raw intensities of the batch, if they are there as integers of 8 or 16 bits.
+fn intensities<'a>(description: &Description, raw: &'a Raw) -> Option<(&'a [u8], AttributeType, [u64; 2])> {
     let at = description.intensity_column()?;
-    let bytes = raw.extras.get(at).filter(|b| b.len() == 2 * raw.len())?;
-    Some((bytes, description.intensity_range?))
+    let ty = description.attributes[at].attribute.ty;
+    let bytes = raw.extras.get(at).filter(|b| b.len() == ty.size() * raw.len())?;
+    Some((bytes, ty, description.intensity_range?))
+}
+
+/// Raw intensities of the batch of other types, and the span that the description states: that it is attained is another
+/// check.
+fn wide_intensities<'a>(description: &Description, raw: &'a Raw) -> Option<(&'a [u8], AttributeType, [f64; 2])> {
+    let at = description.wide_intensity_column()?;
+    let extra = &description.attributes[at];
+    let (Some(&[lo]), Some(&[hi])) = (extra.min.as_deref(), extra.max.as_deref()) else { return None };
+    let ty = extra.attribute.ty;
+    let bytes = raw.extras.get(at).filter(|b| b.len() == ty.size() * raw.len())?;
+    Some((bytes, ty, [lo, hi]))
+}
+
+/// The grey of an intensity of any type among those from `lo` to `hi`.
+fn wide_grey(v: f64, [lo, hi]: [f64; 2]) -> u32 {
+    match v.is_nan() {
+        true => 0,
+        false if hi > lo => ((v - lo) / (hi - lo) * 255.0 + 0.5).floor().clamp(0.0, 255.0) as u32,
+        false => 255,
+    }
 }
 
 /// Order inside the batch.

@@ -49,7 +49,7 @@ pub(crate) fn positions(
     if against.sums.rules().drop_duplicates {
         return Ok(Err(Unknown::Duplicates));
     }
-    if header.points.saturating_mul(size_of::<Row>() as u64 + 24) > memory_bytes {
+    if header.points.saturating_mul((size_of::<Row>() + 2 * size_of::<[i64; 3]>()) as u64) > memory_bytes {
         return Ok(Err(Unknown::Memory));
     }
     let Some(positions) = against.positions(header.points, progress)? else { return Ok(Err(Unknown::Count)) };

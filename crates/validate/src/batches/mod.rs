@@ -11,8 +11,8 @@
 //! * rms of errors: 10⁻⁹, relative. Everything else about known positions: none.
 //!
 //! # Memory
-//! Batches are streamed in windows, twice a quarter of [`Options::memory_bytes`] at most; beside them 24 bytes per batch
-//! for boxes and 8 for originals, and of compressed sections the blocks of a window.
+//! Batches are streamed in windows, with the blocks that they need of compressed sections, within three quarters of what
+//! is left of [`Options::memory_bytes`]; beside them 24 bytes per batch for boxes and 8 for originals.
 
 mod batch;
 mod batch_records;
@@ -45,8 +45,10 @@ use crate::accuracy::{self, Known};
 use crate::against::{Against, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
+use crate::memory::{self, Budget};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::{AgainstSummary, Outcome};
+use crate::report;
 use batch_records::Box32;
 use bytes::Bytes;
 use description::{Colour, Description};
@@ -63,10 +65,14 @@ use walk::{Walked, walk};
 /// As [`crate::validate`].
 pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
     let bytes = Bytes::open(path)?;
+    let mut budget = Budget::new(path, options.memory_bytes)?;
     let findings = Findings::new(DatasetKind::Batches, options.max_problems);
     let Some(header) = header::read(&bytes, &findings)? else {
         return Ok(stopped(findings, &[Check::Header], "the header cannot be used", None));
     };
+    if header.description_bytes <= description::MAX_BYTES.min(bytes.len) {
+        budget.require(header.description_bytes * memory::JSON)?;
+    }
     let Some(description) = description::read(&bytes, &header, &findings)? else {
         let done = [Check::Header, Check::Description];
         return Ok(stopped(findings, &done, "the description cannot be used", Some(&header)));
@@ -75,6 +81,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         let done = [Check::Header, Check::Description, Check::Sections, Check::Blocks];
         return Ok(stopped(findings, &done, "a section cannot be used", Some(&header)));
     };
+    budget.take(header.batches * task::BATCH_BYTES)?;
     let boxes = batch_records::read(&bytes, &header, &findings)?;
     let originals = match header.originals() {
         true => originals::read(&bytes, &header, sections.originals, &findings)?,
@@ -88,8 +95,11 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
     let mut known = None;
     let mut unknown = None;
     if let (false, Some(against)) = (determined, &mut against) {
-        match known::positions(&header, &description.lattice, against, options.memory_bytes, progress)? {
-            Ok(positions) => known = Some(positions),
+        match known::positions(&header, &description.lattice, against, budget.left() / 2, progress)? {
+            Ok(positions) => {
+                budget.take(header.points * size_of::<[i64; 3]>() as u64)?;
+                known = Some(positions);
+            }
             Err(why) => {
                 against.sums.ignore_positions();
                 unknown = Some(why);
@@ -97,7 +107,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         }
     }
     let columns = batch::columns(&sections);
-    blocks::require_memory(&bytes, &header, &columns)?;
+    let window = task::window(&header, &columns, &budget)?;
     let task = Task {
         bytes: &bytes,
         header: &header,
@@ -109,12 +119,12 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         findings: &findings,
         sums: against.as_ref().map(|a| &a.sums),
         progress,
-        memory_bytes: options.memory_bytes,
+        window,
     };
     let walked = walk(&task)?;
     conclude(&task, &walked);
     let summary = match &against {
-        Some(against) => compare(&task, against, &walked, unknown.as_ref(), options)?,
+        Some(against) => compare(&task, against, &walked, unknown.as_ref(), &budget)?,
         None => {
             findings.skip(Check::Against, "no sources were given");
             None
@@ -128,7 +138,8 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
         format: is_measured.then_some(walked.errors.side),
     };
-    let accuracy = accuracy::judge(path, &known, &findings);
+    let report = report::check(path, (header.points, header.batches), &findings)?;
+    let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     let mut outcome = finish(findings, Some(&header));
     outcome.against = summary;
     outcome.accuracy = accuracy;
@@ -229,15 +240,17 @@ fn compare(
     against: &Against,
     walked: &Walked,
     unknown: Option<&Unknown>,
-    options: &Options,
+    budget: &Budget,
 ) -> Result<Option<AgainstSummary>, ReadError> {
     let findings = task.findings;
     if walked.unreadable > 0 {
         findings.skip(Check::Against, format!("{} batches could not be read", walked.unreadable));
         return Ok(None);
     }
-    let context =
-        Context { records: &Records { task }, findings, progress: task.progress, memory_bytes: options.memory_bytes };
+    // records are read in windows again while the sources wait
+    let mut budget = budget.clone();
+    budget.take(task::window_bytes(task.header, task.columns, task.window))?;
+    let context = Context { records: &Records { task }, findings, progress: task.progress, budget: &budget };
     let summary = against.compare(&context)?;
     let mut parts = Vec::new();
     if let Some(unknown) = unknown {

@@ -29,6 +29,8 @@ pub(crate) struct Axis {
     s: f64,
     /// Bits of q that are there.
     bits: u32,
+    /// What a coordinate may be off by for the rounding of doubles, at most.
+    rounding: f64,
     /// A cell, and all rounding, is less than half a step.
     fine: bool,
 }
@@ -42,10 +44,11 @@ impl Axis {
         let (scale, offset) = (lattice.scale[axis], lattice.offset[axis]);
         // p, r, the decoded r and the sum of it with the origin are rounded once each, at most at this size
         let size = origin[axis].abs() + offset.abs() + m + s;
-        let error = s / f64::from(1u32 << bits) / 2.0 + bounds.rounding(axis) + 8.0 * ulp(size);
+        let rounding = bounds.rounding(axis) + 8.0 * ulp(size);
+        let error = s / f64::from(1u32 << bits) / 2.0 + rounding;
         let largest = size / scale;
         let fine = error < scale / 2.0 && largest < EXACT;
-        Self { scale, offset, origin: origin[axis], m, s, bits, fine }
+        Self { scale, offset, origin: origin[axis], m, s, bits, rounding, fine }
     }
 
     /// Every q has one lattice point at most.
@@ -87,10 +90,29 @@ impl Axis {
         match ([x - 1, x + 1].map(at), at(x)) {
             ([false, false], true) => Recovered::Exact(x),
             (_, true) => Recovered::Ambiguous(x),
-            ([true, false], false) if !at(x - 2) => Recovered::Exact(x - 1),
-            ([false, true], false) if !at(x + 2) => Recovered::Exact(x + 1),
-            ([false, false], false) => Recovered::Foreign(x),
-            _ => Recovered::Ambiguous(x),
+            (_, false) => self.search(x, t),
+        }
+    }
+
+    /// X of `t`, of which `x` is none. q grows with X, so that halving finds the first one that is not below, however
+    /// far off the rounding of large coordinates has put `x`.
+    fn search(&self, x: i64, t: u32) -> Recovered {
+        let far = (8.0 * self.rounding / self.scale + self.s / f64::from(1u32 << self.bits) / self.scale).ceil() + 2.0;
+        if far >= EXACT {
+            return Recovered::Ambiguous(x);
+        }
+        let (mut low, mut high) = (x - far as i64, x + far as i64);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            match self.top(middle) < t {
+                true => low = middle + 1,
+                false => high = middle,
+            }
+        }
+        match (self.top(low) == t, self.top(low + 1) == t) {
+            (true, true) => Recovered::Ambiguous(low),
+            (true, false) => Recovered::Exact(low),
+            (false, _) => Recovered::Foreign(x),
         }
     }
 
@@ -123,6 +145,21 @@ mod tests {
     fn a_q_of_no_lattice_point_is_foreign() {
         let a = axis(0.5, 3.25, 0.001, 0.0, 0.0, 20);
         assert_eq!(a.recover(a.top(700) + 50), Recovered::Foreign(700));
+    }
+
+    #[test]
+    fn steps_finer_than_doubles_have_their_cells_all_the_same() {
+        // a step is a tenth of what doubles tell apart there, cells are finer still
+        let a = axis(0.0, 1e-6, 1e-11, 1e6, 1e6, 30);
+        assert!(!a.is_fine());
+        for x in (0..100_000).step_by(37) {
+            match a.recover(a.top(x)) {
+                Recovered::Foreign(_) => panic!("{x} is a lattice point"),
+                Recovered::Exact(found) => assert_eq!(found, x),
+                Recovered::Ambiguous(found) => assert_eq!(a.top(found), a.top(x)),
+            }
+        }
+        assert!(matches!(a.recover(a.top(5000) + 1), Recovered::Foreign(_)), "a cell without a point is found");
     }
 
     #[test]

@@ -79,7 +79,7 @@ impl Ranges {
 }
 
 /// A raw value of little-endian bytes.
-fn number(bytes: &[u8], ty: AttributeType) -> f64 {
+pub(super) fn number(bytes: &[u8], ty: AttributeType) -> f64 {
     let word = bytes.iter().rev().fold(0u64, |w, b| w << 8 | u64::from(*b));
     match ty {
         AttributeType::Int8 => f64::from(word as i8),

@@ -8,7 +8,7 @@ use super::blocks::{Cache, Reported};
 use super::description::{Colour, Description};
 use super::examine::{axes, points_of};
 use super::header::Header;
-use super::task::{Task, slot_of, window_batches};
+use super::task::{Task, slot_of};
 use crate::against::block::{BLOCK_POINTS, Block};
 use crate::against::rules::Conversion;
 use crate::against::{self, Rules, Sink};
@@ -46,7 +46,7 @@ pub(crate) struct Records<'a> {
 impl against::Records for Records<'_> {
     fn each_block(&self, rules: &Rules, work: &(dyn Fn(&mut Block, Place) + Sync)) -> Result<(), ReadError> {
         let task = self.task;
-        let (batches, window) = (task.header.batches, window_batches(task));
+        let (batches, window) = (task.header.batches, task.window);
         let silent = Findings::new(task.findings.format(), 0); // the walk has reported broken blocks
         let reported = Reported::new(&silent);
         let mut cache = Cache::default();

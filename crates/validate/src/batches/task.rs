@@ -1,5 +1,7 @@
 //! What a pass over the batches works on.
 
+use pointmill_format::ReadError;
+
 use super::batch_records::Box32;
 use super::blocks::Column;
 use super::bytes::Bytes;
@@ -9,6 +11,7 @@ use super::header::Header;
 use super::originals::Originals;
 use crate::against::Sums;
 use crate::finding::Findings;
+use crate::memory::Budget;
 use crate::options::ProgressFn;
 
 /// What is walked, and where findings go.
@@ -27,7 +30,8 @@ pub(crate) struct Task<'a> {
     pub(crate) findings: &'a Findings,
     pub(crate) sums: Option<&'a Sums>,
     pub(crate) progress: &'a ProgressFn<'a>,
-    pub(crate) memory_bytes: u64,
+    /// Batches that are examined at once.
+    pub(crate) window: u64,
 }
 
 /// Where Morton batch `number` is.
@@ -35,10 +39,28 @@ pub(crate) fn slot_of(header: &Header, number: u64) -> u64 {
     if header.swapped() { slot(number, header.batches) } else { number }
 }
 
-/// Batches examined at once: two windows are in memory, and what a batch takes is known.
-pub(crate) fn window_batches(task: &Task<'_>) -> u64 {
-    let stored: u64 = task.columns.iter().map(|c| c.stride).sum();
+/// What a batch takes in tables: its box, its originals, its record as it is read.
+pub(crate) const BATCH_BYTES: u64 = 24 + 8 + 32;
+
+/// Batches examined at once.
+///
+/// # Errors
+/// Not even one fits what is left.
+pub(crate) fn window(header: &Header, columns: &[&Column], budget: &Budget) -> Result<u64, ReadError> {
+    let most = budget.left() / 4 * 3;
+    let fits = |batches: &u64| window_bytes(header, columns, *batches) <= most;
+    let window = [64, 32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1);
+    budget.require(window_bytes(header, columns, window))?;
+    Ok(window)
+}
+
+/// What that many batches take while they are examined: two windows are in memory, and the blocks of one and of what
+/// comes next, at both ends of the file as slots are exchanged.
+pub(crate) fn window_bytes(header: &Header, columns: &[&Column], batches: u64) -> u64 {
+    let batches = batches.min(header.batches);
+    let stored: u64 = columns.iter().map(|c| c.stride).sum();
     // lattice integers, positions, codes, distances, colours, flags
     let point_bytes = 2 * stored + 160;
-    (task.memory_bytes / 4 / (BATCH * point_bytes)).clamp(1, 64)
+    let blocks = columns.iter().map(|c| c.batches_decompressed_for(batches).min(header.batches) * BATCH * c.stride);
+    2 * batches * BATCH * point_bytes + blocks.sum::<u64>()
 }

@@ -13,7 +13,7 @@ use super::levels::Levels;
 use super::order::Key;
 use super::ranges::Ranges;
 use super::records::fill;
-use super::task::{Task, slot_of, window_batches};
+use super::task::{Task, slot_of};
 use crate::check::Check;
 use crate::finding::Finding;
 use crate::options::Progress;
@@ -45,7 +45,7 @@ type Examined = Option<(Seen, Ranges)>;
 /// The operating system cannot read the file.
 pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
     let batches = task.header.batches;
-    let window = window_batches(task);
+    let window = task.window;
     let mut state = State::new(task);
     let mut cache = Cache::default();
     let reported = Reported::new(task.findings);

@@ -1,12 +1,12 @@
 //! Everything in `index.json` but the shape of the tree. The reader tolerates more than the page allows.
 
 use std::fmt;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use pointmill_format::ReadError;
 use pointmill_format::bintree::{CORE_BYTES, Header, INDEX_FILE};
+use pointmill_format::bytes::open_file;
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
@@ -117,7 +117,7 @@ impl Head {
 fn read(folder: &Path, tree: &Tree<'_>, findings: &Findings) -> Result<Option<Head>, ReadError> {
     let path = folder.join(INDEX_FILE);
     let io = |error| ReadError::io(&path, "reading", error);
-    let mut file = BufReader::with_capacity(1 << 16, File::open(&path).map_err(io)?);
+    let mut file = BufReader::with_capacity(1 << 16, open_file(&path).map_err(io)?);
     if file.fill_buf().map_err(io)?.starts_with(b"\xef\xbb\xbf") {
         file.consume(3);
     }

@@ -8,7 +8,8 @@
 //! the coordinate. Splits, boxes, centers and offsets are compared exactly.
 //!
 //! # Memory
-//! About 300 bytes per node. Leaves are read in parallel, one per thread, each as a whole; what a split needs of the points
+//! About 600 bytes per node. Leaves are read in parallel, one per thread, each as a whole, by fewer threads where not all
+//! fit [`Options::memory_bytes`]; what a split needs of the points
 //! below it (exact sums, extremes, how many lie at the greatest coordinate) goes up the tree, so every point is read
 //! once.
 
@@ -28,19 +29,24 @@ mod tree;
 use std::path::Path;
 
 use pointmill_format::bintree::{Bintree, PACKED_FILE};
-use pointmill_format::{DatasetKind, ReadError};
+use pointmill_format::{Advice, DatasetKind, ReadError};
 
 use crate::accuracy::{self, Known, Side};
 use crate::against::{Against, Context};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
+use crate::memory::{Budget, on_threads};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::{AgainstSummary, Outcome};
+use crate::report;
 use lenient::Lenient;
 use records::Records;
 use routes::Routes;
 use scan::{Scan, Scanned};
 use tree::Tree;
+
+/// What a node takes in all tables together: the reader's, what is found in leaves, summaries, places.
+const NODE_BYTES: u64 = 640;
 
 /// Checks the dataset in `folder`.
 ///
@@ -48,11 +54,15 @@ use tree::Tree;
 /// As [`crate::validate`].
 pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
     let findings = Findings::new(DatasetKind::Bintree, options.max_problems);
-    let dataset = match Bintree::from_source(Lenient::new(folder)) {
+    let mut budget = Budget::new(folder, options.memory_bytes)?;
+    let most_nodes = usize::try_from(budget.left() / NODE_BYTES).unwrap_or(usize::MAX);
+    let mut dataset = match Bintree::from_source_within(Lenient::new(folder), most_nodes) {
         Ok(dataset) => dataset,
-        Err(error) if error.is_io() => return Err(error),
+        Err(error) if error.is_io() || error.advice() == Some(&Advice::MoreMemory) => return Err(error),
         Err(error) => return Ok(unreadable_index(findings, &error)),
     };
+    budget.take(dataset.nodes().len() as u64 * NODE_BYTES)?;
+    dataset.set_max_leaf_bytes(budget.left());
     let tree = Tree::new(&dataset);
     let lattice_known = head::check(folder, &tree, &findings)?;
     tree.check_capacity(&findings);
@@ -64,7 +74,8 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     };
     let sums = against.as_ref().map(|a| &a.sums);
     let scan = Scan { tree: &tree, readable: &readable, lattice_known, sums, findings: &findings, progress };
-    let Scanned { summaries, ends, quality, deviation } = scan.run()?;
+    let threads = budget.threads(largest_leaf(&tree, &readable))?;
+    let Scanned { summaries, ends, quality, deviation } = on_threads(threads, folder, || scan.run())?;
     let leaves_unread = tree.leaves().filter(|(index, _)| !readable[*index as usize]).count() as u64;
     let unknown = Unknown { lattice: !lattice_known, uncertain: quality.uncertain, unread: leaves_unread };
     let summaries = splits::check(&tree, summaries, &findings);
@@ -72,8 +83,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     unknown.note_what_was_skipped(&findings);
 
     let records = Records { tree: &tree, readable: &readable };
-    let memory_bytes = options.memory_bytes;
-    let context = Context { records: &records, findings: &findings, progress, memory_bytes };
+    let context = Context { records: &records, findings: &findings, progress, budget: &budget };
     let summary = compare(against.as_ref(), &tree, &unknown, &context)?;
 
     let header = dataset.header();
@@ -87,7 +97,8 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         lattice: measured.map(|m| m.lattice),
         format: certain.or(measured.and_then(|m| m.format)),
     };
-    let accuracy = accuracy::judge(folder, &known, &findings);
+    let report = report::check(folder, (header.points, dataset.nodes().len() as u64), &findings)?;
+    let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     Ok(Outcome {
         encoding: Some(header.layout.name()),
         points: header.points,
@@ -97,6 +108,13 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         accuracy,
         ..Outcome::new(findings)
     })
+}
+
+/// Bytes of the largest leaf in memory: as stored, as offsets, positions and integers.
+fn largest_leaf(tree: &Tree<'_>, readable: &[bool]) -> u64 {
+    const TAKEN_APART: u64 = 3 * (4 + 8 + 8);
+    let leaves = tree.leaves().filter(|(index, _)| readable[*index as usize]).map(|(_, leaf)| leaf.count);
+    leaves.max().unwrap_or(0).saturating_mul(tree.header().record.stride() as u64 + TAKEN_APART)
 }
 
 /// Why some things cannot be known.

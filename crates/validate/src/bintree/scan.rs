@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use pointmill_format::ReadError;
 use pointmill_format::bintree::NodeKind;
+use pointmill_format::{ErrorKind, ReadError};
 use rayon::prelude::*;
 
 use super::leaf::{Exactness, Leaf, Points};
@@ -54,11 +54,9 @@ impl Scan<'_> {
     pub(super) fn run(&self) -> Result<Scanned, ReadError> {
         let done = AtomicU64::new(0);
         let ends: Mutex<HashMap<u32, Ends>> = Mutex::default();
-        let nodes = 0..self.tree.nodes().len() as u32;
-        let visits = nodes.into_par_iter().map_init(Points::default, |points, index| {
-            if !self.readable[index as usize] {
-                return Ok(None);
-            }
+        let leaves: Vec<u32> = self.tree.leaves().map(|l| l.0).filter(|l| self.readable[*l as usize]).collect();
+        let visits = leaves.par_iter().map_init(Points::default, |points, index| {
+            let index = *index;
             let visit = self.visit(index, points, &ends)?;
             let count = points.len() as u64;
             let done = done.fetch_add(count, Relaxed) + count;
@@ -71,10 +69,19 @@ impl Scan<'_> {
         visits.iter().flatten().for_each(|(_, exactness)| deviation.merge(&exactness.deviation));
         Ok(Scanned {
             deviation,
-            summaries: visits.into_iter().map(|visit| visit?.0).collect(),
+            summaries: self.by_node(leaves, visits),
             ends: ends.into_inner().unwrap_or_default(),
             quality,
         })
+    }
+
+    /// What is known of each node: of leaves what was found, of others nothing.
+    fn by_node(&self, leaves: Vec<u32>, visits: Vec<Option<(Option<Summary>, Exactness)>>) -> Vec<Option<Summary>> {
+        let mut summaries = vec![None; self.tree.nodes().len()];
+        for (leaf, visit) in leaves.into_iter().zip(visits) {
+            summaries[leaf as usize] = visit.and_then(|(summary, _)| summary);
+        }
+        summaries
     }
 
     /// Checks a leaf; nothing if it turns out not to be readable.
@@ -89,7 +96,7 @@ impl Scan<'_> {
         let NodeKind::Leaf { center, .. } = node.kind else { return Ok(None) };
         let place = tree.place(index);
         if let Err(error) = tree.dataset.read_leaf_bytes(index, &mut points.bytes) {
-            if error.is_io() {
+            if !matches!(error.kind(), ErrorKind::Broken) {
                 return Err(error);
             }
             let expected = format!("{} points", node.count);

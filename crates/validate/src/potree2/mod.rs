@@ -10,9 +10,9 @@
 //! * Attributes, counts, byte ranges, checksums: none.
 //!
 //! # Memory
-//! Nodes are streamed. What stays is the table of nodes (about 100 bytes each), for every thread the points of the
-//! inner nodes on the path from the root (some megabytes), and a cache of a quarter of [`Options::memory_bytes`].
-//! A single node is read as a whole.
+//! Nodes are streamed. What stays is the table of nodes (about 300 bytes each), for every thread the points of the
+//! inner nodes on the path from the root (some megabytes) and a node as a whole, and a cache of half of what is left of
+//! [`Options::memory_bytes`]. Fewer threads work where all do not fit.
 
 mod cache;
 mod checks;
@@ -26,32 +26,48 @@ mod walk;
 
 use std::path::Path;
 
-use pointmill_format::bytes::Folder;
-use pointmill_format::potree2::{Dataset, Encoding, METADATA_FILE, OCTREE_FILE};
-use pointmill_format::{DatasetKind, ReadError};
+use pointmill_format::bytes::{ByteSource as _, Folder, read_file};
+use pointmill_format::potree2::{Dataset, Encoding, METADATA_FILE, Metadata, Node, OCTREE_FILE};
+use pointmill_format::{DatasetKind, ErrorKind, ReadError};
 use serde_json::Value;
 
 use crate::accuracy::{self, Known, Side};
 use crate::against::{Against, Context, Rules};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
+use crate::memory::{self, Budget, on_threads};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::{LevelQuality, Outcome};
+use crate::report;
 use checks::spacing::Sampling;
 use expect::Geometry;
 use lattices::Lattices;
 use records::Records;
-use tree::Tree;
+use tree::{Tree, TreeNode};
 use walk::{Task, Walked, walk};
+
+/// Positions that neighbours ask for again; more of them hardly ever are.
+const MAX_CACHE_BYTES: u64 = 512 << 20;
+
+/// More JSON than this is not metadata.
+const MAX_METADATA_BYTES: u64 = 16 << 20;
 
 /// Checks the dataset in `folder`.
 ///
 /// # Errors
 /// As [`crate::validate`].
 pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
+    let mut budget = Budget::new(folder, options.memory_bytes)?;
     let source = Folder::new(folder);
     let findings = Findings::new(DatasetKind::Potree2, options.max_problems);
-    let dataset = match Dataset::open(folder) {
+    if let Some(missing) = missing(&source) {
+        return Ok(incomplete(&missing, findings));
+    }
+    let metadata_bytes = tree::size_of(&source, METADATA_FILE)?;
+    if metadata_bytes <= MAX_METADATA_BYTES {
+        budget.require(metadata_bytes * memory::JSON)?;
+    }
+    let mut dataset = match Dataset::open(folder) {
         Ok(dataset) => dataset,
         Err(error) if error.is_io() => return Err(error),
         Err(error) => return unreadable_metadata(folder, findings, &error),
@@ -71,25 +87,35 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         }
     };
 
-    let mut tree = tree::walk(&source, metadata.first_chunk_size, &findings)?;
+    let mut tree = tree::walk(&source, metadata.first_chunk_size, &budget, &findings)?;
+    budget.take(tree.nodes.len() as u64 * tree::NODE_BYTES)?;
     checks::structure::check(&tree, metadata.points, metadata.depth, &findings);
     let octree_bytes = tree::size_of(&source, OCTREE_FILE)?;
     let record_len = (metadata.encoding == Encoding::Default).then(|| metadata.record_len() as u64);
     checks::payload_ranges::check(&mut tree, octree_bytes, record_len, &findings);
 
-    let walked = walk(&Task {
+    dataset.set_max_node_bytes(budget.left());
+    unmask(&dataset, &mut tree, &findings)?;
+    let metadata = dataset.metadata();
+    let neighbourhoods = options.neighbourhoods && geometry.spacing_is_sane();
+    let node_bytes = largest_node(&tree, metadata);
+    let thread_bytes = node_bytes + if neighbourhoods { tree.surroundings_bytes() } else { 0 };
+    let threads = budget.threads(thread_bytes)?;
+    let task = Task {
         dataset: &dataset,
         tree: &tree,
         geometry,
         findings: &findings,
-        neighbourhoods: options.neighbourhoods && geometry.spacing_is_sane(),
+        neighbourhoods,
         sampling: Sampling::from_word(metadata.extra.get("pointmill").and_then(|own| own["sampling"].as_str())),
         lattices: Lattices::new(metadata.lattice, metadata.extra.get("pointmill").unwrap_or(&Value::Null)),
         sums: against.as_ref().map(|a| &a.sums),
         progress,
-        cache_bytes: usize::try_from(options.memory_bytes / 4).unwrap_or(usize::MAX),
+        cache_bytes: usize::try_from((budget.left() / 2).min(MAX_CACHE_BYTES)).unwrap_or(usize::MAX),
         max_problems: options.max_problems,
-    })?;
+    };
+    let walked = on_threads(threads, folder, || walk(&task))?;
+    budget.give_back(threads as u64 * (thread_bytes - node_bytes));
     checks::ranges::check(metadata, &geometry, &walked.seen, walked.unreadable == 0, &findings);
     note_what_was_skipped(&walked, &dataset, &geometry, options, &findings);
     let summary = match &against {
@@ -97,7 +123,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
             records: &Records { dataset: &dataset, tree: &tree },
             findings: &findings,
             progress,
-            memory_bytes: options.memory_bytes,
+            budget: &budget,
         })?),
         None => None,
     };
@@ -111,7 +137,8 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
         format: is_measured.then_some(Side { deviation: walked.deviation, lost: 0, merged: Some(0) }),
     };
-    let accuracy = accuracy::judge(folder, &known, &findings);
+    let report = report::check(folder, (metadata.points, tree.nodes.len() as u64), &findings)?;
+    let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     let quality = quality(&tree, &walked, &geometry);
     Ok(Outcome {
         encoding: Some(metadata.encoding.name()),
@@ -124,6 +151,33 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     })
 }
 
+/// Payloads that claim far more than they hold are found out before memory is shared out by what they claim.
+fn unmask(dataset: &Dataset, tree: &mut Tree, findings: &Findings) -> Result<(), ReadError> {
+    for node in tree.nodes.iter_mut().filter(|n| n.readable) {
+        let named = Node::new(node.key, node.record);
+        if !dataset.is_doubtful(&named) {
+            continue;
+        }
+        match dataset.check_payload(&named) {
+            Err(error) if matches!(error.kind(), ErrorKind::Broken) => {
+                let expected = format!("{} points", node.record.points);
+                findings.push(Finding::new(Check::Payloads, "payload", expected, error.what()).at(node.key));
+                node.readable = false;
+            }
+            other => other?,
+        }
+    }
+    Ok(())
+}
+
+/// Bytes of the largest node in memory: as stored, decompressed, as columns and as positions.
+fn largest_node(tree: &Tree, metadata: &Metadata) -> u64 {
+    let unpacked = if metadata.encoding == Encoding::Brotli { metadata.planar_len() } else { 0 };
+    let point = (metadata.record_len() + unpacked + 2 * size_of::<[i32; 3]>()) as u64;
+    let bytes = |node: &TreeNode| node.record.byte_size.saturating_add(u64::from(node.record.points) * point);
+    tree.nodes.iter().filter(|n| n.readable).map(bytes).max().unwrap_or(0)
+}
+
 fn bounds_of(min: &[f64], max: &[f64]) -> Option<[[f64; 2]; 3]> {
     let bounds: Vec<[f64; 2]> = min.iter().zip(max).map(|(min, max)| [*min, *max]).collect();
     bounds.try_into().ok()
@@ -132,8 +186,30 @@ fn bounds_of(min: &[f64], max: &[f64]) -> Option<[[f64; 2]; 3]> {
 /// `metadata.json` as a JSON value; `None` if it is none.
 fn read_json(folder: &Path) -> Result<Option<Value>, ReadError> {
     let path = folder.join(METADATA_FILE);
-    let bytes = std::fs::read(&path).map_err(|e| ReadError::io(&path, "reading", e))?;
-    Ok(serde_json::from_slice(&bytes).ok())
+    match read_file(&path, MAX_METADATA_BYTES) {
+        Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
+        Err(error) if error.kind() == std::io::ErrorKind::FileTooLarge => Ok(None), // the reader's error says so
+        Err(error) => Err(ReadError::io(&path, "reading", error)),
+    }
+}
+
+/// The files of the dataset that are not there; `None` if all are.
+fn missing(source: &Folder) -> Option<Vec<&'static str>> {
+    let is_missing = |file: &&str| source.size(file).is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound);
+    let missing: Vec<_> = DatasetKind::Potree2.required_files().iter().copied().filter(is_missing).collect();
+    (!missing.is_empty()).then_some(missing)
+}
+
+/// The outcome for a dataset without some of its files.
+fn incomplete(missing: &[&'static str], findings: Findings) -> Outcome {
+    let about = |file: &str| if file == OCTREE_FILE { Check::PayloadRanges } else { Check::Hierarchy };
+    for check in Check::POTREE2.iter().filter(|c| missing.iter().all(|file| about(file) != **c)) {
+        findings.skip(*check, format!("{} is missing", missing.join(" and ")));
+    }
+    for file in missing {
+        findings.push(Finding::new(about(file), *file, "a file of the dataset", "no such file"));
+    }
+    Outcome::new(findings)
 }
 
 /// The outcome for a dataset whose metadata is invalid.

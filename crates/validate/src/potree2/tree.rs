@@ -8,6 +8,7 @@ use pointmill_format::{NodeKey, ReadError};
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
+use crate::memory::Budget;
 
 /// A node with the record that locates its payload.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +18,9 @@ pub(crate) struct TreeNode {
     /// Its payload range makes sense and may be read.
     pub(crate) readable: bool,
 }
+
+/// What a node takes in all tables together, at most: records, the index, deviations.
+pub(crate) const NODE_BYTES: u64 = 320;
 
 /// All nodes that could be reached from the root.
 #[derive(Debug, Default)]
@@ -35,6 +39,22 @@ impl Tree {
     pub(crate) fn children(&self, node: &TreeNode) -> Vec<usize> {
         let mask = node.record.child_mask;
         (0..8).filter(|c| mask >> c & 1 == 1).filter_map(|c| self.find(node.key.child(c)?)).collect()
+    }
+
+    /// What the points around a node and its ancestors take while it is looked at, at most, bytes: those of the inner
+    /// nodes on the way to it, with those of their neighbours that are near.
+    pub(crate) fn surroundings_bytes(&self) -> u64 {
+        const SITE_BYTES: u64 = 72;
+        let mut most = 0;
+        // parents come before their children
+        let mut above: HashMap<NodeKey, u64> = HashMap::new();
+        for node in self.nodes.iter().filter(|n| n.readable && n.record.child_mask != 0) {
+            let parent = node.key.parent().and_then(|key| above.get(&key)).copied().unwrap_or(0);
+            let sum = parent + u64::from(node.record.points);
+            above.insert(node.key, sum);
+            most = most.max(sum);
+        }
+        2 * most * SITE_BYTES
     }
 
     /// The node's neighbours of the same level, sharing a face, an edge or a corner; at most 26.
@@ -60,7 +80,12 @@ struct Pending {
 ///
 /// # Errors
 /// The operating system could not read the file.
-pub(crate) fn walk(source: &dyn ByteSource, first_chunk_size: u64, findings: &Findings) -> Result<Tree, ReadError> {
+pub(crate) fn walk(
+    source: &dyn ByteSource,
+    first_chunk_size: u64,
+    budget: &Budget,
+    findings: &Findings,
+) -> Result<Tree, ReadError> {
     let file_size = size_of(source, HIERARCHY_FILE)?;
     let mut tree = Tree::default();
     let mut chunks = BTreeMap::<u64, u64>::new(); // start → end, disjoint: this bounds the walk by the file
@@ -69,11 +94,8 @@ pub(crate) fn walk(source: &dyn ByteSource, first_chunk_size: u64, findings: &Fi
         findings.checked(Check::Hierarchy, 1);
         let Some(end) = admit(&chunk, file_size, &chunks, findings) else { continue };
         chunks.insert(chunk.offset, end);
-        let mut bytes = vec![0; (end - chunk.offset) as usize];
-        source
-            .read_at(HIERARCHY_FILE, chunk.offset, &mut bytes)
-            .map_err(|e| ReadError::io(source.locate(HIERARCHY_FILE), "reading a hierarchy chunk", e))?;
-        parse(&chunk, &bytes, &mut tree, &mut queue, findings);
+        let mut chunk = Open { chunk: &chunk, keys: VecDeque::from([chunk.root]), taken: 0 };
+        chunk.read(source, end, &mut tree, &mut queue, budget, findings)?;
     }
     orphans(&chunks, file_size, findings);
     tree.index = tree.nodes.iter().enumerate().map(|(i, n)| (n.key, i as u32)).collect();
@@ -111,41 +133,84 @@ fn admit(chunk: &Pending, file_size: u64, chunks: &BTreeMap<u64, u64>, findings:
     Some(chunk.offset + whole)
 }
 
-fn parse(chunk: &Pending, bytes: &[u8], tree: &mut Tree, queue: &mut VecDeque<Pending>, findings: &Findings) {
-    let mut keys = vec![chunk.root];
-    let (records, _) = bytes.as_chunks::<{ NodeRecord::LEN }>();
-    for (i, bytes) in records.iter().enumerate() {
-        let Some(&key) = keys.get(i) else { break };
-        let record = NodeRecord::from_bytes(bytes);
-        let blame = |subject, expected: String, found: String| {
-            findings.push(Finding::new(Check::Hierarchy, subject, expected, found).at(key));
-        };
-        if record.node_type > 2 {
-            blame("type", "0, 1 or 2".into(), record.node_type.to_string());
-        }
-        if record.is_proxy() {
-            if i == 0 {
-                blame("first record of a chunk", "type 0 or 1".into(), "a proxy".into());
-                return;
+/// A chunk as far as it was read.
+struct Open<'a> {
+    chunk: &'a Pending,
+    /// The nodes that come next.
+    keys: VecDeque<NodeKey>,
+    /// Records so far.
+    taken: u64,
+}
+
+impl Open<'_> {
+    /// Reads the part of a chunk up to `end`, or as far as there are nodes: a file may be longer than anything in it.
+    fn read(
+        &mut self,
+        source: &dyn ByteSource,
+        end: u64,
+        tree: &mut Tree,
+        queue: &mut VecDeque<Pending>,
+        budget: &Budget,
+        findings: &Findings,
+    ) -> Result<(), ReadError> {
+        const STEP: usize = NodeRecord::LEN << 14;
+        let Pending { root, offset, .. } = *self.chunk;
+        let mut bytes = Vec::new();
+        for at in (offset..end).step_by(STEP) {
+            bytes.resize(STEP.min((end - at) as usize), 0);
+            let read = source.read_at(HIERARCHY_FILE, at, &mut bytes);
+            read.map_err(|e| ReadError::io(source.locate(HIERARCHY_FILE), "reading a hierarchy chunk", e))?;
+            if !self.take(&bytes, tree, queue, findings) {
+                return Ok(());
             }
-            let (offset, size) = (record.byte_offset, record.byte_size);
-            queue.push_back(Pending { root: key, offset, size, points: Some(record.points) });
-            continue;
-        }
-        if let Some(points) = chunk.points.filter(|p| i == 0 && *p != record.points) {
-            blame("numPoints of a proxy", record.points.to_string(), points.to_string());
-        }
-        tree.nodes.push(TreeNode { key, record, readable: false });
-        for child in (0..8).filter(|c| record.child_mask >> c & 1 == 1) {
-            match key.child(child) {
-                Some(child) => keys.push(child),
-                None => blame("level", format!("at most {}", NodeKey::MAX_LEVEL), "deeper".into()),
+            budget.require((tree.nodes.len() + self.keys.len() + queue.len()) as u64 * NODE_BYTES)?;
+            if self.keys.is_empty() {
+                break;
             }
         }
+        let records = (end - offset) / NodeRecord::LEN as u64;
+        let named = self.taken + self.keys.len() as u64;
+        if named != records {
+            findings.push(Finding::new(Check::Hierarchy, "records of a chunk", named, records).at(root));
+        }
+        Ok(())
     }
-    if keys.len() != records.len() {
-        let (expected, found) = (keys.len(), records.len());
-        findings.push(Finding::new(Check::Hierarchy, "records of a chunk", expected, found).at(chunk.root));
+
+    /// Takes records in. False if the chunk is none.
+    fn take(&mut self, bytes: &[u8], tree: &mut Tree, queue: &mut VecDeque<Pending>, findings: &Findings) -> bool {
+        let (records, _) = bytes.as_chunks::<{ NodeRecord::LEN }>();
+        for bytes in records {
+            let Some(key) = self.keys.pop_front() else { break };
+            let (i, chunk) = (self.taken, self.chunk);
+            self.taken += 1;
+            let record = NodeRecord::from_bytes(bytes);
+            let blame = |subject, expected: String, found: String| {
+                findings.push(Finding::new(Check::Hierarchy, subject, expected, found).at(key));
+            };
+            if record.node_type > 2 {
+                blame("type", "0, 1 or 2".into(), record.node_type.to_string());
+            }
+            if record.is_proxy() {
+                if i == 0 {
+                    blame("first record of a chunk", "type 0 or 1".into(), "a proxy".into());
+                    return false;
+                }
+                let (offset, size) = (record.byte_offset, record.byte_size);
+                queue.push_back(Pending { root: key, offset, size, points: Some(record.points) });
+                continue;
+            }
+            if let Some(points) = chunk.points.filter(|p| i == 0 && *p != record.points) {
+                blame("numPoints of a proxy", record.points.to_string(), points.to_string());
+            }
+            tree.nodes.push(TreeNode { key, record, readable: false });
+            for child in (0..8).filter(|c| record.child_mask >> c & 1 == 1) {
+                match key.child(child) {
+                    Some(child) => self.keys.push_back(child),
+                    None => blame("level", format!("at most {}", NodeKey::MAX_LEVEL), "deeper".into()),
+                }
+            }
+        }
+        true
     }
 }
 

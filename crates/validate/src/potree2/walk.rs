@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pointmill_format::potree2::{Dataset, Encoding, Node};
-use pointmill_format::{NodePoints, ReadError};
+use pointmill_format::{ErrorKind, NodePoints, ReadError};
 use rayon::prelude::*;
 
 use crate::accuracy::{Deviation, Ordered};
@@ -203,7 +203,7 @@ impl Walk<'_> {
     /// A broken payload is a finding, a disk that does not answer ends the walk.
     fn blame(&self, node: &TreeNode, error: Option<ReadError>) {
         let Some(error) = error else { return };
-        if error.is_io() {
+        if !matches!(error.kind(), ErrorKind::Broken) {
             self.stop.store(true, Relaxed);
             self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         } else {

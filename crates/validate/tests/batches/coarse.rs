@@ -36,6 +36,19 @@ fn coarse_boxes_and_order_are_checked_to_within_a_cell() {
     assert!(broken(&parts.validate()).contains(&Check::StorageOrder));
 }
 
+/// Cells of the order that are larger than those of the planes: the code of a point is certain, its integers are not.
+#[test]
+fn points_of_one_code_are_not_put_in_an_order_that_nothing_tells() {
+    for cell in [1e5, 1e7] {
+        let cloud = Cloud { planes: 1, cell, ..terrain() };
+        let outcome = cloud.parts().validate();
+        assert!(outcome.ok, "{:#?}", outcome.problems);
+        let mut parts = cloud.parts();
+        parts.exchange(10, 2 * BATCH + 5000);
+        assert_eq!(broken(&parts.validate()).contains(&Check::StorageOrder), cell < 1e6, "far apart, where codes tell");
+    }
+}
+
 #[test]
 fn a_step_that_is_finer_than_30_bits_is_said_too() {
     let mut cloud = terrain();

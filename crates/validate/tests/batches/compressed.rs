@@ -51,3 +51,21 @@ fn a_block_of_another_length_is_not_decompressed() {
     let outcome = parts.validate();
     assert_eq!(broken(&outcome), [Check::Blocks], "{:#?}", outcome.problems);
 }
+
+#[test]
+fn a_block_that_cannot_hold_what_it_states_is_not_decompressed() {
+    let (mut bytes, places) = compressed(256).bytes();
+    let table = places["hi10"] + 8;
+    let begin = places["hi10"] + u64::from_le_bytes(bytes[table..table + 8].try_into().unwrap()) as usize;
+    // an empty block of a few bytes in the place of the frame, which is where the next section begins
+    let raw = (3 * 10_240 + 1000) * 4u64;
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0b1110_0000];
+    frame.extend(raw.to_le_bytes());
+    bytes[begin..begin + frame.len()].copy_from_slice(&frame);
+    let end = (begin - places["hi10"] + frame.len()) as u64;
+    bytes[table + 8..table + 16].copy_from_slice(&end.to_le_bytes());
+    let outcome = check(&bytes);
+    assert!(broken(&outcome).contains(&Check::Blocks), "{:#?}", outcome.problems);
+    let problem = outcome.problems.iter().find(|p| p.check == Check::Blocks).unwrap();
+    assert!(problem.found.as_str().unwrap().contains("cannot hold that") || raw < 32_768 * 13, "{problem}");
+}

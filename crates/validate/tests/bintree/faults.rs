@@ -16,7 +16,9 @@ fn a_good_dataset_has_no_findings_by_any_rule_and_in_any_layout() {
             let outcome = Cloud { rule, packed, ..Cloud::default() }.build().validate();
             assert_only(&outcome, &[]);
             assert_eq!((outcome.format, outcome.points), (DatasetKind::Bintree, 750));
-            for check in outcome.checks.iter().filter(|c| ![Check::Against, Check::Accuracy].contains(&c.name)) {
+            for check in
+                outcome.checks.iter().filter(|c| ![Check::Against, Check::Report, Check::Accuracy].contains(&c.name))
+            {
                 assert!(check.checked > 0 && check.skipped.is_none(), "{check}");
             }
             let leaves = outcome.leaves.unwrap();

@@ -7,7 +7,7 @@ mod spread;
 
 use std::ops::ControlFlow;
 
-use pointmill_format::{Aabb, PointBatch, Positions, Scratch, Wanted};
+use pointmill_format::{Aabb, PointBatch, Positions, Scan, Scratch, Wanted};
 
 use self::spread::Spread;
 use crate::error::ConvertError;
@@ -31,15 +31,12 @@ pub(super) fn find(
     enough: [f64; 3],
     rt: &Runtime<'_>,
 ) -> Result<Option<FarPoints>, ConvertError> {
-    let pieces =
-        sources.all.iter().enumerate().flat_map(|(s, source)| (0..source.scan.pieces().len()).map(move |p| (s, p)));
-    let pieces: Vec<(usize, usize)> = pieces.collect();
     let parts = rt.in_parallel(
-        pieces.len(),
+        sources.pieces(),
         || (Default::default(), Recent::default(), Scratch::default()),
         |(spreads, recent, scratch), unit| {
-            let (source, piece) = pieces[unit];
-            add_piece(sources, source, piece, cut, scratch, |p| {
+            let (source, piece) = sources.piece(unit);
+            add_piece(&*sources.scan(source)?, piece, cut, scratch, |p| {
                 if recent.is_new(p) {
                     let spreads: &mut [Spread; 3] = spreads;
                     spreads.iter_mut().zip(p).for_each(|(spread, v)| spread.add(v));
@@ -86,15 +83,7 @@ impl Recent {
 }
 
 /// Pieces that cannot be decoded were reported when the points were read.
-fn add_piece(
-    sources: &Sources,
-    source: usize,
-    piece: usize,
-    cut: Option<&Aabb>,
-    scratch: &mut Scratch,
-    mut take: impl FnMut([f64; 3]),
-) {
-    let scan = &sources.all[source].scan;
+fn add_piece(scan: &dyn Scan, piece: usize, cut: Option<&Aabb>, scratch: &mut Scratch, mut take: impl FnMut([f64; 3])) {
     let wanted = Wanted::positions(scan.info());
     let _ = scan.decode(piece, &wanted, scratch, &mut |batch: &PointBatch| {
         let lattice = scan.info().lattice;

@@ -116,7 +116,7 @@ pub(super) fn inside(plan: &Plan, sources: &Sources, present: &JobLattice, stats
     choose_for(plan, sources, &Knowledge::of_points(plan, sources, present, stats).inside(bounds))
 }
 
-fn choose_for(plan: &Plan, sources: &Sources, known: &Knowledge) -> JobLattice {
+fn choose_for(plan: &Plan, sources: &Sources, known: &Knowledge<'_>) -> JobLattice {
     let rooms = shared_rooms(known);
     if let ScaleChoice::Fixed(step) = plan.scale {
         return requested(step, sources, rooms);
@@ -148,7 +148,7 @@ fn requested(step: f64, sources: &Sources, rooms: [Room; 3]) -> JobLattice {
 
 /// The room of each axis. Where steps are chosen freely all axes have that of the longest one, since equal steps are
 /// the fastest, unless an axis would lose by it.
-fn shared_rooms(known: &Knowledge) -> [Room; 3] {
+fn shared_rooms(known: &Knowledge<'_>) -> [Room; 3] {
     let mut rooms = [0, 1, 2].map(|a| known.room(a));
     let extent = |a: usize| known.all[a].extent;
     let longest = [0, 1, 2].map(extent).into_iter().fold(0.0, f64::max);

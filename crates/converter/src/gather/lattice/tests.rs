@@ -1,54 +1,29 @@
-use pointmill_format::{Aabb, AxisGrid, Lattice, Piece, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
+use pointmill_format::{Aabb, AxisGrid, Lattice};
 
 use super::*;
-use crate::cloud::{JobBounds, JobPoint};
-use crate::sources::{Extent, Fineness, Schema, Source, Survey};
-
-/// A scan of which only the headers matter.
-struct Header(ScanInfo);
-
-impl Scan for Header {
-    fn info(&self) -> &ScanInfo {
-        &self.0
-    }
-
-    fn pieces(&self) -> &[Piece] {
-        &[]
-    }
-
-    fn decode_bytes(&self, _: &Wanted) -> u64 {
-        0
-    }
-
-    fn decode(&self, _: usize, _: &Wanted, _: &mut Scratch, _: &mut Sink<'_>) -> Result<(), ReadError> {
-        Ok(())
-    }
-}
+use crate::cloud::{JobBounds, JobPoint, SourceStats};
+use crate::sources::{Fineness, Schema, Source, Stored};
 
 fn grid(step: f64) -> Fineness {
     Fineness::Grid { grid: AxisGrid { step, offset: 0.0 }, is_claim: true }
 }
 
 fn world(fineness: [Fineness; 3], min: [f64; 3], max: [f64; 3]) -> Source {
-    let extent = Some(Extent { bounds: Aabb { min, max }, is_sampled: false });
-    let scan = Box::new(Header(ScanInfo::new("x", "", 0)));
-    Source { scan, columns: Vec::new(), survey: Survey { extent, fineness } }
+    let stored = Stored { lattice: None, resolution: Default::default(), fineness };
+    Source::of_header(stored, None, Some(Aabb { min, max }))
 }
 
 fn with_lattice(lattice: Lattice, bounds: Option<Aabb>) -> Source {
-    let mut info = ScanInfo::new("x", "", 0);
-    (info.lattice, info.bounds_declared) = (Some(lattice), bounds);
     let fineness = std::array::from_fn(|a| {
         let grid = AxisGrid { step: lattice.scale[a], offset: lattice.offset[a] };
         Fineness::Grid { grid, is_claim: false }
     });
-    let extent = bounds.map(|bounds| Extent { bounds, is_sampled: false });
-    Source { scan: Box::new(Header(info)), columns: Vec::new(), survey: Survey { extent, fineness } }
+    let stored = Stored { lattice: Some(lattice), resolution: Default::default(), fineness };
+    Source::of_header(stored, bounds, bounds)
 }
 
 fn sources(all: Vec<Source>) -> Sources {
-    let attributes = Schema::new(Vec::new());
-    Sources { all, attributes, points_declared: 0, points_missing: 0, warnings: Vec::new() }
+    Sources::of_headers(all)
 }
 
 fn plan(scale: ScaleChoice) -> Plan {
@@ -152,7 +127,8 @@ fn a_step_is_at_least_two_distances_of_doubles() {
 fn points_that_were_read_make_it_coarser_or_finer() {
     let auto = plan(ScaleChoice::Auto);
     let stats = |bounds: JobBounds, lattice: &Lattice, off_grid| {
-        let mut stats = Stats::new(&Schema::new(Vec::new()), 1);
+        let mut stats = Stats::new(&Schema::new(Vec::new()));
+        stats.sources = vec![SourceStats::default()];
         stats.bounds = bounds;
         stats.sources[0].bounds = Aabb { min: lattice.world(bounds.min.0), max: lattice.world(bounds.max.0) };
         stats.sources[0].off_grid = off_grid;

@@ -4,7 +4,7 @@ use pointmill_format::batches::{ColourSource, colour_word, eight_bit, grey};
 use pointmill_format::{Attribute, AttributeType};
 
 use super::settings::colour_of;
-use crate::cloud::Cloud;
+use crate::cloud::{Cloud, Widening};
 use crate::outputs::attributes::{choose, left_out};
 use crate::outputs::number::number;
 use crate::plan::AttributeChoice;
@@ -35,10 +35,10 @@ pub(super) struct Extra {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Colour {
-    /// Byte offset in a stored record; for each source, if its values are 8 bits deep.
+    /// Byte offset in a stored record, and which values are 8 bits deep.
     Rgb {
         at: usize,
-        is_eight_bit: Vec<bool>,
+        widening: Widening,
     },
     /// Byte offset in a stored record, type, and the range of all points.
     Intensity {
@@ -77,10 +77,7 @@ impl Content {
         let mut dropped: Vec<DroppedAttribute> = not_kept.map(left).collect();
         dropped.extend(left_out(schema, &cloud.intake.unread, |_| true, &unwanted));
         let colour = match colour_index {
-            Some(i) if is_rgb => Colour::Rgb {
-                at: schema.offsets[i],
-                is_eight_bit: facts.widen_rgb.iter().map(Option::is_some).collect(),
-            },
+            Some(i) if is_rgb => Colour::Rgb { at: schema.offsets[i], widening: facts.widening.clone() },
             Some(i) => {
                 let range = &facts.ranges[i];
                 let (least, greatest) = if range.is_empty() { (0.0, 0.0) } else { (range.min[0], range.max[0]) };
@@ -101,12 +98,12 @@ impl Content {
 
     fn warnings(&self, cloud: &Cloud<'_>) -> Vec<Warning> {
         match &self.colour {
-            Colour::Rgb { is_eight_bit, .. } => {
+            Colour::Rgb { widening, .. } => {
                 let rgb = cloud.schema().rgb();
                 let used = |i: &usize| cloud.stats.sources[*i].kept > 0;
-                let coloured = |i: &usize| cloud.intake.sources[*i].has(rgb);
-                let sources: Vec<usize> = (0..is_eight_bit.len()).filter(used).collect();
-                let is_narrowed = sources.iter().any(|i| coloured(i) && !is_eight_bit[*i]);
+                let coloured = |i: &usize| cloud.intake.of(&cloud.sources.all[*i]).has(rgb);
+                let sources: Vec<usize> = (0..cloud.sources.all.len()).filter(used).collect();
+                let is_narrowed = sources.iter().any(|i| coloured(i) && !widening.is_narrow(*i));
                 let (without, inputs) = (sources.iter().filter(|i| !coloured(i)).count(), sources.len());
                 let narrowed = is_narrowed.then_some(Warning::ColoursNarrowed);
                 let black = (without > 0).then_some(Warning::InputsWithoutColour { without, inputs });
@@ -137,17 +134,16 @@ impl Content {
         }
     }
 
-    /// Appends the colour words of records of one source, levels 0.
-    pub(super) fn words(&self, records: &[u8], stride: usize, source: u32, out: &mut Vec<u32>) {
+    /// Appends the colour words of records of one group, levels 0.
+    pub(super) fn words(&self, records: &[u8], stride: usize, group: u32, out: &mut Vec<u32>) {
         let records = records.chunks_exact(stride);
         match &self.colour {
-            Colour::Rgb { at, is_eight_bit } => {
-                let is_eight_bit = is_eight_bit.get(source as usize).copied().unwrap_or(false);
+            Colour::Rgb { at, widening } => {
                 let channels = |r: &[u8]| match r.get(*at..).and_then(|r| r.first_chunk::<6>()) {
                     Some(&[a, b, c, d, e, f]) => [[a, b], [c, d], [e, f]].map(u16::from_le_bytes),
                     None => [0; 3],
                 };
-                if is_eight_bit {
+                if widening.of(group).is_some() {
                     out.extend(records.map(|r| colour_word(channels(r).map(|v| v as u8), 0)));
                 } else {
                     out.extend(records.map(|r| colour_word(channels(r).map(eight_bit), 0)));
@@ -178,6 +174,7 @@ fn grey_of(bytes: &[u8], ty: AttributeType, least: f64, greatest: f64) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::Group;
 
     fn content(colour: Colour) -> Content {
         Content { colour, extras: vec![], kept: vec![], dropped: vec![], warnings: vec![] }
@@ -185,13 +182,14 @@ mod tests {
 
     #[test]
     fn colours_are_taken_by_the_depth_of_their_source() {
-        let c = content(Colour::Rgb { at: 1, is_eight_bit: vec![true, false] });
+        let widening = Widening::new(Some(1), vec![true, false]);
+        let c = content(Colour::Rgb { at: 1, widening });
         let record = [9, 200, 0, 1, 0, 255, 0, 9, 0x34, 0x12, 0xff, 0xff, 0x80, 0];
         let mut out = Vec::new();
-        c.words(&record, 7, 0, &mut out);
+        c.words(&record, 7, Group::of_source(0).0, &mut out);
         assert_eq!(out[0], colour_word([200, 1, 255], 0));
         out.clear();
-        c.words(&record, 7, 1, &mut out);
+        c.words(&record, 7, Group::of_source(1).0, &mut out);
         assert_eq!(out, [colour_word([1, 0, 1], 0), colour_word([eight_bit(0x1234), 255, 0], 0)]);
     }
 

@@ -47,7 +47,7 @@ impl Builder<'_> {
         };
         let mut ledger = Ledger::default();
         let mut sort = BigSort::new(rt, stride, memory_bytes / 2, compare);
-        sort.fill(task.segments(), |segment, records| ledger.load(store, segment, stride, &facts.widen_rgb, records))?;
+        sort.fill(task.segments(), |segment, records| ledger.load(store, segment, stride, &facts.widening, records))?;
         let capacity = u64::from(self.settings.capacity);
         let (mut nodes, mut leaves) = (Vec::new(), Vec::new());
         cut(task.points(), task.points().div_ceil(capacity), task.path.clone(), &mut nodes, &mut leaves);

@@ -114,7 +114,7 @@ impl<'a> Builder<'a> {
         os_hints::reserve(&mut self.records, task.points() as usize * stride);
         let Cloud { store, facts, .. } = self.cloud;
         for segment in task.segments() {
-            ledger.load(store, *segment, stride, &facts.widen_rgb, &mut self.records)?;
+            ledger.load(store, *segment, stride, &facts.widening, &mut self.records)?;
         }
         self.items.clear();
         let records = self.records.chunks_exact(stride).zip(0u32..);

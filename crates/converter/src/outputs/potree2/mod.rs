@@ -24,7 +24,7 @@ use crate::error::{ConvertError, Unsupported};
 use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
-use crate::runtime::{DiskFile, Runtime};
+use crate::runtime::{DiskFile, Events, Runtime};
 use crate::sources::{POSITION_BYTES, Schema};
 
 /// Elements of an attribute that readers of the format accept.
@@ -94,7 +94,8 @@ impl Output for Potree2Settings {
             return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());
         }
         let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
-        let payloads = Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding };
+        let payloads =
+            Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding, events: rt.events() };
         let settings = OctreeSettings { sampling: self.sampling, leaf_capacity: self.leaf_capacity };
         let tree = octree::build(cloud, rt, settings, &payloads)?;
         payloads.file.sync("syncing the payloads")?;
@@ -132,17 +133,18 @@ fn entry(node: &FinishedNode) -> NodeEntry {
 }
 
 /// `octree.bin` while it is written.
-struct Payloads {
+struct Payloads<'a> {
     file: DiskFile,
     layout: OutputLayout,
     encoding: Encoding,
+    events: &'a dyn Events,
 }
 
-impl NodeSink for Payloads {
-    type Encoder = PayloadEncoder;
+impl<'a> NodeSink for Payloads<'a> {
+    type Encoder = PayloadEncoder<'a>;
 
-    fn encoder(&self) -> PayloadEncoder {
-        PayloadEncoder::new(self.layout.clone(), self.encoding)
+    fn encoder(&self) -> PayloadEncoder<'a> {
+        PayloadEncoder::new(self.layout.clone(), self.encoding, self.events)
     }
 
     fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {

@@ -1,37 +1,53 @@
 //! The payload of one node, DEFAULT or BROTLI.
 
-use pointmill_format::potree2::{BrotliScratch, encode_brotli};
-use pointmill_format::{Attribute, AttributeType, NodeKey};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use pointmill_format::potree2::{BrotliScratch, encode_brotli_while};
+use pointmill_format::{Attribute, AttributeType, NodeKey, WriteError};
 
 use super::layout::OutputLayout;
 use super::settings::Encoding;
 use crate::cloud::{Checksum, copy_record};
 use crate::error::ConvertError;
 use crate::octree::NodeEncoder;
+use crate::runtime::Events;
 
 /// Records are first copied into a small tile: the copies are short and independent, so that the processor waits for
 /// many scattered records at once, and what is done with them then happens in the first-level cache.
 const TILE_RECORDS: usize = 128;
 
+/// From this quality on the library may work for many seconds without asking whether to go on.
+const LONG_QUALITY: u8 = 9;
+
+/// Nodes up to this size take less than half a second at any quality.
+const SHORT_BYTES: usize = 64 << 10;
+
+/// How often a run that waits for a node asks whether it is to stop.
+const ASK: Duration = Duration::from_millis(100);
+
 /// Bytes of a position in a Brotli payload.
 const BROTLI_POSITION_BYTES: u64 = 16;
 
 /// Turns stored records into payloads; one for each thread.
-pub(crate) struct PayloadEncoder {
+pub(crate) struct PayloadEncoder<'a> {
+    events: &'a dyn Events,
     layout: OutputLayout,
     encoding: Encoding,
-    attributes: Vec<Attribute>,
+    attributes: Arc<[Attribute]>,
     tile: Vec<u8>,
     plain: Vec<u8>,
     scratch: BrotliScratch,
 }
 
-impl PayloadEncoder {
-    pub(crate) fn new(layout: OutputLayout, encoding: Encoding) -> Self {
+impl<'a> PayloadEncoder<'a> {
+    pub(crate) fn new(layout: OutputLayout, encoding: Encoding, events: &'a dyn Events) -> Self {
         let mut attributes = vec![Attribute::new("position", AttributeType::Int32, 3)];
         attributes.extend(layout.attributes.iter().cloned());
         let (tile, plain, scratch) = (Vec::new(), Vec::new(), BrotliScratch::default());
-        Self { layout, encoding, attributes, tile, plain, scratch }
+        Self { events, layout, encoding, attributes: attributes.into(), tile, plain, scratch }
     }
 
     fn interleave<'r>(
@@ -59,7 +75,64 @@ impl PayloadEncoder {
     }
 }
 
-impl NodeEncoder for PayloadEncoder {
+impl PayloadEncoder<'_> {
+    fn check_stop(&self) -> Result<(), ConvertError> {
+        if self.events.stop_requested() { Err(ConvertError::Interrupted) } else { Ok(()) }
+    }
+
+    /// Appends the compressed `plain` to `out`.
+    fn compress(&mut self, quality: u8, out: &mut Vec<u8>) -> Result<(), ConvertError> {
+        if quality >= LONG_QUALITY && self.plain.len() > SHORT_BYTES {
+            return self.compress_apart(quality, out);
+        }
+        let goes_on = || !self.events.stop_requested();
+        encode_brotli_while(&self.attributes, &self.plain, quality, &mut self.scratch, &goes_on, out).map_err(failed)
+    }
+
+    /// The same on another thread, which is left alone with its work if the run is to stop: it ends by itself at the next
+    /// question.
+    fn compress_apart(&mut self, quality: u8, out: &mut Vec<u8>) -> Result<(), ConvertError> {
+        let is_left_alone = Arc::new(AtomicBool::new(false));
+        let (send, receive) = channel();
+        let (attributes, stop) = (Arc::clone(&self.attributes), Arc::clone(&is_left_alone));
+        let (plain, mut scratch) = (std::mem::take(&mut self.plain), std::mem::take(&mut self.scratch));
+        let work = move || {
+            let mut out = Vec::new();
+            let goes_on = || !stop.load(Ordering::Relaxed);
+            let encoded = encode_brotli_while(&attributes, &plain, quality, &mut scratch, &goes_on, &mut out);
+            let _ = send.send((encoded, out, plain, scratch)); // nobody waits for it if the run has stopped
+        };
+        std::thread::Builder::new()
+            .name("pointmill-brotli".to_owned())
+            .spawn(work)
+            .map_err(|e| ConvertError::Internal(format!("starting a thread: {e}")))?;
+        loop {
+            match receive.recv_timeout(ASK) {
+                Ok((encoded, bytes, plain, scratch)) => {
+                    (self.plain, self.scratch) = (plain, scratch);
+                    encoded.map_err(failed)?;
+                    out.extend_from_slice(&bytes);
+                    return Ok(());
+                }
+                Err(RecvTimeoutError::Timeout) => self.check_stop().inspect_err(|_| {
+                    is_left_alone.store(true, Ordering::Relaxed);
+                })?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(ConvertError::Internal("Brotli: its thread ended".to_owned()));
+                }
+            }
+        }
+    }
+}
+
+fn failed(error: WriteError) -> ConvertError {
+    match error {
+        WriteError::Stopped => ConvertError::Interrupted,
+        other => ConvertError::Internal(format!("Brotli: {other}")),
+    }
+}
+
+impl NodeEncoder for PayloadEncoder<'_> {
     fn encode<'r>(
         &mut self,
         _: NodeKey,
@@ -67,15 +140,15 @@ impl NodeEncoder for PayloadEncoder {
         written: &mut Checksum,
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError> {
+        self.check_stop()?;
         match self.encoding {
             Encoding::Default => self.interleave(records, out, written),
             Encoding::Brotli { quality } => {
                 let mut plain = std::mem::take(&mut self.plain);
                 plain.clear();
                 self.interleave(records, &mut plain, written);
-                let encoded = encode_brotli(&self.attributes, &plain, quality, &mut self.scratch, out);
                 self.plain = plain;
-                encoded.map_err(|e| ConvertError::Internal(format!("Brotli: {e}")))?;
+                self.compress(quality, out)?;
             }
         }
         Ok(())

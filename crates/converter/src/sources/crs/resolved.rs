@@ -33,9 +33,9 @@ impl ResolvedCrs {
         self.unit.is_some_and(Unit::is_angle)
     }
 
-    pub(super) fn is_same(&self, other: &Self) -> bool {
-        let key = |crs: &Self| (crs.projection.clone(), crs.label.clone(), crs.unit, crs.vertical_unit);
-        key(self) == key(other)
+    /// Equal for systems that are the same, though files may declare them in other words.
+    pub(super) fn kind(&self) -> String {
+        format!("{:?}", (&self.projection, &self.label, self.unit, self.vertical_unit))
     }
 }
 

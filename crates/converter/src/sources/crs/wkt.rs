@@ -73,6 +73,12 @@ pub(super) fn is_whole(text: &str) -> bool {
     elements(text).is_whole
 }
 
+/// True if the name of the outermost system stands in quotes, as it must; what holds a system has none.
+pub(super) fn has_quoted_name(text: &str) -> bool {
+    let (keyword, inner) = text.trim_start().split_once(['[', '(']).unwrap_or((text, ""));
+    is_one_of(keyword.trim_end(), &HOLDERS) || inner.trim_start().starts_with('"')
+}
+
 /// True if text follows behind the last system.
 pub(super) fn is_followed(text: &str) -> bool {
     !text[elements(text).end..].trim().is_empty()

@@ -21,6 +21,8 @@ pub(super) enum Fault {
     Broken(u64, String),
     /// The byte at which it is something that this version does not read, and what.
     Unsupported(u64, String),
+    /// The byte at which what is read does not fit memory any more.
+    Memory(u64),
     /// The source could not be read.
     Io(io::Error),
 }
@@ -31,6 +33,7 @@ impl Fault {
         match self {
             Self::Broken(_, what) => Self::Broken(at, what),
             Self::Unsupported(_, what) => Self::Unsupported(at, what),
+            Self::Memory(_) => Self::Memory(at),
             Self::Io(e) => Self::Io(e),
         }
     }
@@ -244,6 +247,7 @@ mod tests {
         let mut json = Json::new(&memory, "a").map_err(|_| "io")?;
         read(&mut json).and_then(|v| json.end().map(|()| v)).map_err(|fault| match fault {
             Fault::Broken(at, what) | Fault::Unsupported(at, what) => format!("{at}: {what}"),
+            Fault::Memory(at) => format!("{at}: memory"),
             Fault::Io(e) => e.to_string(),
         })
     }

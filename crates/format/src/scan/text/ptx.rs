@@ -9,7 +9,7 @@ use super::table::Table;
 use crate::scan::source::Source;
 use crate::scan::tabular::ascii::{Tokens, parse};
 use crate::scan::tabular::{LineRule, Pose, lines, reconcile};
-use crate::{Advice, Attribute, AttributeType, Piece, ReadError, Scan, ScanPart};
+use crate::{Advice, Attribute, AttributeType, Lattice, Piece, ReadError, Scan, ScanPart};
 
 /// Lines of a scan before its cells.
 const HEADER_LINES: usize = 10;
@@ -184,9 +184,22 @@ impl Header {
             let [x, y, z, _] = numbers::<4>(source, line)?;
             *row = [x, y, z];
         }
+        if let Some(i) = misplaced(&matrix) {
+            let what = format!("row {} of the matrix places no point where coordinates can be", i + 1);
+            return Err(ReadError::broken(source.path(), lines[6 + i].0, what).advise(Advice::ExportAgain));
+        }
         let (end, _) = lines::skip(source, at, HEADER_LINES as u64)?;
         Ok(Self { cells, matrix, end })
     }
+}
+
+/// The first row of a matrix that takes points where no coordinate can be; the last row moves them.
+fn misplaced(matrix: &[[f64; 3]; 4]) -> Option<usize> {
+    let factors = Lattice::FINEST_STEP..=1.0 / Lattice::FINEST_STEP;
+    matrix.iter().enumerate().position(|(i, row)| {
+        let largest = row.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
+        if i == 3 { !Lattice::is_sound_offset(largest) } else { largest != 0.0 && !factors.contains(&largest) }
+    })
 }
 
 /// The `N` finite numbers of a header line.
@@ -202,7 +215,19 @@ fn numbers<const N: usize>(source: &Source, (at, line): &(u64, Vec<u8>)) -> Resu
 
 #[cfg(test)]
 mod tests {
-    use super::is_point;
+    use super::{is_point, misplaced};
+
+    #[test]
+    fn matrices_that_place_no_point_are_found_by_their_row() {
+        let turn = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [5e5, 5e6, -3.0]];
+        assert_eq!(misplaced(&turn), None);
+        for (row, value, expected) in [(0, 5e-310, Some(0)), (2, 1e300, Some(2)), (3, 2e30, Some(3)), (1, 1e-15, None)]
+        {
+            let mut odd = turn;
+            odd[row] = [value; 3];
+            assert_eq!(misplaced(&odd), expected, "{value:e}");
+        }
+    }
 
     #[test]
     fn zeros_in_any_spelling_are_no_point() {

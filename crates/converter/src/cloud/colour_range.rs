@@ -1,0 +1,106 @@
+//! The range of the colours of one input, small: there may be very many inputs.
+
+use pointmill_format::Column;
+
+/// Least and greatest red, green and blue of 16 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ColourRange {
+    min: [u16; 3],
+    max: [u16; 3],
+}
+
+impl Default for ColourRange {
+    /// Of no colour.
+    fn default() -> Self {
+        Self { min: [u16::MAX; 3], max: [0; 3] }
+    }
+}
+
+/// Values that are compared at once: whole colours, and vectors of the processor.
+const LANES: usize = 24;
+
+impl ColourRange {
+    /// Includes the colours of `column` (three `u16` a point) that `selection` names (`None`: all).
+    pub(crate) fn include(&mut self, column: &Column, selection: Option<&[u32]>) {
+        let Column::UInt16(values) = column else { return };
+        let colours = values.as_chunks::<3>().0;
+        match selection {
+            Some(chosen) => chosen.iter().for_each(|i| self.add(colours[*i as usize])),
+            None => {
+                let (mut min, mut max) = ([u16::MAX; LANES], [0; LANES]);
+                let (lanes, rest) = values.as_chunks::<LANES>();
+                for values in lanes {
+                    for i in 0..LANES {
+                        min[i] = min[i].min(values[i]);
+                        max[i] = max[i].max(values[i]);
+                    }
+                }
+                if !lanes.is_empty() {
+                    min.as_chunks::<3>().0.iter().chain(max.as_chunks::<3>().0).for_each(|colour| self.add(*colour));
+                }
+                rest.as_chunks::<3>().0.iter().for_each(|colour| self.add(*colour));
+            }
+        }
+    }
+
+    /// Includes a colour.
+    pub(crate) fn add(&mut self, colour: [u16; 3]) {
+        for e in 0..3 {
+            self.min[e] = self.min[e].min(colour[e]);
+            self.max[e] = self.max[e].max(colour[e]);
+        }
+    }
+
+    pub(crate) fn merge(&mut self, other: &Self) {
+        for e in 0..3 {
+            self.min[e] = self.min[e].min(other.min[e]);
+            self.max[e] = self.max[e].max(other.max[e]);
+        }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.min[0] > self.max[0]
+    }
+
+    /// True if no value needs more than 8 bits.
+    pub(crate) fn fits_eight_bits(&self) -> bool {
+        self.max.iter().all(|v| *v <= 255)
+    }
+
+    /// True if some value is above 0.
+    pub(crate) fn is_lit(&self) -> bool {
+        self.max.iter().any(|v| *v > 0)
+    }
+
+    /// Least and greatest values as numbers; `None` if there is no colour.
+    pub(crate) fn ends(&self) -> Option<[[f64; 3]; 2]> {
+        (!self.is_empty()).then(|| [self.min.map(f64::from), self.max.map(f64::from)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_range_is_that_of_all_colours_or_of_the_chosen_ones() {
+        let mut values: Vec<u16> = (0..300).map(|i| 1000 + i % 7).collect();
+        values[3 * 50 + 1] = 9;
+        values[3 * 99 + 2] = 60_000;
+        let column = Column::UInt16(values);
+        let (mut all, mut chosen) = (ColourRange::default(), ColourRange::default());
+        all.include(&column, None);
+        assert_eq!(all, ColourRange { min: [1000, 9, 1000], max: [1006, 1006, 60_000] });
+        assert!(!all.fits_eight_bits() && chosen.is_empty() && !chosen.is_lit() && chosen.ends().is_none());
+        chosen.include(&column, Some(&[0, 50]));
+        let Column::UInt16(values) = &column else { panic!() };
+        let of = |e: usize| (values[e].min(values[150 + e]), values[e].max(values[150 + e]));
+        let ends = [[0, 1, 2].map(|e| f64::from(of(e).0)), [0, 1, 2].map(|e| f64::from(of(e).1))];
+        assert_eq!(chosen.ends(), Some(ends));
+        let mut few = ColourRange::default();
+        few.include(&Column::UInt16(vec![3, 200, 255]), None);
+        assert!(few.fits_eight_bits() && few.is_lit());
+        few.merge(&all);
+        assert_eq!(few, ColourRange { min: [3, 9, 255], max: [1006, 1006, 60_000] });
+    }
+}

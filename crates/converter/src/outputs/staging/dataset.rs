@@ -1,0 +1,73 @@
+//! A dataset on its way into the output.
+
+use std::io::{self, BufWriter, Write as _};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use crate::error::ConvertError;
+use crate::runtime::disk::{sync_file_system, sync_folder, sync_path};
+use crate::runtime::{Disk, DiskFile, Sequential};
+
+/// Bytes of JSON that are written at once.
+const JSON_BUFFER: usize = 64 << 10;
+
+/// A dataset on its way into a [`super::StagedFolder`].
+pub(crate) struct StagedDataset {
+    pub(super) folder: PathBuf,
+    /// What errors name: where it is to be.
+    pub(super) shown: PathBuf,
+    pub(super) name: &'static str,
+    pub(super) disk: Arc<dyn Disk>,
+}
+
+impl StagedDataset {
+    /// The name of its folder below the output, or nothing.
+    pub(crate) fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Makes a file; whoever writes it syncs it.
+    pub(crate) fn create(&self, name: &str) -> Result<DiskFile, ConvertError> {
+        DiskFile::create(&self.folder.join(name), self.shown.join(name), &self.disk)
+    }
+
+    /// Opens a file that was made before, to write more.
+    pub(crate) fn open(&self, name: &str) -> Result<DiskFile, ConvertError> {
+        DiskFile::open(&self.folder.join(name), self.shown.join(name), &self.disk)
+    }
+
+    /// Writes and syncs a small file.
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), ConvertError> {
+        let file = self.create(name)?;
+        file.write_at(bytes, 0, "writing the file")?;
+        file.sync("writing the file")
+    }
+
+    /// Writes and syncs an object, however large, as indented JSON.
+    pub(super) fn write_json(&self, name: &str, object: &impl Serialize) -> Result<(), ConvertError> {
+        let doing = "writing the file";
+        let file = self.create(name)?;
+        let mut writer = BufWriter::with_capacity(JSON_BUFFER, Sequential::new(&file));
+        let written = serde_json::to_writer_pretty(&mut writer, object).map_err(io::Error::from);
+        written.and_then(|()| writer.flush()).map_err(|e| file.failed(doing, e))?;
+        file.sync(doing)
+    }
+
+    /// Syncs everything that the file system of the dataset has; false where the system cannot.
+    pub(crate) fn sync_file_system(&self) -> Result<bool, ConvertError> {
+        sync_file_system(&*self.disk, &self.folder).map_err(|e| ConvertError::io(&self.shown, "syncing the files", e))
+    }
+
+    /// Syncs a file that was made before and is closed.
+    pub(crate) fn sync_file(&self, name: &str) -> Result<(), ConvertError> {
+        let path = self.folder.join(name);
+        sync_path(&*self.disk, &path).map_err(|e| ConvertError::io(self.shown.join(name), "syncing the file", e))
+    }
+
+    /// Syncs the names of the files.
+    pub(crate) fn sync(&self) -> Result<(), ConvertError> {
+        sync_folder(&*self.disk, &self.folder).map_err(|e| ConvertError::io(&self.shown, "syncing the output", e))
+    }
+}
