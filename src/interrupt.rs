@@ -96,7 +96,10 @@ fn abandon_late_work() {
     tell_of_cleaning(cleaning_line);
     let folder = FOLDER.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some(folder) = folder {
-        // Threads may make files in it until the process ends. What they leave the next run removes.
+        // Threads make files in it until the process ends, but not under another name. What is left the next run removes.
+        let mut other = folder.clone().into_os_string();
+        other.push("0");
+        let folder = if fs::rename(&folder, &other).is_ok() { PathBuf::from(other) } else { folder };
         let _ = (0..3).find(|_| fs::remove_dir_all(&folder).is_ok());
     }
     end("interrupted; nothing was written");
