@@ -99,7 +99,7 @@ fn validation_ends_at_once() {
 fn a_second_signal_does_not_cut_the_cleaning_short() {
     let dir = stage(400_000);
     for pause in [0, 20, 150] {
-        let child = start(&dir, &["--to", "bintree", "--layout", "files", "--capacity", "20"]);
+        let child = start(&dir, &["--to", "bintree", "--layout", "files", "--capacity", "60"]);
         std::thread::sleep(Duration::from_millis(900));
         send(&child, "-INT");
         std::thread::sleep(Duration::from_millis(pause));

@@ -45,9 +45,9 @@ impl ColourRange {
 
     /// Includes a colour.
     pub(crate) fn add(&mut self, colour: [u16; 3]) {
-        for e in 0..3 {
-            self.min[e] = self.min[e].min(colour[e]);
-            self.max[e] = self.max[e].max(colour[e]);
+        for (e, v) in colour.into_iter().enumerate() {
+            self.min[e] = self.min[e].min(v);
+            self.max[e] = self.max[e].max(v);
         }
     }
 

@@ -31,7 +31,7 @@ impl<'a> Parser<'a> {
         Ok(Self { root, records, byte_offset, path, keys: VecDeque::from([root]), nodes: Vec::new() })
     }
 
-    fn broken(&self, index: usize, what: String) -> ReadError {
+    fn broken(&self, index: usize, what: &str) -> ReadError {
         let what = format!("the hierarchy chunk of {} has {} records, {what}", self.root, self.records);
         ReadError::broken(self.path, self.at(index), what)
     }
@@ -48,7 +48,7 @@ impl<'a> Parser<'a> {
         for bytes in records {
             let index = self.nodes.len();
             let Some(key) = self.keys.pop_front() else {
-                return Err(self.broken(index, format!("its child masks account for {index}")));
+                return Err(self.broken(index, &format!("its child masks account for {index}")));
             };
             let record = NodeRecord::from_bytes(bytes);
             self.nodes.push(Node { key, record });
@@ -60,7 +60,7 @@ impl<'a> Parser<'a> {
                 self.keys.push_back(child);
             }
             if (self.nodes.len() + self.keys.len()) as u64 > self.records {
-                return Err(self.broken(index, format!("its child masks call for more (node {key})")));
+                return Err(self.broken(index, &format!("its child masks call for more (node {key})")));
             }
         }
         Ok(())

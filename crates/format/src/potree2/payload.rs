@@ -66,7 +66,7 @@ impl Dataset {
         self.read_payload(node, &mut stored)?;
         let expected = self.claimed(node)?;
         let len = usize::try_from(expected).map_err(|_| self.no_room(node, expected))?;
-        brotli::count(&stored, len).map_err(|fault| self.fault(node, fault, expected))
+        brotli::count(&stored, len).map_err(|fault| self.fault(node, &fault, expected))
     }
 
     /// Reads the points of a node; replaces the contents of `out`. A node without payload has no points, whatever its
@@ -129,7 +129,7 @@ impl Dataset {
         let Some(len) = len else { return Err(self.no_room(node, expected)) };
         let counted = if is_doubtful(expected, stored.len() as u64) { brotli::count(stored, len) } else { Ok(()) };
         let unpacked = counted.and_then(|()| brotli::decompress(stored, len, planes));
-        unpacked.map_err(|fault| self.fault(node, fault, expected))
+        unpacked.map_err(|fault| self.fault(node, &fault, expected))
     }
 
     /// The decompressed bytes that the record of a node asks for, unless no stream can give them.
@@ -139,25 +139,25 @@ impl Dataset {
         if expected <= u128::from(byte_size) * u128::from(MAX_BROTLI_RATIO) {
             return Ok(expected);
         }
-        Err(self.broken(node, format!("claims {points} points, more than {byte_size} compressed bytes can hold")))
+        Err(self.broken(node, &format!("claims {points} points, more than {byte_size} compressed bytes can hold")))
     }
 
     /// What is wrong with the stream of a node that should give `len` bytes.
-    fn fault(&self, node: &Node, fault: Fault, len: u128) -> ReadError {
+    fn fault(&self, node: &Node, fault: &Fault, len: u128) -> ReadError {
         let points = node.record.points;
-        match fault {
+        match *fault {
             Fault::Memory => self.no_room(node, len),
-            Fault::Corrupt => self.broken(node, "is not a Brotli stream, or a damaged one".into()),
+            Fault::Corrupt => self.broken(node, "is not a Brotli stream, or a damaged one"),
             Fault::Short(got) => {
-                self.broken(node, format!("decompresses to {got} bytes, its {points} points need {len}"))
+                self.broken(node, &format!("decompresses to {got} bytes, its {points} points need {len}"))
             }
             Fault::Long => {
-                self.broken(node, format!("decompresses to more than the {len} bytes of its {points} points"))
+                self.broken(node, &format!("decompresses to more than the {len} bytes of its {points} points"))
             }
         }
     }
 
-    fn broken(&self, node: &Node, what: String) -> ReadError {
+    fn broken(&self, node: &Node, what: &str) -> ReadError {
         let what = format!("node {} {what}", node.key);
         ReadError::broken(self.locate(OCTREE_FILE), node.record.byte_offset, what)
     }

@@ -80,9 +80,8 @@ fn records_of_las_are_held_up_to_a_limit_together() {
 
 #[test]
 fn a_record_of_4_gib_is_passed_over() {
-    let las = Las { point_format: 6, ..Las::terrain(100, 1) }.bytes();
-    let end = las.len() as u64;
-    let mut head = las.clone();
+    let mut head = Las { point_format: 6, ..Las::terrain(100, 1) }.bytes();
+    let end = head.len() as u64;
     put(&mut head, 235, &end.to_le_bytes());
     put(&mut head, 243, &1u32.to_le_bytes());
     let (path, mut file) = sparse(".las", &head, end + 60 + (4 << 30));

@@ -11,7 +11,7 @@ use crate::runtime::{DiskFile, Runtime};
 
 /// More files are not synced one by one: the file system is asked to sync all it has. That takes a tenth of the time, but
 /// it waits for what others write, too, and cannot be interrupted.
-const FEW_FILES: usize = 10_000;
+const FEW_FILES: usize = 50_000;
 
 /// The leaves of a dataset; any number of threads put them.
 pub(super) struct Leaves<'a> {

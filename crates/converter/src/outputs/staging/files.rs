@@ -54,9 +54,9 @@ impl StagedFiles {
         let is_there = fs::symlink_metadata(&self.output).is_ok();
         let replace = Replace { hidden: &mut self.hidden, output: &self.output, disk: &SystemDisk };
         if is_there {
-            replace.entries(replaced)?
+            replace.entries(replaced)?;
         } else {
-            replace.appear()?
+            replace.appear()?;
         }
         self.hidden.keep_parents();
         Ok(())

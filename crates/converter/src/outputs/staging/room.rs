@@ -50,7 +50,8 @@ impl Place {
             match HiddenFolder::beside(&self.path) {
                 Ok(hidden) if *standing == Standing::Nothing => return Ok((hidden, best)),
                 Ok(mut hidden) => {
-                    if self.can_be_moved(&mut hidden) && self.keeps_owner(standing, &hidden) {
+                    let suits = self.can_be_moved(&mut hidden) && self.keeps_owner(standing, &hidden);
+                    if suits {
                         return Ok((hidden, best));
                     }
                 }
