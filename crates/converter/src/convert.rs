@@ -99,6 +99,7 @@ fn write(
     }
 
     clock.begin(Phase::Finish, 0);
+    rt.check_stop()?;
     let account = Account {
         settings: settings(plan, targets),
         other_files: OtherFilesReport::new(&plan.other_files),
