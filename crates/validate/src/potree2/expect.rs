@@ -48,6 +48,12 @@ impl Geometry {
         (8.0..65_536.0).contains(&cells)
     }
 
+    /// False if the spacing of a level is lost in the rounding of doubles as large as the coordinates: what lies in a box, and
+    /// how far from it, is not decided by them then.
+    pub(crate) fn resolves(&self, level: u8) -> bool {
+        (0..3).all(|axis| self.tolerance(axis) < self.spacing_at(level))
+    }
+
     /// Rounding allowed when world coordinates are compared: 4 ulps of the cube's largest coordinate on that axis.
     ///
     /// A dequantised coordinate carries two roundings (product, sum), a box bound one per level in the worst case, of
@@ -176,6 +182,12 @@ mod tests {
                 assert_eq!(morton_cmp(*a, *b), code(*a).cmp(&code(*b)), "{a:?} {b:?}");
             }
         }
+    }
+
+    #[test]
+    fn spacings_below_the_rounding_of_the_coordinates_decide_nothing() {
+        let geometry = geometry(); // spacing 8 mm, 4 ulps of 4.4 million are 3.7 nm
+        assert!(geometry.resolves(0) && geometry.resolves(21) && !geometry.resolves(22));
     }
 
     #[test]

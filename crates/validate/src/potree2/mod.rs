@@ -97,7 +97,9 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     dataset.set_max_node_bytes(budget.left());
     unmask(&dataset, &mut tree, &findings)?;
     let metadata = dataset.metadata();
-    let neighbourhoods = options.neighbourhoods && geometry.spacing_is_sane();
+    let deepest = tree.nodes.iter().map(|n| n.key.level).max().unwrap_or(0);
+    let out_of_reach = out_of_reach(&geometry, deepest, options);
+    let neighbourhoods = out_of_reach.is_none();
     let node_bytes = largest_node(&tree, metadata);
     let thread_bytes = node_bytes + if neighbourhoods { tree.surroundings_bytes() } else { 0 };
     let threads = budget.threads(thread_bytes)?;
@@ -117,7 +119,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let walked = on_threads(threads, folder, || walk(&task))?;
     budget.give_back(threads as u64 * (thread_bytes - node_bytes));
     checks::ranges::check(metadata, &geometry, &walked.seen, walked.unreadable == 0, &findings);
-    note_what_was_skipped(&walked, &dataset, &geometry, options, &findings);
+    note_what_was_skipped(&walked, &dataset, out_of_reach, options, &findings);
     let summary = match &against {
         Some(against) => Some(against.compare(&Context {
             records: &Records { dataset: &dataset, tree: &tree },
@@ -226,10 +228,20 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: &ReadError) -> 
     Ok(Outcome::new(findings))
 }
 
+/// Why spacing and coverage are not looked at, if they are not.
+fn out_of_reach(geometry: &Geometry, deepest: u8, options: &Options) -> Option<&'static str> {
+    match options.neighbourhoods {
+        false => Some("not asked for"),
+        true if !geometry.spacing_is_sane() => Some("the spacing is out of proportion"),
+        true if !geometry.resolves(deepest) => Some("the spacing is below the rounding of coordinates so large"),
+        true => None,
+    }
+}
+
 fn note_what_was_skipped(
     walked: &Walked,
     dataset: &Dataset,
-    geometry: &Geometry,
+    out_of_reach: Option<&'static str>,
     options: &Options,
     findings: &Findings,
 ) {
@@ -240,8 +252,7 @@ fn note_what_was_skipped(
     if metadata.attributes.iter().all(|a| a.histogram.is_none()) {
         findings.skip(Check::Histogram, "there are none");
     }
-    if !options.neighbourhoods || !geometry.spacing_is_sane() {
-        let why = if options.neighbourhoods { "the spacing is out of proportion" } else { "not asked for" };
+    if let Some(why) = out_of_reach {
         findings.skip(Check::Spacing, why);
         findings.skip(Check::Coverage, why);
     } else if walked.unreadable > 0 {
