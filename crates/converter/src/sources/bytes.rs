@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use super::schema::POSITION_BYTES;
 use super::source::Source;
 use super::union::Layout;
-use crate::error::{ConvertError, MemoryNeed};
+use crate::error::ConvertError;
 use crate::plan::Plan;
+use crate::runtime::{Budget, Least};
 
 /// What an input takes after its header was read: counts and ranges of its points, a block of records that nothing else
 /// is in, its entry in the report. Measured by a run over many scans of one point (tests/cli/many.rs).
@@ -20,23 +22,25 @@ const PATHS: u64 = 3;
 /// A warning without its path.
 const WARNING_BYTES: u64 = 512;
 
-/// Inputs may take this part of the memory: the points need some, too.
-const SHARE: u64 = 2;
-
 /// Inputs that take less are never the reason that a ceiling is too small.
 const FEW_BYTES: u64 = 8 << 20;
 
-/// Fails if the inputs take too much of the memory of the plan.
-pub(super) fn check(plan: &Plan, bytes: u64) -> Result<(), ConvertError> {
-    if bytes <= (plan.memory_bytes / SHARE).max(FEW_BYTES) {
-        return Ok(());
-    }
-    let why = MemoryNeed::Inputs { bytes };
-    Err(ConvertError::Memory { ceiling: plan.memory_bytes, needed: bytes.saturating_mul(SHARE), why })
+/// Bytes of a record, where nothing is known of them yet: position, colour and the attributes of LAS.
+const USUAL_RECORD: usize = 46;
+
+/// Bytes that decoding takes, where nothing is known of the scans yet.
+const USUAL_DECODING: u64 = 12 << 20;
+
+/// Fails where inputs of these paths leave no room for the run itself, before one of them is opened. The ceiling that is
+/// named is enough for usual scans.
+pub(super) fn check(plan: &Plan, paths: &[&Path]) -> Result<(), ConvertError> {
+    let bytes = least_bytes(paths);
+    let budget = |record, decoding| Budget::new(plan, record, Least::of([], decoding, bytes)).map(|_| ());
+    if bytes <= FEW_BYTES || budget(POSITION_BYTES, 0).is_ok() { Ok(()) } else { budget(USUAL_RECORD, USUAL_DECODING) }
 }
 
 /// What inputs of these paths take in all, at least: before their headers were read.
-pub(super) fn least_bytes(paths: &[&Path]) -> u64 {
+fn least_bytes(paths: &[&Path]) -> u64 {
     let each = (size_of::<Source>() + size_of::<PathBuf>()) as u64 + LATER_BYTES;
     paths.iter().map(|path| each + path_bytes(path.as_os_str().len())).sum()
 }

@@ -130,7 +130,7 @@ impl Sources {
         let mut paths: Vec<&Path> = plan.inputs.iter().map(PathBuf::as_path).collect();
         paths.sort_unstable();
         paths.dedup();
-        bytes::check(plan, bytes::least_bytes(&paths))?;
+        bytes::check(plan, &paths)?;
         let workers = Workers::start(plan.threads.min(paths.len()).min(MOST_THREADS), events)?;
         let open = OpenScans::new(Opener::new(plan, workers.threads), plan.threads);
         let probe = Probe { open: &open, unreadable: plan.unreadable, shared: Mutex::new(Shared::default()) };
@@ -149,7 +149,6 @@ impl Sources {
         }
         drop(probe);
         let sources = found.combine(open)?;
-        bytes::check(plan, sources.bytes)?;
         sources.warnings.iter().for_each(|w| events.warning(w));
         Ok(sources)
     }
