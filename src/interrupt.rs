@@ -30,7 +30,7 @@ const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Makes Ctrl-C end the process with exit code 130, and a file that grows beyond the limit an error of the write.
 pub(crate) fn watch() {
-    let ignored = signals::ignored();
+    let is_hangup_ignored = signals::is_hangup_ignored();
     // Where no handler can be set the default one ends the process, and outputs are safe all the same.
     let _ = ctrlc::set_handler(|| {
         STOP.store(true, Ordering::Relaxed);
@@ -42,8 +42,9 @@ pub(crate) fn watch() {
             _ => end("interrupted; the next run with the same output removes what this one leaves"),
         }
     });
-    // As for `nohup`: who started the program has said that it must not hear these.
-    ignored.into_iter().for_each(signals::ignore);
+    if is_hangup_ignored {
+        signals::ignore_hangup(); // `nohup` has said that the end of the session is not that of the run
+    }
     signals::ignore_file_size();
 }
 
@@ -125,20 +126,21 @@ pub(crate) fn say(line: impl Into<String>) {
 
 #[cfg(unix)]
 mod signals {
-    /// Those of the signals watched that are ignored now.
-    pub(super) fn ignored() -> Vec<libc::c_int> {
-        let is_ignored = |signal: &libc::c_int| {
-            // SAFETY: without a new action the call only writes the present one, to memory of that type that lives here.
-            let (result, action) = unsafe {
-                let mut action: libc::sigaction = std::mem::zeroed();
-                (libc::sigaction(*signal, std::ptr::null(), &mut action), action)
-            };
-            result == 0 && action.sa_sigaction == libc::SIG_IGN
+    /// True if the signal at the end of a session is ignored now.
+    pub(super) fn is_hangup_ignored() -> bool {
+        // SAFETY: without a new action the call only writes the present one, to memory of that type that lives here.
+        let (result, action) = unsafe {
+            let mut action: libc::sigaction = std::mem::zeroed();
+            (libc::sigaction(libc::SIGHUP, std::ptr::null(), &mut action), action)
         };
-        [libc::SIGINT, libc::SIGTERM, libc::SIGHUP].into_iter().filter(is_ignored).collect()
+        result == 0 && action.sa_sigaction == libc::SIG_IGN
     }
 
-    pub(super) fn ignore(signal: libc::c_int) {
+    pub(super) fn ignore_hangup() {
+        ignore(libc::SIGHUP);
+    }
+
+    fn ignore(signal: libc::c_int) {
         // SAFETY: ignoring a signal runs no code and touches no memory of ours.
         unsafe { libc::signal(signal, libc::SIG_IGN) };
     }
@@ -151,11 +153,11 @@ mod signals {
 
 #[cfg(not(unix))]
 mod signals {
-    pub(super) fn ignored() -> Vec<i32> {
-        Vec::new()
+    pub(super) fn is_hangup_ignored() -> bool {
+        false
     }
 
-    pub(super) fn ignore(_: i32) {}
+    pub(super) fn ignore_hangup() {}
 
     pub(super) fn ignore_file_size() {}
 }
