@@ -229,7 +229,8 @@ mod tests {
         let side = 1u32 << 27; // of level 4; spacing 2^20
         for room in [1 << 20, 0] {
             let memory = Arc::new(Pool::new(room + (64 << 10), room));
-            let borders = Borders::new(Spacing::default(), &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
+            let borders =
+                Borders::new(Spacing::default(), &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
             let mut first = UnitBorders::new(&borders, key(3, 0, 0, 0));
             let near = TreePoint([2 * side - 9, 5, side + 7]);
             let far = TreePoint([2 * side - (1 << 20) - 1, 5, side + 7]);

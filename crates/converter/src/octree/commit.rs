@@ -187,12 +187,7 @@ impl<'a, S: NodeSink> Committer<'a, S> {
 }
 
 impl State {
-    fn append(
-        &mut self,
-        unit: BuiltUnit,
-        row_bytes: Option<u64>,
-        ready: &mut Vec<Placed>,
-    ) -> Result<(), ConvertError> {
+    fn append(&mut self, unit: BuiltUnit, row_bytes: Option<u64>, ready: &mut Vec<Placed>) -> Result<(), ConvertError> {
         let BuiltUnit { pieces, root, ledger, overfull_leaves } = unit;
         self.ledger.merge(&ledger);
         self.overfull_leaves += overfull_leaves;

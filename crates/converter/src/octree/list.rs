@@ -1,7 +1,7 @@
 //! Records of nodes that wait for the nodes above them: in memory as long as there is room, else in a temporary file.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use super::raise::Points;
 use crate::error::ConvertError;
@@ -56,11 +56,20 @@ pub(super) struct Lists {
     file: Mutex<Option<Arc<DiskFile>>>,
     /// Where the next list that goes to the file begins.
     end: AtomicU64,
+    /// Who samples a node of many points: side by side as long as there is memory.
+    pub(super) large: RwLock<()>,
 }
 
 impl Lists {
     pub(super) fn new(stride: usize, memory: &Arc<Pool>, temp: &TempFiles) -> Self {
-        Self { stride, memory: Arc::clone(memory), temp: temp.clone(), file: Mutex::new(None), end: AtomicU64::new(0) }
+        Self {
+            stride,
+            memory: Arc::clone(memory),
+            temp: temp.clone(),
+            file: Mutex::new(None),
+            end: AtomicU64::new(0),
+            large: RwLock::new(()),
+        }
     }
 
     /// Accounts for a list of a chunk: it stays in memory if there is room.

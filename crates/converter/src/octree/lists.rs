@@ -1,6 +1,6 @@
 //! Nodes whose children are lists: their records may be on the disk, and pass by in pieces.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use pointmill_format::NodeKey;
 
@@ -24,7 +24,7 @@ const LARGE_BYTES: u64 = 4 << 20;
 pub(super) struct ListMemory {
     records: Vec<u8>,
     part: Part,
-    /// What the sampler has taken for the largest node.
+    /// What the sampler has.
     sampled: Reservation,
 }
 
@@ -33,6 +33,9 @@ impl ListMemory {
         Self { records: Vec::new(), part: Part::default(), sampled }
     }
 }
+
+/// What a sampler has of a node is kept for the next up to this size, bytes.
+const USUAL_SAMPLE_BYTES: u64 = 1 << 20;
 
 /// Nodes while they are made from lists.
 pub(super) struct ListNodes<'n, 'a, E> {
@@ -55,7 +58,13 @@ struct Part {
 
 impl<E: NodeEncoder> ListNodes<'_, '_, E> {
     /// Samples one child; returns what it keeps.
-    fn sample_child(&mut self, level: u8, mut list: List, taken: &mut Writer) -> Result<List, ConvertError> {
+    fn sample_child(
+        &mut self,
+        level: u8,
+        mut list: List,
+        taken: &mut Writer,
+        is_short: bool,
+    ) -> Result<List, ConvertError> {
         if list.is_one_place {
             // of points that share a place a sample takes the first, if any
             let first = self.lists.first(&list)?;
@@ -76,12 +85,19 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
             if part.records.len() >= PART_BYTES {
                 let cut = part.trees.windows(2).rposition(|w| self.sampler.may_be_cut(level, w[0], w[1]));
                 self.choose(&mut part, cut.map_or(0, |i| i + 1), taken, &mut rest)?;
+                self.account(is_short)?;
             }
         }
         let all = part.trees.len();
         self.choose(&mut part, all, taken, &mut rest)?;
+        self.account(is_short)?;
         self.memory.part = part;
         rest.finish(self.lists)
+    }
+
+    /// Accounts for what the sampler has, if that was not done beforehand.
+    fn account(&mut self, is_short: bool) -> Result<(), ConvertError> {
+        if is_short { self.memory.sampled.grow_to(self.sampler.bytes()) } else { Ok(()) }
     }
 
     /// Decides about the first `count` candidates of a part.
@@ -98,7 +114,6 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
             let writer = if *is_taken { &mut *taken } else { &mut *rest };
             writer.push(record, self.lists)?;
         }
-        self.memory.sampled.grow_to(self.sampler.bytes())?; // memory that was touched stays
         part.records.drain(..count * stride);
         part.trees.drain(..count);
         Ok(())
@@ -107,15 +122,30 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
 
 impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<List>]) -> Result<List, ConvertError> {
-        self.sampler.begin(key, self.borders.around(key)?);
         let candidates = children.iter().map(|c| c.points.count()).sum();
+        let mut side_by_side = Some(self.lists.large.read().unwrap_or_else(PoisonError::into_inner));
+        let expected = Sampler::expected_bytes(candidates);
+        let room = self.pool.try_take(Consumer::Work, expected).then(|| {
+            Reservation::of(self.pool, Consumer::Work, expected) // given back when the node has its sample
+        });
+        // where memory is short, one node of many points at a time
+        let is_short = expected > USUAL_SAMPLE_BYTES && room.is_none();
+        let alone = is_short.then(|| {
+            side_by_side.take();
+            self.lists.large.write().unwrap_or_else(PoisonError::into_inner)
+        });
+        self.sampler.begin(key, self.borders.around(key)?);
         self.sampler.expect(candidates);
         let mut taken = Writer::new(candidates);
         for child in children {
             let list = std::mem::replace(&mut child.points, List::empty());
-            child.points = self.sample_child(key.level, list, &mut taken)?;
+            child.points = self.sample_child(key.level, list, &mut taken, alone.is_some())?;
         }
         self.borders.note(key, self.sampler.border());
+        if self.sampler.bytes() > USUAL_SAMPLE_BYTES {
+            self.sampler.release();
+        }
+        self.memory.sampled.resize(0)?;
         taken.finish(self.lists)
     }
 

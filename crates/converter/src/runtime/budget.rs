@@ -15,7 +15,7 @@ const GATHER_BYTES: u64 = 20 << 20;
 const BUILD_BYTES: u64 = 6 << 20;
 
 /// Less than this in the pool is not worth beginning.
-const LEAST_POOL_BYTES: u64 = 24 << 20;
+const LEAST_POOL_BYTES: u64 = 32 << 20;
 
 /// Larger chunks gain nothing: they leave the caches and the threads uneven.
 pub(crate) const MAX_CHUNK_POINTS: u64 = 400_000;

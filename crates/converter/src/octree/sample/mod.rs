@@ -68,6 +68,11 @@ impl Sampler {
         self.over_border.begin(node.level, self.corner, self.spacing, over_border);
     }
 
+    /// Memory that a node of so many candidates needs at most, bytes.
+    pub(crate) fn expected_bytes(candidates: u64) -> u64 {
+        poisson::expected_bytes(candidates)
+    }
+
     /// Says how many candidates of the node there will be.
     pub(crate) fn expect(&mut self, candidates: u64) {
         if let Method::Poisson(p) = &mut self.method {
@@ -75,12 +80,22 @@ impl Sampler {
         }
     }
 
-    /// Memory that the points taken so far need, bytes.
+    /// Memory that the points taken so far and those around the node need, bytes.
     pub(crate) fn bytes(&self) -> u64 {
-        match &self.method {
+        let taken = match &self.method {
             Method::Poisson(p) => p.bytes(),
             Method::Cells { .. } => 0,
+        };
+        taken + self.over_border.bytes() + size_of_val(self.border.as_slice()) as u64
+    }
+
+    /// Gives back the memory of the last node.
+    pub(crate) fn release(&mut self) {
+        if let Method::Poisson(p) = &mut self.method {
+            p.release();
         }
+        self.over_border = OverBorder::default();
+        self.border = Vec::new();
     }
 
     /// Adds the points of the next child, or a part of them, in Morton order.

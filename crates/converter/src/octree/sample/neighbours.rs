@@ -39,6 +39,11 @@ impl OverBorder {
         self.points.sort_unstable_by_key(|(tile, point)| (*tile, point.0));
     }
 
+    /// Memory that they take, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        size_of_val(self.points.as_slice()) as u64
+    }
+
     /// Those that concern a tile; tiles are asked for in ascending order.
     #[inline]
     pub(super) fn of_tile(&mut self, tile: u32) -> &[(u32, TreePoint)] {
@@ -68,7 +73,8 @@ mod tests {
         over.begin(10, corner, Spacing::default(), &[far, edge, below]);
         assert_eq!(over.of_tile(0), [(0, below)]);
         let tile = |x, y, z| interleave([x, y, z]) as u32;
-        let mut found: Vec<u32> = [(31, 0, 15), (31, 1, 15), (31, 0, 16), (31, 1, 16)].map(|(x, y, z)| tile(x, y, z)).to_vec();
+        let mut found: Vec<u32> =
+            [(31, 0, 15), (31, 1, 15), (31, 0, 16), (31, 1, 16)].map(|(x, y, z)| tile(x, y, z)).to_vec();
         found.sort_unstable();
         assert!(over.of_tile(1).is_empty());
         for tile in found {

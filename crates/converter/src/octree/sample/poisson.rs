@@ -36,6 +36,11 @@ const LANES: usize = 8;
 /// More points of a node cannot be that far apart: spheres as dense as they can be packed, and some over the border.
 const MOST_TAKEN: u64 = 3_200_000;
 
+/// Memory that the points taken of so many candidates need at most, bytes.
+pub(super) fn expected_bytes(candidates: u64) -> u64 {
+    candidates.min(MOST_TAKEN) * size_of::<TreePoint>() as u64
+}
+
 /// The grid, kept from node to node; all empty in between.
 pub(super) struct Poisson {
     /// Squared distances (in squared units) below this conflict.
@@ -159,6 +164,11 @@ impl Poisson {
     /// Memory of the points taken so far, bytes.
     pub(super) fn bytes(&self) -> u64 {
         (self.taken.len() * size_of::<TreePoint>()) as u64
+    }
+
+    /// Gives back the memory of the points taken.
+    pub(super) fn release(&mut self) {
+        self.taken = Vec::new();
     }
 
     /// Chooses among the next candidates of a node; a part ends where a tile ends.

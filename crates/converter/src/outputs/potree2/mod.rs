@@ -32,10 +32,10 @@ const MAX_ELEMENTS: usize = 16;
 
 /// Bytes of the payloads of a subtree that one thread builds. Part of the result, and the same whatever else is written in
 /// the same run.
-const UNIT_BYTES: u64 = 14_000_000;
+const UNIT_BYTES: u64 = 10_000_000;
 
 /// Points of such a subtree: larger ones leave the caches and the threads uneven.
-const UNIT_POINTS: std::ops::RangeInclusive<u64> = 20_000..=400_000;
+const UNIT_POINTS: std::ops::RangeInclusive<u64> = 20_000..=300_000;
 
 /// Bytes of a hierarchy record.
 const NODE_BYTES: u64 = 22;
