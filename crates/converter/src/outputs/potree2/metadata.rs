@@ -7,7 +7,7 @@ use pointmill_format::{Aabb, Attribute, AttributeType, Lattice};
 use serde_json::Map;
 
 use super::layout::viewable;
-use super::settings::{Encoding, HIERARCHY_STEP, Potree2Settings};
+use super::settings::{Encoding, Potree2Settings};
 use crate::cloud::{Cloud, JobPoint, Ledger};
 use crate::octree::{Octree, Spacing};
 use crate::outputs::attributes::Choice;
@@ -55,7 +55,6 @@ pub(super) fn metadata(
     metadata.points = ledger.points();
     metadata.projection.clone_from(&facts.crs.projection);
     metadata.first_chunk_size = hierarchy.first_chunk_size;
-    metadata.step_size = HIERARCHY_STEP;
     metadata.depth = hierarchy.depth;
     metadata.encoding = match settings.encoding {
         Encoding::Default => StoredEncoding::Default,

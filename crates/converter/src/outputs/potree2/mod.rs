@@ -7,7 +7,7 @@ mod payload;
 mod settings;
 
 use pointmill_format::DatasetKind;
-use pointmill_format::potree2::{NodeEntry, encode_hierarchy};
+use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
 use serde_json::{Map, Value};
 
 pub(crate) use layout::OutputLayout;
@@ -15,7 +15,6 @@ pub(crate) use payload::PayloadEncoder;
 pub use settings::{Encoding, Potree2Settings};
 
 use self::layout::viewable;
-use self::settings::HIERARCHY_STEP;
 use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
@@ -117,7 +116,7 @@ impl Output for Potree2Settings {
         payloads.file.sync("syncing the payloads")?;
 
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
-        let hierarchy = encode_hierarchy(&mut nodes, HIERARCHY_STEP);
+        let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
         let metadata = metadata::metadata(cloud, self, &choice, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
