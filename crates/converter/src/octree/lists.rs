@@ -157,7 +157,7 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
         let mut pairs = Pairs::new(level);
         self.lists.each(points, |records| {
             for record in records.chunks_exact(self.lists.stride) {
-                pairs.add(&self.sampler, self.frame.tree(record));
+                pairs.add(self.sampler, self.frame.tree(record));
                 if pairs.count >= enough {
                     return Ok(false);
                 }

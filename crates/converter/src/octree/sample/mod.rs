@@ -15,7 +15,7 @@ pub(crate) use spacing::Spacing;
 
 use crate::cloud::{TREE_BITS, TreePoint};
 use cells::Candidates;
-use neighbours::{OverBorder, TILE_BITS};
+use neighbours::{OverBorder, TILE_BITS, tile_code};
 use spacing::squared_distance;
 
 /// Chooses samples; one for each thread.
@@ -196,10 +196,4 @@ fn free(
         }
         at += run;
     }
-}
-
-/// The Morton code of a tile in its node.
-#[inline]
-fn tile_code(t: TreePoint, corner: TreePoint, tile_shift: u32) -> u32 {
-    crate::cloud::morton::interleave(std::array::from_fn(|a| (t[a] - corner[a]) >> tile_shift)) as u32
 }

@@ -58,6 +58,12 @@ impl OverBorder {
     }
 }
 
+/// The Morton code of a tile in its node.
+#[inline]
+pub(super) fn tile_code(t: TreePoint, corner: TreePoint, tile_shift: u32) -> u32 {
+    interleave(std::array::from_fn(|a| (t[a] - corner[a]) >> tile_shift)) as u32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -18,9 +18,8 @@
 //! What neighbours have taken over the border of the node ([`OverBorder`]) is among the points around a tile, and is kept
 //! at the same distance.
 
-use super::neighbours::{OverBorder, TILE_BITS};
+use super::neighbours::{OverBorder, TILE_BITS, tile_code};
 use super::spacing::Spacing;
-use super::tile_code;
 use crate::cloud::TreePoint;
 use crate::cloud::morton::interleave;
 
