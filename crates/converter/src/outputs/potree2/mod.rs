@@ -7,7 +7,7 @@ mod payload;
 mod settings;
 
 use pointmill_format::DatasetKind;
-use pointmill_format::potree2::{NodeEntry, encode_hierarchy};
+use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
 use serde_json::{Map, Value};
 
 pub(crate) use layout::OutputLayout;
@@ -15,13 +15,12 @@ pub(crate) use payload::PayloadEncoder;
 pub use settings::{Encoding, Potree2Settings};
 
 use self::layout::viewable;
-use self::settings::HIERARCHY_STEP;
 use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
+use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling, Spacing};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Events, Runtime};
@@ -29,6 +28,13 @@ use crate::sources::{POSITION_BYTES, Schema};
 
 /// Elements of an attribute that readers of the format accept.
 const MAX_ELEMENTS: usize = 16;
+
+/// Bytes of the payloads of a subtree that one thread builds. Part of the result, and the same whatever else is written in
+/// the same run.
+const UNIT_BYTES: u64 = 10_000_000;
+
+/// Points of such a subtree: larger ones leave the caches and the threads uneven.
+const UNIT_POINTS: std::ops::RangeInclusive<u64> = 20_000..=300_000;
 
 /// Bytes of a hierarchy record.
 const NODE_BYTES: u64 = 22;
@@ -65,6 +71,10 @@ impl Output for Potree2Settings {
         u64::from(self.leaf_capacity)
     }
 
+    fn least_bytes(&self) -> u64 {
+        UNIT_BYTES
+    }
+
     fn disk_size(&self, _: &Plan, _: &Schema, kept: u64) -> DiskSize {
         let nodes = 3000 / u64::from(self.leaf_capacity).max(1) + 1;
         DiskSize { per_point: POSITION_BYTES as u64 + kept, per_1000_points: nodes * NODE_BYTES }
@@ -96,12 +106,17 @@ impl Output for Potree2Settings {
         let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
         let payloads =
             Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding, events: rt.events() };
-        let settings = OctreeSettings { sampling: self.sampling, leaf_capacity: self.leaf_capacity };
+        let settings = OctreeSettings {
+            sampling: self.sampling,
+            spacing: Spacing::default(),
+            leaf_capacity: self.leaf_capacity,
+            unit_points: self.unit_points(payloads.layout.stride),
+        };
         let tree = octree::build(cloud, rt, settings, &payloads)?;
         payloads.file.sync("syncing the payloads")?;
 
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
-        let hierarchy = encode_hierarchy(&mut nodes, HIERARCHY_STEP);
+        let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
         let metadata = metadata::metadata(cloud, self, &choice, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
@@ -124,6 +139,14 @@ impl Output for Potree2Settings {
             tree: metadata::tree_report(&tree),
             ..OutputReport::default()
         })
+    }
+}
+
+impl Potree2Settings {
+    /// Points of a subtree that one thread builds, for records of `stride` bytes.
+    fn unit_points(&self, stride: usize) -> u64 {
+        let (least, most) = UNIT_POINTS.into_inner();
+        (UNIT_BYTES / stride as u64).clamp(least, most).max(self.leaf_capacity.into())
     }
 }
 
