@@ -39,6 +39,7 @@ use crate::sources::{Fineness, Sources, far_out, intersection};
 use crate::warning::Warning;
 use far::FarPoints;
 use lattice::Loss;
+use partition::Hint;
 use pass::{Pass, PassEnd};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
@@ -66,7 +67,9 @@ pub(crate) fn gather<'a>(
 ) -> Result<Cloud<'a>, ConvertError> {
     let mut lattice = from_headers(plan, sources)?;
     let hint = sources.bounds_hint(plan.filter.bounds.as_ref());
-    let mut hint = hint.map(|bounds| quantized(&lattice.lattice, &bounds));
+    // What a box cuts has other bounds than the box, as a rule.
+    let is_promise = sources.declares_bounds() && plan.filter.bounds.is_none();
+    let mut hint = hint.map(|bounds| Hint { bounds: quantized(&lattice.lattice, &bounds), is_promise });
     let mut far_cut = None;
     for pass in 1..=MAX_PASSES {
         clock.begin(Phase::Read, sources.points_declared);
@@ -93,7 +96,7 @@ pub(crate) fn gather<'a>(
             && let Some((others, points, without)) = read.without_outliers(plan, sources, rt)?
         {
             warn(Warning::OutliersDropped { points, others });
-            hint = Some(quantized(&without.lattice, &others));
+            hint = Some(Hint { bounds: quantized(&without.lattice, &others), is_promise: false });
             (far_cut, lattice) = (Some(others), without);
             continue;
         }
@@ -102,17 +105,17 @@ pub(crate) fn gather<'a>(
         match (settled, complete) {
             (Some(other), None) => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(bounds);
+                hint = Some(Hint { bounds, is_promise: true });
                 lattice = other;
             }
             (Some(other), Some(_)) if pass < MAX_PASSES => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(bounds);
+                hint = Some(Hint { bounds, is_promise: true });
                 lattice = other;
             }
             (None, None) => {
                 warn(Warning::ReadAgain);
-                hint = Some(bounds);
+                hint = Some(Hint { bounds, is_promise: true });
             }
             (_, Some(mut gathered)) => {
                 if let Some(mark) = intake.mark {
