@@ -17,7 +17,7 @@ pub struct Potree2Settings {
 
 impl Default for Potree2Settings {
     fn default() -> Self {
-        Self { sampling: Sampling::Poisson, spacing: None, encoding: Encoding::Default, leaf_capacity: 10_000 }
+        Self { sampling: Sampling::Poisson, spacing: None, encoding: Encoding::Default, leaf_capacity: 20_000 }
     }
 }
 
