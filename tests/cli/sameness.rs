@@ -74,7 +74,7 @@ fn whatever_a_header_says_of_the_bounds() {
         file[187..195].copy_from_slice(&min.to_le_bytes());
         dir.write("a.las", &file);
         let to = formats.iter().flat_map(|format| ["--to", format]);
-        let args = ["convert", "a.las", "-o", "out", "--overwrite", "--memory", "100MiB", "--threads", "2"];
+        let args = ["convert", "a.las", "-o", "out", "--overwrite", "--memory", "160MiB", "--threads", "2"];
         let ended = dir.succeed(args.into_iter().chain(to));
         assert!(!ended.stderr().contains("again"), "{}", ended.stderr());
         let all = formats.map(|format| dataset(&dir.path("out").join(format)));
