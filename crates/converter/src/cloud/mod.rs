@@ -24,7 +24,7 @@ mod store;
 mod widening;
 
 pub(crate) use big_sort::BigSort;
-pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, xyz};
+pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, node, xyz};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{Cube, MOST_STEPS, TREE_BITS, high, tidy_world};
 pub(crate) use facts::Facts;

@@ -2,8 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::loose::node;
-use crate::cloud::{CellHash, CensusCell};
+use crate::cloud::{CellHash, CensusCell, node};
 
 /// A finer census is not kept: cells of twice the width take its place. A cube has no more cells of level 6.
 const MOST_CELLS: usize = 1 << 18;

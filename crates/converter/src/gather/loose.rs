@@ -4,7 +4,7 @@
 use pointmill_format::NodeKey;
 
 use super::context::{CellPart, CellParts, Collected};
-use crate::cloud::{Moments, RecordFrame, Regrouper, Segments, Sifted, Store, TREE_BITS, morton, position};
+use crate::cloud::{Moments, RecordFrame, Regrouper, Segments, Sifted, Store, TREE_BITS, morton, node, position};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Reservation, Runtime};
 
@@ -121,10 +121,4 @@ fn pieces<'s>(parts: impl Iterator<Item = &'s Segments>) -> Vec<Segments> {
     }
     pieces.extend((!open.is_empty()).then_some(open));
     pieces
-}
-
-/// The node of a level with that Morton code.
-pub(super) fn node(code: u64, level: u32) -> NodeKey {
-    let child = |key: NodeKey, l: u32| key.child((code >> (3 * l) & 7) as u8).unwrap_or(key);
-    (0..level).rev().fold(NodeKey::ROOT, child)
 }

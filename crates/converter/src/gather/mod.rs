@@ -1,9 +1,10 @@
 //! From sources to the cloud: every point decoded once, put on the lattice of the run, and kept in blocks of records
 //! that are grouped by the cells of a coarse grid, in memory or in one spill file.
 //!
-//! Headers choose the lattice and the grid before the first point is read. Where the points prove them wrong, the pass is
-//! repeated with another lattice or the measured bounds; each pass makes its own, and the one that succeeds makes the
-//! cloud.
+//! Headers choose the lattice and the grid before the first point is read. Where the points have another cube than headers
+//! promise, or nothing is promised, records are grouped by its cells once all are in. Where they need another lattice, or do
+//! not fit the integers of records, the pass is repeated; each pass makes its own store, and the one that succeeds makes
+//! the cloud.
 
 mod axis;
 mod batch;

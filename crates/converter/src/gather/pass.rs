@@ -9,11 +9,12 @@ use pointmill_format::{Aabb, Advice, Lattice, NodeKey, Scratch};
 use super::batch::Worker;
 use super::context::{CellPart, Collected, Context, Demand};
 use super::lattice::ulp;
-use super::loose::{Grouper, node};
+use super::loose::Grouper;
 use super::partition::{Hint, Partition};
 use super::visit::Visit;
 use crate::cloud::{
-    Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, SourceStats, Stats, Store, morton, xyz,
+    Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, SourceStats, Stats, Store, morton, node,
+    xyz,
 };
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};

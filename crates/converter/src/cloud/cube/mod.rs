@@ -99,7 +99,7 @@ impl Cube {
                 let span = side / scale[a];
                 // far more than what the quotient is rounded by, and less than the step of the reference that is to spare
                 let last = (span * (1.0 - 2f64.powi(-40))) as u64;
-                start = place(extent, (span / 2.0) as u64 + 1, last);
+                start = place(extent, ((span / 2.0) as u64).saturating_add(1), last);
                 (cube.shift[a], cube.factor[a]) = quotient(scale[a] / side);
             }
             let has_room = start.saturating_add(extent) <= LARGEST_STORED;

@@ -134,6 +134,9 @@ fn unequal_scales_give_one_cube_and_points_inside_it() {
     assert_eq!(u128::from(cube.tree(wide.max)[0]), (1_000_000u128 << 31) / 1_000_001);
     assert!((0..3).all(|a| cube.tree(wide.max)[a] < 1 << 31 && cube.tree(wide.min)[a] <= cube.tree(wide.max)[a]));
     assert_eq!(cube.tree(wide.max)[2] >> 30, 1, "thin: above the middle plane");
+    // more steps of y across the cube than 64 bits count
+    let cube = Cube::around(&wide, &lattice([1e9, 1e-15, 1.0])).unwrap();
+    assert_eq!((cube.min[1], cube.tree(wide.max)[1]), (0, 0));
 }
 
 #[test]
