@@ -29,11 +29,15 @@ impl Geometry {
         self.lattice.scale.iter().copied().fold(0.0, f64::max)
     }
 
-    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube: nothing where these are
-    /// whole steps, else less than a unit on each axis.
+    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube: nothing where steps are
+    /// whole numbers of these, else less than a unit on each axis.
     pub(crate) fn sampling_slack(&self) -> f64 {
-        let [x, y, z] = self.lattice.scale;
-        if x == y && y == z { 0.0 } else { 2.0 * (self.cube.max[0] - self.cube.min[0]) / 31f64.exp2() }
+        let side = self.cube.max[0] - self.cube.min[0];
+        let is_whole = |scale: &f64| {
+            let steps = (side / scale).round();
+            steps >= 1.0 && steps.log2().fract() == 0.0 && (side / scale - steps).abs() < 1e-6 * steps
+        };
+        if self.lattice.scale.iter().all(is_whole) { 0.0 } else { 2.0 * side / 31f64.exp2() }
     }
 
     /// Spacing of a level, world units.

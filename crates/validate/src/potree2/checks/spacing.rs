@@ -7,7 +7,7 @@ use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::potree2::expect::Geometry;
 use crate::potree2::grid::{Grid, Origin, square};
-use crate::potree2::quality::Tally;
+use crate::potree2::quality::{NodeFigures, Tally};
 
 /// How inner nodes are sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,15 +57,15 @@ pub(crate) fn pairs(
     let spacing = geometry.spacing_at(key.level);
     let allowed_squared = sampling.allowed_squared(spacing, geometry);
     let (mut close, mut closest, mut looked_at) = (0, f64::INFINITY, 0);
-    let mut node = crate::potree2::quality::NodeFigures::default();
-    for (i, _) in grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own) {
-        let (own_squared, across_squared) = grid.nearest_by_origin(i, RINGS);
+    let own = || grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own);
+    let mut node = NodeFigures::new(own().count());
+    for (i, _) in own() {
+        let nearest = grid.nearest_by_origin(i, RINGS);
         looked_at += 1;
-        node.nearest(own_squared.sqrt() / spacing);
-        node.across(across_squared.sqrt() / spacing, across_squared < allowed_squared);
-        if own_squared < allowed_squared {
+        tally.add_nearest(node.add(&nearest, spacing, allowed_squared));
+        if nearest.own < allowed_squared {
             close += 1;
-            closest = f64::min(closest, own_squared.sqrt());
+            closest = f64::min(closest, nearest.own.sqrt());
         }
     }
     tally.add_node(&node);
