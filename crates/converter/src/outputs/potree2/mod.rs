@@ -20,7 +20,7 @@ use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
+use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling, Spacing};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Events, Runtime};
@@ -28,6 +28,13 @@ use crate::sources::{POSITION_BYTES, Schema};
 
 /// Elements of an attribute that readers of the format accept.
 const MAX_ELEMENTS: usize = 16;
+
+/// Bytes of the payloads of a subtree that one thread builds. Part of the result, and the same whatever else is written in
+/// the same run.
+const UNIT_BYTES: u64 = 10_000_000;
+
+/// Points of such a subtree: larger ones leave the caches and the threads uneven.
+const UNIT_POINTS: std::ops::RangeInclusive<u64> = 20_000..=300_000;
 
 /// Bytes of a hierarchy record.
 const NODE_BYTES: u64 = 22;
@@ -64,6 +71,10 @@ impl Output for Potree2Settings {
         u64::from(self.leaf_capacity)
     }
 
+    fn least_bytes(&self) -> u64 {
+        UNIT_BYTES
+    }
+
     fn disk_size(&self, _: &Plan, _: &Schema, kept: u64) -> DiskSize {
         let nodes = 3000 / u64::from(self.leaf_capacity).max(1) + 1;
         DiskSize { per_point: POSITION_BYTES as u64 + kept, per_1000_points: nodes * NODE_BYTES }
@@ -95,7 +106,12 @@ impl Output for Potree2Settings {
         let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
         let payloads =
             Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding, events: rt.events() };
-        let settings = OctreeSettings { sampling: self.sampling, leaf_capacity: self.leaf_capacity };
+        let settings = OctreeSettings {
+            sampling: self.sampling,
+            spacing: Spacing::default(),
+            leaf_capacity: self.leaf_capacity,
+            unit_points: self.unit_points(payloads.layout.stride),
+        };
         let tree = octree::build(cloud, rt, settings, &payloads)?;
         payloads.file.sync("syncing the payloads")?;
 
@@ -123,6 +139,14 @@ impl Output for Potree2Settings {
             tree: metadata::tree_report(&tree),
             ..OutputReport::default()
         })
+    }
+}
+
+impl Potree2Settings {
+    /// Points of a subtree that one thread builds, for records of `stride` bytes.
+    fn unit_points(&self, stride: usize) -> u64 {
+        let (least, most) = UNIT_POINTS.into_inner();
+        (UNIT_BYTES / stride as u64).clamp(least, most).max(self.leaf_capacity.into())
     }
 }
 
