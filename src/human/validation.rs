@@ -98,14 +98,14 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
     }
     let _ = writeln!(
         out,
-        "  level   nodes        points     spacing  nearest: min  median  close: inside   across  within 1 spacing    1.5   \
+        "  level   nodes        points     spacing  nearest: min  median  close: inside   across  within: 1      1.5   \
          largest hole"
     );
     let ratio = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
     for l in levels {
         let _ = writeln!(
             out,
-            "  {:>5} {:>7} {:>13} {:>11.5} {:>13} {:>7} {:>14} {:>8} {:>17} {:>6} {:>14}",
+            "  {:>5} {:>7} {:>13} {:>11.5} {:>13} {:>7} {:>14} {:>8} {:>10} {:>8} {:>14}",
             l.level,
             count(l.nodes),
             count(l.points),
@@ -114,7 +114,7 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
             ratio(l.nearest_median),
             share(l.close_inside, l.sampled),
             share(l.close_across, l.sampled),
-            share(l.below_within_1, l.below),
+            share(l.offered_within_1, l.offered),
             share(l.below_within_1_5, l.below),
             if l.largest_hole.is_some_and(|hole| hole >= 4.0) { "≥ 4".to_owned() } else { ratio(l.largest_hole) },
         );
@@ -123,8 +123,8 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
         out.push_str(
             "  Distances are relative to the spacing of the level. Nearest: from a point of an inner node to the next of that\n  \
              node, median: to the next of the level. Close: points of inner nodes with one of the same node, of another\n  \
-             node, nearer than 0.999 spacings. Within: points of deeper levels with one drawn so near; largest hole: the\n  \
-             distance of the one that is farthest from any drawn.\n",
+             node, nearer than 0.999 spacings. Within 1: points of the next level with one drawn so near; within 1.5: points\n  \
+             of all deeper levels; largest hole: the distance of the one that is farthest from any drawn.\n",
         );
     }
     out

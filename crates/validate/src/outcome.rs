@@ -115,9 +115,14 @@ pub struct LevelQuality {
     /// The largest distance from any point of deeper levels to the nearest point drawn at this level and above, over
     /// the spacing; 4 stands for 4 and more.
     pub largest_hole: Option<f64>,
+    /// Points of the next level, from which this one took its sample, without those that are the only ones of an inner
+    /// node.
+    pub offered: u64,
+    /// How many of them are within the spacing of a point drawn at this level and above.
+    pub offered_within_1: u64,
     /// Points of deeper levels, without those that are the only ones of an inner node.
     pub below: u64,
-    /// How many of them are within the spacing of a point drawn at this level and above.
+    /// How many of them are within the spacing of such a point.
     pub below_within_1: u64,
     /// How many of them are within one and a half spacings.
     pub below_within_1_5: u64,

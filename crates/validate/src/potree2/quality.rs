@@ -97,6 +97,8 @@ pub(crate) struct Tally {
     close_inside: AtomicU64,
     close_across: AtomicU64,
     hole_squared: AtomicU64,
+    offered: AtomicU64,
+    offered_within_1: AtomicU64,
     below: AtomicU64,
     below_within_1: AtomicU64,
     below_within_1_5: AtomicU64,
@@ -121,6 +123,8 @@ impl Default for Tally {
             close_inside: zero(),
             close_across: zero(),
             hole_squared: zero(),
+            offered: zero(),
+            offered_within_1: zero(),
             below: zero(),
             below_within_1: zero(),
             below_within_1_5: zero(),
@@ -170,7 +174,12 @@ impl Tally {
     }
 
     /// Takes in points of deeper levels, and how many of them have one drawn at this level within 1 and 1.5 spacings.
-    pub(crate) fn add_below(&self, points: u64, within_1: u64, within_1_5: u64) {
+    /// Those of the next level are what was `offered` to this one.
+    pub(crate) fn add_below(&self, points: u64, within_1: u64, within_1_5: u64, offered: bool) {
+        if offered {
+            self.offered.fetch_add(points, Relaxed);
+            self.offered_within_1.fetch_add(within_1, Relaxed);
+        }
         self.below.fetch_add(points, Relaxed);
         self.below_within_1.fetch_add(within_1, Relaxed);
         self.below_within_1_5.fetch_add(within_1_5, Relaxed);
@@ -207,6 +216,8 @@ impl Tally {
             close_inside: self.close_inside.load(Relaxed),
             close_across: self.close_across.load(Relaxed),
             largest_hole: (below > 0).then(|| self.hole_squared().sqrt() / spacing),
+            offered: self.offered.load(Relaxed),
+            offered_within_1: self.offered_within_1.load(Relaxed),
             below,
             below_within_1: self.below_within_1.load(Relaxed),
             below_within_1_5: self.below_within_1_5.load(Relaxed),

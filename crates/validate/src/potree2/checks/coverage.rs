@@ -84,7 +84,7 @@ pub(crate) fn check(
         }
     }
     tally.widen_hole(widest);
-    tally.add_below(positions.len() as u64, within_1, within_1_5);
+    tally.add_below(positions.len() as u64, within_1, within_1_5, key.level == level + 1);
     if uncovered > 0 {
         let subject = format!("distance to the nearest point drawn at levels up to {level}");
         let expected = json!(limit);

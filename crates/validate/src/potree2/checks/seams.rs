@@ -1,15 +1,10 @@
 //! Doubled planes: neighbouring inner nodes that were sampled as if they were alone, along a surface that lies on the
 //! plane between them.
 
-use serde_json::json;
-
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::potree2::checks::spacing::Sampling;
 use crate::potree2::quality::Tally;
-
-/// Whether seams make a dataset of ours invalid. If not, they are warned of.
-const ARE_ERRORS: bool = false;
 
 /// So many points of a level may have one of another node nearer than the spacing, however few the level has.
 const FEW: u64 = 8;
@@ -29,8 +24,7 @@ pub(crate) fn check(tallies: &[Tally], sampling: Sampling, findings: &Findings) 
         let (found, allowed) = (tally.seam_faults(), FEW.max(sampled / ONE_IN));
         if found > allowed {
             let subject = format!("points of level {level} nearer than the spacing to one of another inner node");
-            let finding = Finding::new(Check::Seams, subject, json!(format!("at most {allowed}")), found).points(found);
-            findings.push(if ARE_ERRORS { finding } else { finding.warning() });
+            findings.push(Finding::new(Check::Seams, subject, format!("at most {allowed}"), found).points(found));
         }
     }
 }
@@ -61,7 +55,7 @@ mod tests {
         let findings = Findings::new(DatasetKind::Potree2, 20);
         check(&[tally], Sampling::Poisson, &findings);
         let (checks, _) = findings.finish();
-        checks.iter().find(|c| c.name == Check::Seams).map(|c| c.found + c.warnings).unwrap()
+        checks.iter().find(|c| c.name == Check::Seams).map(|c| c.found).unwrap()
     }
 
     #[test]
