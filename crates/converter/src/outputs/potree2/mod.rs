@@ -5,6 +5,7 @@ mod layout;
 mod metadata;
 mod payload;
 mod settings;
+mod spacing;
 
 use pointmill_format::DatasetKind;
 use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
@@ -15,12 +16,13 @@ pub(crate) use payload::PayloadEncoder;
 pub use settings::{Encoding, Potree2Settings};
 
 use self::layout::viewable;
+use self::spacing::ChosenSpacing;
 use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling, Spacing};
+use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Events, Runtime};
@@ -55,6 +57,9 @@ impl Output for Potree2Settings {
         if self.leaf_capacity == 0 {
             return refuse(Setting::LeafCapacity, PlanFault::Zero);
         }
+        if self.spacing.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
+            return refuse(Setting::Spacing, PlanFault::NotPositive);
+        }
         match self.encoding {
             Encoding::Brotli { quality } if quality > 11 => {
                 refuse(Setting::BrotliQuality, PlanFault::NotOneOf("0 to 11"))
@@ -85,6 +90,9 @@ impl Output for Potree2Settings {
         if let Sampling::Random { seed } = self.sampling {
             settings.insert("seed".into(), seed.into());
         }
+        if let Some(spacing) = self.spacing {
+            settings.insert("spacing".into(), spacing.into());
+        }
         let encoding = match self.encoding {
             Encoding::Default => "default",
             Encoding::Brotli { quality } => {
@@ -106,9 +114,10 @@ impl Output for Potree2Settings {
         let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
         let payloads =
             Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding, events: rt.events() };
+        let spacing = ChosenSpacing::of(self, cloud)?;
         let settings = OctreeSettings {
             sampling: self.sampling,
-            spacing: Spacing::default(),
+            spacing: spacing.spacing,
             leaf_capacity: self.leaf_capacity,
             unit_points: self.unit_points(payloads.layout.stride),
         };
@@ -117,7 +126,7 @@ impl Output for Potree2Settings {
 
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
         let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
-        let metadata = metadata::metadata(cloud, self, &choice, &tree.ledger, &hierarchy);
+        let metadata = metadata::metadata(cloud, self, &spacing, &choice, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
         to.write("metadata.json", json.as_bytes())?;
@@ -137,6 +146,7 @@ impl Output for Potree2Settings {
             bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
             checksum: tree.ledger.unaltered().to_string(),
             tree: metadata::tree_report(&tree),
+            details: Map::from_iter([("spacing".to_owned(), spacing.describe())]),
             ..OutputReport::default()
         })
     }
