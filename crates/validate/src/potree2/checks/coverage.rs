@@ -19,7 +19,7 @@ const LIMIT: f64 = 2.0;
 
 /// How far a point may be from the sample of the node above it where the dataset promises a maximal Poisson-disk sample,
 /// in spacings.
-const SAMPLED: f64 = 1.00006;
+const SAMPLED: f64 = 1.00002;
 
 /// Holes are measured up to this many spacings; wider ones count as this.
 pub(crate) const REACH: f64 = 4.0;

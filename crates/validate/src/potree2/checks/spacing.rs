@@ -14,7 +14,7 @@ use crate::potree2::quality::{NodeFigures, Tally};
 pub(crate) enum Sampling {
     /// No two points of a node closer than the spacing of its level.
     Poisson,
-    /// At most one point in each cell of the node's 128³ grid (grid and random sampling).
+    /// At most one point in each cell of the node's grid (grid and random sampling).
     Cells,
     /// Not stated in the dataset: one of the two, throughout.
     Unknown,
@@ -77,16 +77,16 @@ pub(crate) fn pairs(
     }
 }
 
-/// Reports cells of an inner node's 128³ grid that hold more than one point.
+/// Reports cells of an inner node's grid that hold more than one point.
 pub(crate) fn cells(key: NodeKey, positions: &[[i32; 3]], geometry: &Geometry, findings: &Findings) {
     findings.checked(Check::Spacing, positions.len() as u64);
     let node = geometry.node_box(key);
-    let mut cells: Vec<u32> = positions.iter().filter_map(|p| geometry.sample_cell(key.level, &node, *p)).collect();
+    let mut cells: Vec<u64> = positions.iter().filter_map(|p| geometry.sample_cell(key.level, &node, *p)).collect();
     cells.sort_unstable();
     let surplus = cells.windows(2).filter(|w| w[0] == w[1]).count() as u64;
     if surplus > 0 {
-        let fullest = cells.chunk_by(|a, b| a == b).map(<[u32]>::len).max();
-        let finding = Finding::new(Check::Spacing, "points of a cell of the 128³ grid", 1, fullest);
+        let fullest = cells.chunk_by(|a, b| a == b).map(<[u64]>::len).max();
+        let finding = Finding::new(Check::Spacing, "points of a cell of the grid", 1, fullest);
         findings.push(finding.at(key).points(surplus));
     }
 }
