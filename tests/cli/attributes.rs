@@ -53,14 +53,14 @@ fn attributes(dir: &Dir) -> String {
 }
 
 /// An ascii PLY of these properties and rows.
-fn ply(properties: &[&str], rows: &[&str]) -> Vec<u8> {
+pub(crate) fn ply(properties: &[&str], rows: &[&str]) -> Vec<u8> {
     let properties: Vec<String> = properties.iter().map(|p| format!("property {p}\n")).collect();
     let (count, properties, rows) = (rows.len(), properties.concat(), rows.join("\n"));
     format!("ply\nformat ascii 1.0\nelement vertex {count}\n{properties}end_header\n{rows}\n").into_bytes()
 }
 
 /// Points of format 2 on a line from x 0, with extra bytes: name, type, scale, and the bytes of each point.
-fn las(points: i32, extras: &[(&str, u8, Option<f64>)], bytes: impl Fn(i32) -> Vec<u8>) -> Vec<u8> {
+pub(crate) fn las(points: i32, extras: &[(&str, u8, Option<f64>)], bytes: impl Fn(i32) -> Vec<u8>) -> Vec<u8> {
     let line = Las { offset: [0.0; 3], ..Las::new((0..points).map(|i| Point::at([i * 100, 0, 0])).collect()) };
     let plain = line.bytes();
     let u32_at = |at: usize| u32::from_le_bytes(plain[at..at + 4].try_into().unwrap()) as usize;
@@ -209,11 +209,11 @@ fn octree_of<T: Element>(dir: &Dir, name: &str, bytes: &[u8]) -> Vec<(f64, T)> {
 #[test]
 fn what_a_file_lacks_is_told_and_types_hold_the_values_of_all() {
     let dir = Dir::new();
-    dir.write("a.las", &las(2, &[("height", 4, Some(0.5))], |i| (-3i16 - i as i16).to_le_bytes().to_vec()));
-    let properties = ["float x", "float y", "float z", "float intensity", "float height"];
+    dir.write("a.las", &las(2, &[("quality", 4, Some(0.5))], |i| (-3i16 - i as i16).to_le_bytes().to_vec()));
+    let properties = ["float x", "float y", "float z", "float intensity", "float quality"];
     dir.write("b.ply", &ply(&properties, &["7 0 0 0.25 1.5", "8 0 0 nan 2.5"]));
     let ended = dir.succeed(["convert", "a.las", "b.ply", "-o", "out"]);
-    assert_eq!(values(octree::<f64>(&dir, "height")), [-1.5, -2.0, 1.5, 2.5]);
+    assert_eq!(values(octree::<f64>(&dir, "quality")), [-1.5, -2.0, 1.5, 2.5]);
     assert_eq!(values(octree::<f32>(&dir, "intensity"))[..3], [0.0, 0.0, 0.25]);
     let line = "classification";
     let told = ended.stderr();

@@ -69,4 +69,4 @@ pub use report::{
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
 pub use sources::{ResolvedCrs, resolve_crs};
-pub use warning::{CrsNote, Proj4Fault, Warning};
+pub use warning::{CrsNote, NameFault, Proj4Fault, RenamedAttribute, ViewerNote, Warning};

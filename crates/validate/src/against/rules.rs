@@ -81,7 +81,8 @@ pub(crate) struct Rules {
 impl Rules {
     /// `attributes`: those to compare, beside the position. `lattice`: of the dataset's integer positions. `own`:
     /// pointmill's own key of the metadata, null if it is not there.
-    pub(crate) fn new(attributes: Vec<Attribute>, lattice: Lattice, own: &Value) -> Self {
+    pub(crate) fn new(mut attributes: Vec<Attribute>, lattice: Lattice, own: &Value) -> Self {
+        rename_back(&mut attributes, &own["attributesRenamed"]);
         let rgb = attributes.iter().position(|a| a.name == "rgb" && a.elements == 3);
         let lattice_offset = vector(&own["latticeOffset"]).unwrap_or(lattice.offset);
         let shift = [0, 1, 2].map(|a| ((lattice.offset[a] - lattice_offset[a]) / lattice.scale[a]).round() as i64);
@@ -166,6 +167,15 @@ pub(crate) fn grey(v: u64, [lo, hi]: [u64; 2]) -> u64 {
     let span = hi.saturating_sub(lo);
     let scaled = (v.min(hi).saturating_sub(lo)).saturating_mul(255).saturating_add(span / 2);
     scaled.checked_div(span).unwrap_or(255)
+}
+
+/// Gives attributes that were renamed the names that they have in the sources.
+fn rename_back(attributes: &mut [Attribute], renamed: &Value) {
+    for attribute in attributes {
+        if let Some(name) = renamed.get(&attribute.name).and_then(Value::as_str) {
+            name.clone_into(&mut attribute.name);
+        }
+    }
 }
 
 fn constants(dropped: &Value) -> Vec<(String, Vec<f64>)> {

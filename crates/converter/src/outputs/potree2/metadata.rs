@@ -7,6 +7,7 @@ use pointmill_format::{Aabb, Attribute, AttributeType, Lattice};
 use serde_json::Map;
 
 use super::layout::viewable;
+use super::names::Names;
 use super::settings::{Encoding, HIERARCHY_STEP, Potree2Settings};
 use crate::cloud::{Cloud, JobPoint, Ledger};
 use crate::octree::{Octree, SPACING_BITS};
@@ -19,6 +20,7 @@ pub(super) fn metadata(
     cloud: &Cloud<'_>,
     settings: &Potree2Settings,
     choice: &Choice,
+    names: &Names,
     ledger: &Ledger,
     hierarchy: &HierarchyBytes,
 ) -> Metadata {
@@ -31,8 +33,9 @@ pub(super) fn metadata(
     position.min = lattice.world(stored(stats.bounds.min)).to_vec();
     position.max = lattice.world(stored(stats.bounds.max)).to_vec();
     let mut attributes = vec![position];
-    attributes.extend(choice.kept.iter().map(|&i| {
+    attributes.extend(choice.kept.iter().zip(&names.stored).map(|(&i, name)| {
         let mut attribute = cloud.schema().attributes[i].clone();
+        attribute.name.clone_from(name);
         attribute.ty = viewable(attribute.ty);
         let range = &facts.ranges[i];
         // A range must be there and finite; a column of NaN has none.
@@ -47,6 +50,10 @@ pub(super) fn metadata(
         described
     }));
     let mut own = own_key(cloud, &choice.dropped);
+    if !names.renamed.is_empty() {
+        let renamed = names.renamed.iter().map(|r| (r.stored_as.clone(), r.name.clone().into()));
+        own.insert("attributesRenamed".into(), renamed.collect::<Map<_, _>>().into());
+    }
     own.insert("sampling".into(), settings.sampling.name().into());
     own.insert("leafCapacity".into(), settings.leaf_capacity.into());
     let box_of_root = Aabb { min: offset, max: offset.map(|v| v + side) };

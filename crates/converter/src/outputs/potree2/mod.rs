@@ -3,6 +3,8 @@
 mod accuracy;
 mod layout;
 mod metadata;
+mod names;
+mod notes;
 mod payload;
 mod settings;
 
@@ -15,6 +17,7 @@ pub(crate) use payload::PayloadEncoder;
 pub use settings::{Encoding, Potree2Settings};
 
 use self::layout::viewable;
+use self::names::Names;
 use self::settings::HIERARCHY_STEP;
 use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
@@ -25,7 +28,8 @@ use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Events, Runtime};
-use crate::sources::{POSITION_BYTES, Schema};
+use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
+use crate::warning::Warning;
 
 /// Elements of an attribute that readers of the format accept.
 const MAX_ELEMENTS: usize = 16;
@@ -86,6 +90,10 @@ impl Output for Potree2Settings {
         settings.insert("leaf-capacity".into(), self.leaf_capacity.into());
     }
 
+    fn foresee(&self, schema: &Schema, kept: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {
+        notes::foresee(self, schema, kept, crs)
+    }
+
     fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
         let schema = cloud.schema();
         let choice = choose(&cloud.plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges);
@@ -102,7 +110,8 @@ impl Output for Potree2Settings {
 
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
         let hierarchy = encode_hierarchy(&mut nodes, HIERARCHY_STEP);
-        let metadata = metadata::metadata(cloud, self, &choice, &tree.ledger, &hierarchy);
+        let names = Names::of(&notes::attributes(schema, &choice.kept));
+        let metadata = metadata::metadata(cloud, self, &choice, &names, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
         to.write("metadata.json", json.as_bytes())?;
@@ -110,7 +119,9 @@ impl Output for Potree2Settings {
             let (attribute, changes) = (&schema.attributes[i], cloud.stats.doubled.get(i)?);
             changed(self.kind(), attribute, viewable(attribute.ty), changes)
         });
-        let (attributes_changed, warnings) = doubled.unzip();
+        let (attributes_changed, changes): (_, Vec<_>) = doubled.unzip();
+        let mut warnings = self.foresee(schema, &choice.kept, &cloud.facts.crs);
+        warnings.extend(changes);
         Ok(OutputReport {
             points: tree.ledger.points(),
             duplicates_dropped: tree.ledger.duplicates_dropped(),
@@ -118,6 +129,7 @@ impl Output for Potree2Settings {
             attributes: cloud.names(choice.kept.iter().copied()),
             attributes_dropped: choice.dropped,
             attributes_changed,
+            attributes_renamed: names.renamed,
             warnings,
             bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
             checksum: tree.ledger.unaltered().to_string(),
