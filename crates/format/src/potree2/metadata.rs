@@ -81,7 +81,8 @@ pub struct Metadata {
     pub projection: String,
     /// Bytes of the chunk at the start of `hierarchy.bin`.
     pub first_chunk_size: u64,
-    /// Levels per hierarchy chunk.
+    /// Levels per hierarchy chunk, in datasets whose chunks all have as many. Nobody needs it: the masks of the records
+    /// say where a chunk ends.
     pub step_size: u32,
     /// The deepest level that has a node (root = 0); PotreeConverter 2 often writes less.
     pub depth: u32,
@@ -100,8 +101,8 @@ pub struct Metadata {
 }
 
 impl Metadata {
-    /// The metadata of an unnamed cloud without points: encoding DEFAULT, hierarchy chunks of 4 levels. Set the other
-    /// fields.
+    /// The metadata of an unnamed cloud without points: encoding DEFAULT, `step_size` 4, which is what
+    /// clients know from PotreeConverter. Set the other fields.
     ///
     /// `cube`, `spacing` of the root: world units. `attributes`: in the order of the bytes, `position` among them.
     #[must_use]

@@ -29,10 +29,12 @@
 
 mod brotli;
 mod chunk;
+mod chunk_cut;
 mod dataset;
 mod encode_brotli;
 mod encode_hierarchy;
 mod hierarchy;
+mod linked_tree;
 mod metadata;
 mod metadata_json;
 mod metadata_parse;
@@ -43,10 +45,10 @@ mod record;
 
 pub use dataset::Dataset;
 pub use encode_brotli::{BrotliScratch, encode_brotli, encode_brotli_while};
-pub use encode_hierarchy::{HierarchyBytes, NodeEntry, encode_hierarchy};
+pub use encode_hierarchy::{CHUNK_RECORDS, HierarchyBytes, encode_hierarchy};
 pub use hierarchy::Hierarchy;
 pub use metadata::{AttributeStats, Encoding, Metadata};
-pub use record::{Node, NodeRecord, NodeType};
+pub use record::{Node, NodeEntry, NodeRecord, NodeType};
 
 /// The file of the metadata.
 pub const METADATA_FILE: &str = "metadata.json";

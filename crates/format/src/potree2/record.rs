@@ -88,6 +88,35 @@ impl Node {
     }
 }
 
+/// A node to be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct NodeEntry {
+    /// Its address.
+    pub key: NodeKey,
+    /// Points of the node alone.
+    pub points: u32,
+    /// Where its payload starts in `octree.bin`.
+    pub byte_offset: u64,
+    /// Bytes of its payload.
+    pub byte_size: u64,
+}
+
+impl NodeEntry {
+    /// The node `key` with `points` points, whose payload is `byte_size` bytes of `octree.bin`, from `byte_offset` on.
+    #[must_use]
+    pub const fn new(key: NodeKey, points: u32, byte_offset: u64, byte_size: u64) -> Self {
+        Self { key, points, byte_offset, byte_size }
+    }
+}
+
+impl From<&Node> for NodeEntry {
+    fn from(node: &Node) -> Self {
+        let NodeRecord { points, byte_offset, byte_size, .. } = node.record;
+        Self { key: node.key, points, byte_offset, byte_size }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

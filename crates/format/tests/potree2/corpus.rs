@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use pointmill_format::potree2::{BrotliScratch, Dataset, Encoding, NodeEntry, encode_brotli, encode_hierarchy};
+use pointmill_format::potree2::{
+    BrotliScratch, CHUNK_RECORDS, Dataset, Encoding, NodeEntry, encode_brotli, encode_hierarchy,
+};
 use pointmill_format::{Attribute, Column, NodeKey, NodePoints, with_column};
 use pointmill_testkit::files::corpus;
 
@@ -186,7 +188,7 @@ fn nodes_of_the_reference_are_encoded_to_the_same_points_in_the_same_order() {
         let byte_size = octree.len() as u64 - byte_offset;
         entries.push(NodeEntry::new(node.key, node.record.points, byte_offset, byte_size));
     }
-    let hierarchy = encode_hierarchy(&mut entries, 4);
+    let hierarchy = encode_hierarchy(&mut entries, CHUNK_RECORDS);
     let mut metadata = dataset.metadata().clone();
     metadata.first_chunk_size = hierarchy.first_chunk_size;
     let files = memory(metadata.to_json().into_bytes(), hierarchy.bytes, octree);

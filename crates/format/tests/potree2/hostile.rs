@@ -91,7 +91,7 @@ fn ranges_outside_the_files_are_named() {
     for (offset, size) in [(u64::MAX, 33), (0, u64::MAX), (u64::MAX, u64::MAX), (429, 33), (1 << 63, 1 << 63)] {
         let change = |r: &mut NodeRecord| (r.byte_offset, r.byte_size) = (offset, size);
         assert_fault(&with_record("default", 0, change), "octree.bin has 429");
-        assert_fault(&with_record("default", 5, change), "hierarchy");
+        assert_fault(&with_record("default", 1, change), "hierarchy");
     }
 }
 
@@ -131,23 +131,23 @@ fn a_stream_that_gives_more_than_is_allowed_is_not_followed() {
 
 #[test]
 fn proxies_that_go_round_in_circles_or_share_a_chunk_are_refused() {
-    // r0000 (record 5) names the root's own chunk, then the record of a leaf in it.
-    let back = |r: &mut NodeRecord| (r.byte_offset, r.byte_size) = (0, 132);
-    assert_fault(&with_record("default", 5, back), "the hierarchy chunk of r0000 overlaps the one of r");
+    // r0 (record 1) names the root's own chunk, then the record of a leaf in it.
+    let back = |r: &mut NodeRecord| (r.byte_offset, r.byte_size) = (0, 66);
+    assert_fault(&with_record("default", 1, back), "the hierarchy chunk of r0 overlaps the one of r");
     let inside = |r: &mut NodeRecord| (r.byte_offset, r.byte_size) = (44, 22);
-    assert_fault(&with_record("default", 5, inside), "overlaps");
-    // The chunk of r0000 is one record, a proxy for itself.
-    let mut files = with_record("default", 5, |r| r.byte_size = 22);
-    change_record(&mut files, 6, |r| (r.node_type, r.byte_offset, r.byte_size) = (2, 132, 22));
-    assert_fault(&files, "the hierarchy chunk of r0000 begins with a proxy");
+    assert_fault(&with_record("default", 1, inside), "overlaps");
+    // The chunk of r0 is one record, a proxy for itself.
+    let mut files = with_record("default", 1, |r| r.byte_size = 22);
+    change_record(&mut files, 3, |r| (r.node_type, r.byte_offset, r.byte_size) = (2, 66, 22));
+    assert_fault(&files, "the hierarchy chunk of r0 begins with a proxy");
 }
 
 #[test]
 fn masks_that_do_not_fit_the_records_are_refused() {
     assert_fault(&with_record("default", 0, |r| r.child_mask = 0xff), "its child masks call for more (node r)");
     assert_fault(&with_record("default", 0, |r| r.child_mask = 0), "its child masks account for 1");
-    assert_fault(&with_record("default", 5, |r| r.byte_size = 43), "not a multiple of 22");
-    assert_fault(&with_record("default", 5, |r| r.byte_size = 0), "not a multiple of 22");
+    assert_fault(&with_record("default", 1, |r| r.byte_size = 43), "not a multiple of 22");
+    assert_fault(&with_record("default", 1, |r| r.byte_size = 0), "not a multiple of 22");
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn metadata_faults_are_told_by_name() {
         ("\"scale\": [0.001, ", "\"scale\": [1e999, ", "not valid JSON"),
         ("\"offset\": [1000.0, ", "\"offset\": [", "offset has 2 numbers, not 3"),
         ("\"spacing\": 0.128", "\"spacing\": 0", "spacing 0 has to be"),
-        ("\"firstChunkSize\": 132", "\"firstChunkSize\": 18446744073709551615", "hierarchy.bin has 176"),
+        ("\"firstChunkSize\": 66", "\"firstChunkSize\": 18446744073709551615", "hierarchy.bin has 176"),
     ];
     for (from, to, expected) in faults {
         let mut files = golden.clone();

@@ -3,7 +3,9 @@
 use std::collections::{BTreeSet, HashSet};
 
 use pointmill_format::bytes::Memory;
-use pointmill_format::potree2::{BrotliScratch, Encoding, Node, NodeEntry, encode_brotli, encode_hierarchy};
+use pointmill_format::potree2::{
+    BrotliScratch, CHUNK_RECORDS, Encoding, HierarchyBytes, Node, NodeEntry, encode_brotli, encode_hierarchy,
+};
 use pointmill_format::{NodeKey, NodePoints};
 use pointmill_testkit::Random;
 
@@ -32,19 +34,22 @@ fn name(name: &str) -> NodeKey {
 }
 
 /// Encodes, reads back all nodes and checks everything that the format promises; returns what was read, and the bytes.
-fn round_trip(entries: &mut [NodeEntry], step: u32) -> (Vec<Node>, Vec<u8>) {
-    let encoded = encode_hierarchy(entries, step);
+fn round_trip(entries: &mut [NodeEntry], most: u32) -> (Vec<Node>, Vec<u8>) {
+    let encoded = encode_hierarchy(entries, most);
     let json = metadata(Encoding::Default, encoded.first_chunk_size, attributes()).to_json();
     let files = memory(json.into_bytes(), encoded.bytes.clone(), Vec::new());
     let dataset = open(&files).unwrap();
     let nodes = dataset.read_hierarchy().unwrap();
 
     let found: Vec<NodeEntry> = nodes.iter().map(NodeEntry::from).collect();
-    assert_eq!(found, entries, "step {step}"); // encode_hierarchy sorted them
+    assert_eq!(found, entries, "at most {most}"); // encode_hierarchy sorted them
     assert_eq!(encoded.depth, nodes.iter().map(|n| u32::from(n.key.level)).max().unwrap());
-    let border = |n: &&Node| n.key.level > 0 && u32::from(n.key.level) % step == 0 && n.record.child_mask != 0;
-    let proxies = nodes.iter().filter(border).count();
-    assert_eq!(encoded.bytes.len(), 22 * (nodes.len() + proxies), "step {step}: a chunk too many, or too few");
+    let chunks = chunks(&encoded);
+    assert_eq!(chunks.iter().sum::<usize>(), nodes.len() + chunks.len() - 1, "at most {most}: a record too many");
+    // A root and its children are in one chunk however few are allowed.
+    assert!(chunks.iter().all(|records| *records <= (most as usize).max(9)), "at most {most}: {chunks:?}");
+    assert!(chunks[1..].iter().all(|records| *records > 1), "at most {most}: a leaf has a chunk: {chunks:?}");
+    assert_eq!(chunks.len() == 1, nodes.len() <= most as usize || nodes.len() == chunks[0], "at most {most}");
     let keys: HashSet<NodeKey> = nodes.iter().map(|n| n.key).collect();
     for Node { key, record, .. } in &nodes {
         let mask = (0..8).filter(|c| key.child(*c).is_some_and(|child| keys.contains(&child)));
@@ -54,6 +59,31 @@ fn round_trip(entries: &mut [NodeEntry], step: u32) -> (Vec<Node>, Vec<u8>) {
     (nodes, encoded.bytes)
 }
 
+/// Records of the chunks, the root's first; they fill the file without gaps.
+fn chunks(encoded: &HierarchyBytes) -> Vec<usize> {
+    let field = |r: &[u8], at: usize| u64::from_le_bytes(r[at..at + 8].try_into().unwrap()) as usize;
+    let proxies = encoded.bytes.chunks_exact(22).filter(|r| r[0] == 2).map(|r| (field(r, 6), field(r, 14)));
+    let mut places: Vec<(usize, usize)> = proxies.chain([(0, encoded.first_chunk_size as usize)]).collect();
+    places.sort_unstable();
+    let end = places.iter().fold(0, |end, (at, size)| {
+        assert_eq!(*at, end);
+        at + size
+    });
+    assert_eq!(end, encoded.bytes.len());
+    places.iter().map(|(_, size)| size / 22).collect()
+}
+
+/// The full tree of `children` children a node and `levels` levels below the root.
+fn full_tree(children: u8, levels: u32) -> Vec<NodeEntry> {
+    let mut row = vec![NodeKey::ROOT];
+    let mut keys = row.clone();
+    for _ in 0..levels {
+        row = row.iter().flat_map(|key| (0..children).map(|c| key.child(c).unwrap())).collect();
+        keys.extend(&row);
+    }
+    keys.into_iter().map(|key| NodeEntry::new(key, 1, 0, 0)).collect()
+}
+
 #[test]
 fn a_root_alone_is_one_leaf() {
     let (nodes, bytes) = round_trip(&mut entries([], &mut Random::new(1)), 4);
@@ -61,24 +91,47 @@ fn a_root_alone_is_one_leaf() {
 }
 
 #[test]
-fn chains_down_to_the_deepest_level_come_back_for_every_step_size() {
+fn chains_down_to_the_deepest_level_come_back_whatever_a_chunk_may_hold() {
     for digit in ["0", "7"] {
         let leaf = name(&format!("r{}", digit.repeat(31)));
-        for step in [1, 2, 4, 5, 30, 31, 32] {
-            let (nodes, _) = round_trip(&mut entries([leaf], &mut Random::new(2)), step);
+        for most in [0, 1, 2, 4, 5, 30, 31, 32, u32::MAX] {
+            let (nodes, _) = round_trip(&mut entries([leaf], &mut Random::new(2)), most);
             assert_eq!(nodes.len(), 32);
         }
     }
 }
 
 #[test]
-fn a_node_at_the_border_of_a_chunk_is_a_proxy_only_if_it_has_children() {
-    let leaves = ["r0000", "r0001", "r00020", "r7777", "r77777777"].map(name);
+fn a_chunk_has_whole_levels_and_then_the_smallest_subtrees_that_fit() {
+    let leaves = ["r0000", "r0001", "r00020", "r7777", "r77777777", "r4"].map(name);
     let mut entries = entries(leaves, &mut Random::new(3));
-    let (_, bytes) = round_trip(&mut entries, 4);
-    // r · r0 r7 · r00 r77 · r000 r777 · r0000 r0001 r0002* r7777*, then r0002 r00020, then r7777 … r77777777
-    let types: Vec<u8> = bytes.chunks_exact(22).map(|r| r[0]).collect();
-    assert_eq!(types, [0, 0, 0, 0, 0, 0, 0, 1, 1, 2, 2, 0, 1, 0, 0, 0, 0, 1]);
+    let types = |bytes: &[u8]| -> Vec<u8> { bytes.chunks_exact(22).map(|r| r[0]).collect() };
+    // r · r0* r4 r7*, then r0 r00 r000 r0000 r0001 r0002 r00020 and r7 r77 … r77777777
+    assert_eq!(types(&round_trip(&mut entries, 9).1), [0, 2, 1, 2, 0, 0, 0, 1, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1]);
+    // r0 has seven nodes, r7 eight: one of them fits behind the four of the first two levels.
+    let (_, bytes) = round_trip(&mut entries, 10);
+    assert_eq!(
+        types(&bytes)[..10],
+        [0, 0, 1, 2, 0, 0, 1, 1, 0, 1],
+        "r · r0 r4 r7* · r00 · r000 · r0000 r0001 r0002 · r00020"
+    );
+    assert_eq!(round_trip(&mut entries, 16).1.len(), 22 * 18, "one less than all nodes");
+    assert_eq!(round_trip(&mut entries, 17).1.len(), 22 * 17);
+}
+
+#[test]
+fn what_a_client_takes_at_once_is_one_chunk_and_a_larger_tree_fills_its_first_chunk() {
+    let mut tree = full_tree(8, 4);
+    assert_eq!(chunks(&encode_hierarchy(&mut tree, CHUNK_RECORDS)), [4681]);
+    tree.push(NodeEntry::new(name("r00000"), 1, 0, 0));
+    let divided = chunks(&encode_hierarchy(&mut tree, CHUNK_RECORDS));
+    // Three levels are 585 records; of the 512 subtrees of 9 nodes, one of 10, the 512 that cost 8 fill up to 4,681.
+    assert_eq!(divided, [4673, 10]);
+
+    // Five levels are 1,365 records; 165 of their 1,024 subtrees of 21 nodes fit as well.
+    let surface = chunks(&encode_hierarchy(&mut full_tree(4, 7), CHUNK_RECORDS));
+    assert_eq!((surface[0], surface.len()), (1365 + 165 * 20, 1 + 1024 - 165));
+    assert!(surface[1..].iter().all(|records| *records == 21));
 }
 
 #[test]
@@ -95,10 +148,10 @@ fn random_trees_come_back_and_their_bytes_do_not_depend_on_order() {
         };
         let leaves: Vec<NodeKey> = (0..count).map(|_| leaf(random)).collect();
         let mut entries = entries(leaves, random);
-        for step in [1, 2, 3, 4, 7] {
-            let (_, bytes) = round_trip(&mut entries, step);
+        for most in [1, 10, 33, 200, 1000] {
+            let (_, bytes) = round_trip(&mut entries, most);
             shuffle(&mut entries, random);
-            assert_eq!(bytes, encode_hierarchy(&mut entries, step).bytes, "seed {seed}");
+            assert_eq!(bytes, encode_hierarchy(&mut entries, most).bytes, "seed {seed}");
         }
     }
 }

@@ -165,7 +165,7 @@ impl Cloud {
             entries.push(NodeEntry::new(*key, points.len() as u32, byte_offset, byte_size));
             octree.extend(payload);
         }
-        let hierarchy = encode_hierarchy(&mut entries, 2);
+        let hierarchy = encode_hierarchy(&mut entries, 40);
         let side = f64::from(SIDE) * SCALE;
         let (lattice, cube) =
             (Lattice { scale: [SCALE; 3], offset: OFFSET }, Aabb { min: OFFSET, max: OFFSET.map(|v| v + side) });
@@ -173,7 +173,7 @@ impl Cloud {
         metadata.name = "hill".into();
         metadata.points = self.points().count() as u64;
         (metadata.first_chunk_size, metadata.depth) = (hierarchy.first_chunk_size, hierarchy.depth);
-        (metadata.step_size, metadata.encoding) = (2, encoding);
+        metadata.encoding = encoding;
         metadata.extra = serde_json::from_value(serde_json::json!({ "pointmill": {
             "version": "0.1.0", "latticeOffset": OFFSET, "rgbDepth": "auto", "duplicates": "keep",
             "sampling": if self.sampler == Sampler::Poisson { "poisson" } else { "grid" },

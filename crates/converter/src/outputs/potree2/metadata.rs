@@ -8,7 +8,7 @@ use serde_json::Map;
 
 use super::layout::viewable;
 use super::names::Names;
-use super::settings::{Encoding, HIERARCHY_STEP, Potree2Settings};
+use super::settings::{Encoding, Potree2Settings};
 use crate::cloud::{Cloud, JobPoint, Ledger};
 use crate::octree::{Octree, SPACING_BITS};
 use crate::outputs::attributes::Choice;
@@ -62,7 +62,6 @@ pub(super) fn metadata(
     metadata.points = ledger.points();
     metadata.projection.clone_from(&facts.crs.projection);
     metadata.first_chunk_size = hierarchy.first_chunk_size;
-    metadata.step_size = HIERARCHY_STEP;
     metadata.depth = hierarchy.depth;
     metadata.encoding = match settings.encoding {
         Encoding::Default => StoredEncoding::Default,

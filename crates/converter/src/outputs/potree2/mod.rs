@@ -9,7 +9,7 @@ mod payload;
 mod settings;
 
 use pointmill_format::DatasetKind;
-use pointmill_format::potree2::{NodeEntry, encode_hierarchy};
+use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
 use serde_json::{Map, Value};
 
 pub(crate) use layout::OutputLayout;
@@ -18,7 +18,6 @@ pub use settings::{Encoding, Potree2Settings};
 
 use self::layout::viewable;
 use self::names::Names;
-use self::settings::HIERARCHY_STEP;
 use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
@@ -109,7 +108,7 @@ impl Output for Potree2Settings {
         payloads.file.sync("syncing the payloads")?;
 
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
-        let hierarchy = encode_hierarchy(&mut nodes, HIERARCHY_STEP);
+        let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
         let names = Names::of(&notes::attributes(schema, &choice.kept));
         let metadata = metadata::metadata(cloud, self, &choice, &names, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;

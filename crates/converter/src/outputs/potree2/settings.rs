@@ -2,9 +2,6 @@
 
 use crate::octree::Sampling;
 
-/// Levels per hierarchy chunk, as the reference converter has it.
-pub(super) const HIERARCHY_STEP: u32 = 4;
-
 /// Settings of a Potree 2.0 octree (`docs/formats/potree2.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Potree2Settings {
