@@ -8,6 +8,7 @@ fn option(setting: Setting) -> &'static str {
     match setting {
         Setting::Outputs => "--to",
         Setting::LeafCapacity => "--leaf-capacity",
+        Setting::Spacing => "--spacing",
         Setting::BrotliQuality => "--brotli-quality",
         Setting::Capacity => "--capacity",
         Setting::LodCell => "--lod-cell",

@@ -50,6 +50,11 @@ pub(crate) struct ConvertArgs {
           help_heading = "Output",
           help = format!("Seed for --sampling random; the same seed gives the same bytes [default: {SEED}]"))]
     pub(crate) seed: Option<u64>,
+    /// Distance between points in the root, in units of the CRS; each level has half of the one above: 1/255 to 1/16 of
+    /// the side of the root cube; auto takes 1/128 [default: auto]
+    #[arg(long, value_name = "STEP|auto", value_parser = parse_scale, allow_negative_numbers = true,
+          help_heading = "Output")]
+    pub(crate) spacing: Option<Scale>,
     #[arg(long, value_name = "POINTS", value_parser = whole::<u32>(1..=1_000_000), allow_negative_numbers = true,
           help_heading = "Output",
           help = format!("Maximum points per leaf node [default: {}]", Potree2Settings::default().leaf_capacity))]

@@ -97,6 +97,7 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
     let given = [
         ("--sampling", TargetArg::Potree2, args.sampling.is_some()),
         ("--encoding", TargetArg::Potree2, args.encoding.is_some()),
+        ("--spacing", TargetArg::Potree2, args.spacing.is_some()),
         ("--leaf-capacity", TargetArg::Potree2, args.leaf_capacity.is_some()),
         ("--capacity", TargetArg::Bintree, tree.capacity.is_some()),
         ("--split", TargetArg::Bintree, tree.split.is_some()),
@@ -124,6 +125,7 @@ fn potree2_settings(args: &ConvertArgs) -> Potree2Settings {
             EncodingArg::Brotli => Encoding::Brotli { quality: args.brotli_quality.unwrap_or(BROTLI_QUALITY) },
             EncodingArg::Default => Encoding::Default,
         }),
+        spacing: args.spacing.and_then(|s| s.0),
         leaf_capacity: args.leaf_capacity.unwrap_or(default.leaf_capacity),
     }
 }

@@ -94,6 +94,31 @@ fn every_sampling_and_encoding_holds_every_point() {
 }
 
 #[test]
+fn the_spacing_of_an_octree_can_be_chosen() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(40_000, 3).bytes());
+    let mut in_root = Vec::new();
+    for (out, spacing, sampling) in
+        [("usual", "auto", "poisson"), ("fine", "0.4", "poisson"), ("coarse", "2.5", "poisson"), ("grid", "1", "grid")]
+    {
+        dir.succeed(["convert", "a.las", "-q", "-o", out, "--spacing", spacing, "--sampling", sampling]);
+        dir.validate(out, &["a.las"]);
+        let metadata: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(dir.path(out).join("metadata.json")).unwrap()).unwrap();
+        let report = dir.report(out)["outputs"][0].clone();
+        let (stated, found) = (&metadata["spacing"], &report["details"]["spacing"]);
+        assert_eq!(stated, &found["root"]);
+        match spacing.parse::<f64>() {
+            Ok(spacing) if sampling == "poisson" => assert!((stated.as_f64().unwrap() / spacing - 1.0).abs() < 1e-12),
+            Ok(spacing) => assert!((1.0..2.0).contains(&(stated.as_f64().unwrap() / spacing)), "{stated}"),
+            Err(_) => assert_eq!(found["per_side"], 128.0),
+        }
+        in_root.push(report["tree"]["points_per_level"][0].as_u64().unwrap());
+    }
+    assert!(in_root[1] > in_root[0] * 5 / 4 && in_root[0] > 2 * in_root[2], "{in_root:?}");
+}
+
+#[test]
 fn what_a_scene_drops_as_constant_is_checked_by_the_validator() {
     let dir = Dir::new();
     let mut scan = Las::terrain(500, 1);

@@ -3,7 +3,7 @@
 use pointmill_format::{Attribute, Lattice, NodeKey};
 
 use crate::cloud::{Checksum, Cube, JobBounds, JobPoint, RecordFrame, StoredOrigin, TreePoint, position};
-use crate::octree::{NodeEncoder, OrderScratch, Point, Sampler, Sampling, order};
+use crate::octree::{NodeEncoder, OrderScratch, Point, Sampler, Sampling, Spacing, order};
 use crate::outputs::potree2::{Encoding, OutputLayout, PayloadEncoder};
 use crate::runtime::Silent;
 use crate::sources::Schema;
@@ -62,12 +62,12 @@ pub struct Sample(Sampler);
 impl Sample {
     /// A sampler of that kind.
     pub fn new(sampling: Sampling) -> Self {
-        Self(Sampler::new(sampling))
+        Self(Sampler::new(sampling, Spacing::default()))
     }
 
     /// The number of candidates that the node takes.
     pub fn choose(&mut self, level: u8, candidates: &[[u32; 3]]) -> usize {
-        self.0.begin(NodeKey { level, ..NodeKey::ROOT });
+        self.0.begin(NodeKey { level, ..NodeKey::ROOT }, &[]);
         self.0.offer(candidates.iter().copied().map(TreePoint));
         self.0.choose().iter().filter(|taken| **taken).count()
     }

@@ -124,7 +124,8 @@ fn write(
 /// A scan that had to be opened again cannot be.
 pub(crate) fn least(targets: &[Target], sources: &Sources, intake: &Intake) -> Result<Least, ConvertError> {
     let decode_bytes = sources.decode_bytes(|source| &intake.of(source).wanted)?;
-    Ok(Least::of(targets.iter().map(|t| t.output().least_points()), decode_bytes, sources.bytes))
+    let least = Least::of(targets.iter().map(|t| t.output().least_points()), decode_bytes, sources.bytes);
+    Ok(least.with_units(targets.iter().map(|t| t.output().least_bytes())))
 }
 
 /// What there is to say if the process grew beyond the ceiling during this run.

@@ -1,16 +1,18 @@
-//! One chunk: load, sort, divide, sample, write into a buffer.
+//! One chunk: load, sort, divide, sample, write into the buffer of the unit.
 
 use std::ops::Range;
 
 use pointmill_format::NodeKey;
 
+use super::borders::UnitBorders;
 use super::divide::Chunk;
+use super::finished::Finished;
 use super::list::List;
 use super::order::{OrderScratch, Point, order};
 use super::raise::{Nodes, Pairs, Pending, Points};
 use super::sample::Sampler;
-use super::sink::{FinishedNode, NodeEncoder, finish_node};
-use crate::cloud::{Checksum, Cloud, Ledger, morton};
+use super::sink::NodeEncoder;
+use crate::cloud::{Cloud, Ledger, morton};
 use crate::error::ConvertError;
 use crate::plan::Duplicates;
 use crate::runtime::os_hints;
@@ -19,88 +21,64 @@ use crate::runtime::os_hints;
 pub(super) struct ChunkPlan<'a> {
     pub(super) cloud: &'a Cloud<'a>,
     pub(super) leaf_capacity: u32,
-    /// Buffers are made for chunks of this size at once; what is not touched costs nothing.
+    /// Points of a unit, at most; buffers are made for as many at once: what is not touched costs nothing.
+    pub(super) unit_points: u64,
+    /// The same of a chunk.
     pub(super) usual_points: u64,
 }
 
-/// A chunk, built: final nodes as bytes, and what the nodes above may still change.
-pub(super) struct BuiltChunk {
-    pub(super) payloads: Vec<u8>,
-    /// Byte offsets are relative to `payloads`.
-    pub(super) nodes: Vec<FinishedNode>,
-    /// Records as stored.
-    pub(super) root: Pending<List>,
-    pub(super) ledger: Ledger,
-    pub(super) overfull_leaves: u64,
-}
-
 /// One thread's memory for building chunks.
-pub(super) struct ChunkBuilder<'a, E> {
-    plan: &'a ChunkPlan<'a>,
-    sampler: Sampler,
-    encoder: E,
+#[derive(Default)]
+pub(super) struct ChunkMemory {
     records: Vec<u8>,
     points: Vec<Point>,
     scratch: OrderScratch,
 }
 
-impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
-    pub(super) fn new(plan: &'a ChunkPlan<'a>, sampler: Sampler, encoder: E) -> Self {
-        let (records, points, scratch) = (Vec::new(), Vec::new(), OrderScratch::default());
-        Self { plan, sampler, encoder, records, points, scratch }
-    }
-
-    /// Gives back the memory of the chunks so far.
-    pub(super) fn release(&mut self) {
-        (self.records, self.points, self.scratch) = (Vec::new(), Vec::new(), OrderScratch::default());
-    }
-
-    /// Builds a chunk; `payloads` is a buffer to use again.
-    pub(super) fn build(&mut self, chunk: &Chunk, payloads: Vec<u8>) -> Result<BuiltChunk, ConvertError> {
-        let frame = &self.plan.cloud.frame;
-        let mut ledger = Ledger::default();
-        self.load(chunk, &mut ledger)?;
-        order(&self.records, frame, chunk.key.level, &mut self.scratch, &mut self.points);
-        if self.plan.cloud.plan.duplicates == Duplicates::Drop {
-            self.drop_duplicates(&mut ledger);
-        }
-        let mut nodes = ChunkNodes {
-            points: &self.points,
-            records: &self.records,
-            stride: frame.stride,
-            sampler: &mut self.sampler,
-            encoder: &mut self.encoder,
-            payloads,
-            nodes: Vec::new(),
-            written: Checksum::default(),
-        };
-        nodes.payloads.clear();
-        let room = self.points.len().max(self.plan.usual_points as usize) * frame.stride;
-        os_hints::reserve(&mut nodes.payloads, room);
-        let mut subtree = Subtree { capacity: self.plan.leaf_capacity as usize, overfull_leaves: 0 };
-        let root = subtree.node(chunk.key, 0..self.points.len(), &mut nodes)?;
-        let overfull_leaves = subtree.overfull_leaves;
-        ledger.written = nodes.written;
-        let (payloads, nodes) = (nodes.payloads, nodes.nodes);
-        let root = self.detach(root);
-        Ok(BuiltChunk { payloads, nodes, root, ledger, overfull_leaves })
-    }
-
-    fn load(&mut self, chunk: &Chunk, ledger: &mut Ledger) -> Result<(), ConvertError> {
-        let Cloud { store, facts, frame, .. } = self.plan.cloud;
+impl ChunkMemory {
+    /// Takes the points of a chunk, in order.
+    pub(super) fn load(
+        &mut self,
+        plan: &ChunkPlan<'_>,
+        chunk: &Chunk,
+        ledger: &mut Ledger,
+    ) -> Result<(), ConvertError> {
+        let Cloud { store, facts, frame, .. } = plan.cloud;
         self.records.clear();
-        os_hints::reserve(&mut self.records, chunk.points.max(self.plan.usual_points) as usize * frame.stride);
+        os_hints::reserve(&mut self.records, chunk.points.max(plan.usual_points) as usize * frame.stride);
         for segment in &chunk.segments {
             ledger.load(store, *segment, frame.stride, &facts.widening, &mut self.records)?;
+        }
+        order(&self.records, frame, chunk.key.level, &mut self.scratch, &mut self.points);
+        if plan.cloud.plan.duplicates == Duplicates::Drop {
+            self.drop_duplicates(plan, ledger);
         }
         Ok(())
     }
 
+    /// Builds the nodes of the chunk that was loaded; returns its root, and the number of leaves above the capacity.
+    pub(super) fn build(
+        &mut self,
+        plan: &ChunkPlan<'_>,
+        key: NodeKey,
+        sampler: &mut Sampler,
+        encoder: &mut impl NodeEncoder,
+        borders: &mut UnitBorders<'_>,
+        finished: &mut Finished,
+    ) -> Result<(Pending<List>, u64), ConvertError> {
+        let stride = plan.cloud.frame.stride;
+        let (points, records) = (&self.points[..], &self.records[..]);
+        let mut nodes = ChunkNodes { points, records, stride, sampler, encoder, borders, finished };
+        let mut subtree = Subtree { capacity: plan.leaf_capacity as usize, overfull_leaves: 0 };
+        let root = subtree.node(key, 0..self.points.len(), &mut nodes)?;
+        Ok((self.detach(root, stride), subtree.overfull_leaves))
+    }
+
     /// Of records that are equal in every byte one stays. Their mark ([`crate::cloud::Intake::mark`]) differs where the
     /// sources have different positions.
-    fn drop_duplicates(&mut self, ledger: &mut Ledger) {
-        let (records, stride) = (&self.records, self.plan.cloud.frame.stride);
-        let class = self.plan.cloud.facts.class;
+    fn drop_duplicates(&mut self, plan: &ChunkPlan<'_>, ledger: &mut Ledger) {
+        let (records, stride) = (&self.records, plan.cloud.frame.stride);
+        let class = plan.cloud.facts.class;
         let bytes = |p: &Point| &records[p.record as usize * stride..][..stride];
         self.points.dedup_by(|next, previous| {
             let same = next.t == previous.t && bytes(next) == bytes(previous);
@@ -113,28 +91,26 @@ impl<'a, E: NodeEncoder> ChunkBuilder<'a, E> {
     }
 
     /// Copies what the pending nodes refer to, so that the chunk's memory can be used again.
-    fn detach(&self, node: Pending<Vec<u32>>) -> Pending<List> {
-        let stride = self.plan.cloud.frame.stride;
+    fn detach(&self, node: Pending<Vec<u32>>, stride: usize) -> Pending<List> {
         let mut records = Vec::with_capacity(node.points.len() * stride);
         for point in node.points {
             let record = self.points[point as usize].record as usize;
             records.extend_from_slice(&self.records[record * stride..][..stride]);
         }
-        let children = node.children.into_iter().map(|child| self.detach(child)).collect();
+        let children = node.children.into_iter().map(|child| self.detach(child, stride)).collect();
         Pending { key: node.key, points: List::of_chunk(records, stride), is_inner: node.is_inner, children }
     }
 }
 
 /// The nodes of a chunk while they are made.
-struct ChunkNodes<'a, E> {
+struct ChunkNodes<'a, 'b, E> {
     points: &'a [Point],
     records: &'a [u8],
     stride: usize,
     sampler: &'a mut Sampler,
     encoder: &'a mut E,
-    payloads: Vec<u8>,
-    nodes: Vec<FinishedNode>,
-    written: Checksum,
+    borders: &'a mut UnitBorders<'b>,
+    finished: &'a mut Finished,
 }
 
 impl Points for Vec<u32> {
@@ -143,9 +119,9 @@ impl Points for Vec<u32> {
     }
 }
 
-impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, E> {
+impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, '_, E> {
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<Vec<u32>>]) -> Result<Vec<u32>, ConvertError> {
-        self.sampler.begin(key);
+        self.sampler.begin(key, self.borders.around(key)?);
         for child in &*children {
             self.sampler.offer(child.points.iter().map(|p| self.points[*p as usize].t));
         }
@@ -164,6 +140,7 @@ impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, E> {
                 !taken
             });
         }
+        self.borders.note(key, self.sampler.border());
         Ok(points)
     }
 
@@ -184,9 +161,7 @@ impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, E> {
             let at = self.points[*p as usize].record as usize * self.stride;
             &self.records[at..at + self.stride]
         });
-        let node = finish_node(self.encoder, key, records, &mut self.written, &mut self.payloads)?;
-        self.nodes.push(node);
-        Ok(())
+        self.finished.encode(self.encoder, key, records)
     }
 }
 
@@ -201,7 +176,7 @@ impl Subtree {
         &mut self,
         key: NodeKey,
         range: Range<usize>,
-        nodes: &mut ChunkNodes<'_, impl NodeEncoder>,
+        nodes: &mut ChunkNodes<'_, '_, impl NodeEncoder>,
     ) -> Result<Pending<Vec<u32>>, ConvertError> {
         let points = &nodes.points[range.clone()];
         let is_one_place = points.first().map(|p| p.t) == points.last().map(|p| p.t);

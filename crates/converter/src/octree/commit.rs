@@ -1,17 +1,18 @@
-//! Puts built chunks behind one another in the output, in Morton order, and builds the nodes above them.
+//! Puts built units behind one another in the output, in their order, and lets those begin that waited for them.
 
 use std::collections::HashMap;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use pointmill_format::NodeKey;
 
-use super::chunk::BuiltChunk;
-use super::list::List;
-use super::raise::{Nodes, Pending};
-use super::sink::{FinishedNode, NodeSink};
-use super::top::{Placed, TopNodes};
-use crate::cloud::Ledger;
-use crate::error::ConvertError;
+use super::finished::Piece;
+use super::list::{List, Lists};
+use super::raise::{Pending, Points};
+use super::sink::{FinishedNode, NodeEncoder, NodeSink, points_of};
+use super::unit::BuiltUnit;
+use crate::cloud::{Checksum, Ledger};
+use crate::error::{ConvertError, Unsupported};
+use crate::runtime::{Consumer, Reservation, Runtime};
 
 /// A finished tree.
 pub(crate) struct Octree {
@@ -23,60 +24,82 @@ pub(crate) struct Octree {
     pub(crate) overfull_leaves: u64,
 }
 
-/// Where workers hand in their chunks. A worker may be a few chunks ahead of the oldest unfinished one, no more: that
-/// bounds the memory.
+/// Where workers hand in their units. A worker may be a few units ahead of the oldest unfinished one, no more: that bounds
+/// the memory.
 pub(super) struct Committer<'a, S: NodeSink> {
     sink: &'a S,
+    lists: &'a Lists,
     window: usize,
-    /// Keys of all chunks, in Morton order.
-    keys: Vec<NodeKey>,
-    state: Mutex<State<'a, S>>,
+    units: usize,
+    state: Mutex<State>,
     changed: Condvar,
 }
 
 /// Buffers below this size are not passed on.
 const SPARE_BYTES: usize = 4 << 20;
 
-struct State<'a, S: NodeSink> {
-    /// The next chunk to put behind the others.
+struct State {
+    /// The next unit to put behind the others.
     next: usize,
-    waiting: HashMap<usize, BuiltChunk>,
-    stack: Vec<Pending<List>>,
-    top: TopNodes<'a, S>,
+    waiting: HashMap<usize, BuiltUnit>,
+    /// Roots of units that wait for the node above them.
+    roots: HashMap<NodeKey, Pending<List>>,
+    /// Nodes that have their place.
+    nodes: Vec<FinishedNode>,
+    known: Reservation,
+    /// Bytes of all of them.
+    bytes: u64,
     ledger: Ledger,
     overfull_leaves: u64,
     spare: Vec<Vec<u8>>,
-    /// Chunks above this one are not built any more.
+    /// Units above this one are not built any more.
     last: usize,
 }
 
+/// Nodes whose bytes have a place.
+enum Placed {
+    Nodes { nodes: Vec<FinishedNode>, bytes: Vec<u8>, offset: u64 },
+    Large { node: FinishedNode, points: List },
+}
+
 impl<'a, S: NodeSink> Committer<'a, S> {
-    /// `keys`: those of all chunks, in Morton order.
-    pub(super) fn new(keys: Vec<NodeKey>, window: usize, sink: &'a S, top: TopNodes<'a, S>) -> Self {
+    pub(super) fn new(units: usize, window: usize, sink: &'a S, lists: &'a Lists, rt: &Runtime<'_>) -> Self {
         let state = State {
             next: 0,
             waiting: HashMap::new(),
-            stack: Vec::new(),
-            top,
+            roots: HashMap::new(),
+            nodes: Vec::new(),
+            known: Reservation::new(&rt.memory, Consumer::Nodes),
+            bytes: 0,
             ledger: Ledger::default(),
             overfull_leaves: 0,
             spare: Vec::new(),
             last: usize::MAX,
         };
-        Self { sink, window, keys, state: Mutex::new(state), changed: Condvar::new() }
+        Self { sink, lists, window, units, state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Waits until chunk `index` may be begun and returns a buffer for its bytes; `None` if it is not needed any more,
+    /// Waits until unit `index` may be begun and returns a buffer for its bytes; `None` if it is not needed any more,
     /// because one below it failed.
     pub(super) fn admit(&self, index: usize) -> Option<Vec<u8>> {
-        let mut state = self.lock();
-        while index <= state.last && index >= state.next + self.window {
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
-        (index <= state.last).then(|| state.spare.pop().unwrap_or_default())
+        let mut state = self.wait(index, (index + 1).saturating_sub(self.window))?;
+        Some(state.spare.pop().unwrap_or_default())
     }
 
-    /// Chunk `index` has failed: those above it that wait are let go. Those below it go on; they wait for none above.
+    /// Waits until all units before `first` are done; false if unit `index` is not needed any more.
+    pub(super) fn wait_for(&self, index: usize, first: usize) -> bool {
+        self.wait(index, first).is_some()
+    }
+
+    fn wait(&self, index: usize, first: usize) -> Option<MutexGuard<'_, State>> {
+        let mut state = self.lock();
+        while index <= state.last && state.next < first {
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        (index <= state.last).then_some(state)
+    }
+
+    /// Unit `index` has failed: those above it that wait are let go. Those below it go on; they wait for none above.
     pub(super) fn stop_above(&self, index: usize) {
         let mut state = self.lock();
         state.last = state.last.min(index);
@@ -84,80 +107,112 @@ impl<'a, S: NodeSink> Committer<'a, S> {
         self.changed.notify_all();
     }
 
-    /// Takes a chunk; whatever has become next in order gets its place among the bytes, and is written.
-    pub(super) fn submit(&self, index: usize, chunk: BuiltChunk) -> Result<(), ConvertError> {
+    /// The roots of units that are done.
+    pub(super) fn take(&self, roots: &[NodeKey]) -> Result<Vec<Pending<List>>, ConvertError> {
+        let mut state = self.lock();
+        let taken = roots.iter().map(|key| state.roots.remove(key)).collect::<Option<_>>();
+        taken.ok_or_else(|| ConvertError::Internal("a subtree is missing".into()))
+    }
+
+    /// Takes a unit; whatever has become next in order gets its place among the bytes, and is written.
+    pub(super) fn submit(
+        &self,
+        index: usize,
+        unit: BuiltUnit,
+        encoder: &mut impl NodeEncoder,
+    ) -> Result<(), ConvertError> {
         let mut ready: Vec<Placed> = Vec::new();
         {
             let mut state = self.lock();
-            state.waiting.insert(index, chunk);
+            state.waiting.insert(index, unit);
             loop {
                 let next = state.next;
-                let Some(chunk) = state.waiting.remove(&next) else { break };
-                let following = self.keys.get(next + 1).copied();
-                state.append(chunk, following, &mut ready)?;
+                let Some(unit) = state.waiting.remove(&next) else { break };
+                state.append(unit, encoder.row_bytes(), &mut ready)?;
                 state.next += 1;
             }
         }
         self.changed.notify_all();
-        for Placed { nodes, bytes, offset } in ready {
-            self.sink.write(&nodes, &bytes, offset)?;
-            let mut state = self.lock();
-            // The small buffers of the nodes above are not worth keeping.
-            if state.spare.len() < self.window && bytes.capacity() > SPARE_BYTES {
-                state.spare.push(bytes);
+        for placed in ready {
+            match placed {
+                Placed::Nodes { nodes, bytes, offset } => {
+                    self.sink.write(&nodes, &bytes, offset)?;
+                    let mut state = self.lock();
+                    // The small buffers of the nodes above are not worth keeping.
+                    if state.spare.len() < self.window && bytes.capacity() > SPARE_BYTES {
+                        state.spare.push(bytes);
+                    }
+                }
+                Placed::Large { node, points } => {
+                    let written = self.write_large(node, &points, encoder)?;
+                    self.lock().ledger.written.merge(&written);
+                }
             }
         }
         Ok(())
     }
 
-    /// The tree, once all chunks were handed in.
-    pub(super) fn finish(self) -> Result<Octree, ConvertError> {
-        let mut state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        if state.next != self.keys.len() || !state.stack.is_empty() {
-            return Err(ConvertError::Internal("the tree was not finished".into()));
-        }
-        state.ledger.written.merge(&state.top.written);
-        let State { top, ledger, overfull_leaves, .. } = state;
-        Ok(Octree { nodes: top.nodes, bytes: top.bytes, ledger, overfull_leaves })
+    /// Writes a node whose records are too many to have them in memory together.
+    fn write_large(
+        &self,
+        node: FinishedNode,
+        points: &List,
+        encoder: &mut impl NodeEncoder,
+    ) -> Result<Checksum, ConvertError> {
+        let (mut written, mut bytes, mut size) = (Checksum::default(), Vec::new(), 0);
+        self.lists.each(points, |records| {
+            bytes.clear();
+            encoder.encode(node.key, records.chunks_exact(self.lists.stride), &mut written, &mut bytes)?;
+            self.sink.write(&[], &bytes, node.byte_offset + size)?;
+            size += bytes.len() as u64;
+            Ok(true)
+        })?;
+        self.sink.write(&[node], &[], node.byte_offset)?;
+        Ok(written)
     }
 
-    fn lock(&self) -> MutexGuard<'_, State<'a, S>> {
+    /// The tree, once all units were handed in.
+    pub(super) fn finish(self) -> Result<Octree, ConvertError> {
+        let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        if state.next != self.units || !state.roots.is_empty() {
+            return Err(ConvertError::Internal("the tree was not finished".into()));
+        }
+        let State { nodes, bytes, ledger, overfull_leaves, .. } = state;
+        Ok(Octree { nodes, bytes, ledger, overfull_leaves })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl<S: NodeSink> State<'_, S> {
-    fn append(
-        &mut self,
-        chunk: BuiltChunk,
-        following: Option<NodeKey>,
-        ready: &mut Vec<Placed>,
-    ) -> Result<(), ConvertError> {
-        let BuiltChunk { payloads, nodes, mut root, ledger, overfull_leaves } = chunk;
+impl State {
+    fn append(&mut self, unit: BuiltUnit, row_bytes: Option<u64>, ready: &mut Vec<Placed>) -> Result<(), ConvertError> {
+        let BuiltUnit { pieces, root, ledger, overfull_leaves } = unit;
         self.ledger.merge(&ledger);
         self.overfull_leaves += overfull_leaves;
-        ready.push(self.top.place(nodes, payloads)?);
-        self.top.admit(&mut root)?;
-        self.stack.push(root);
-        self.climb(following)?;
-        ready.extend(self.top.take_finished()?);
-        Ok(())
-    }
-
-    /// Builds every node all of whose chunks are in; at the root writes what is left.
-    fn climb(&mut self, following: Option<NodeKey>) -> Result<(), ConvertError> {
-        while let Some(last) = self.stack.last() {
-            let Some(parent) = last.key.parent() else {
-                let Some(mut root) = self.stack.pop() else { break };
-                root.write_children(&mut self.top)?;
-                return self.top.write(root.key, root.points);
-            };
-            if following.is_some_and(|f| f.ancestor(parent.level) == Some(parent)) {
-                break;
+        for piece in pieces {
+            let offset = self.bytes;
+            match piece {
+                Piece::Nodes(mut nodes, bytes) => {
+                    nodes.iter_mut().for_each(|n| n.byte_offset += offset);
+                    self.nodes.extend_from_slice(&nodes);
+                    self.bytes += bytes.len() as u64;
+                    ready.push(Placed::Nodes { nodes, bytes, offset });
+                }
+                Piece::Large(key, points) => {
+                    let too_many = || Unsupported::CrowdedNode { points: points.count(), max: u64::MAX };
+                    let byte_size = row_bytes.and_then(|b| points.count().checked_mul(b)).ok_or_else(too_many)?;
+                    let node = FinishedNode { key, points: points_of(points.count())?, byte_offset: offset, byte_size };
+                    self.nodes.push(node);
+                    self.bytes += byte_size;
+                    ready.push(Placed::Large { node, points });
+                }
             }
-            let first = self.stack.iter().rposition(|n| n.key.parent() != Some(parent)).map_or(0, |i| i + 1);
-            let children = self.stack.split_off(first);
-            self.stack.push(Pending::above(parent, children, &mut self.top)?);
+        }
+        self.known.resize((self.nodes.capacity() * size_of::<FinishedNode>()) as u64)?;
+        if let Some(root) = root {
+            self.roots.insert(root.key, root);
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
-//! Cuts the cloud into chunks: octree nodes small enough to be built in memory, alone. Which nodes these are changes
-//! nothing in the output; it is a matter of memory and load.
+//! Cuts the cloud into subtrees of a size that does not depend on memory, and these into chunks that are small enough to be
+//! built in memory. Which nodes are the roots of subtrees is part of the result ([`super::units`]); which are chunks is
+//! not.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +10,7 @@ use crate::cloud::{Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Reservation, Runtime};
 
-/// A subtree that is built alone.
+/// A subtree that is built in memory.
 #[derive(Debug)]
 pub(super) struct Chunk {
     pub(super) key: NodeKey,
@@ -18,16 +19,25 @@ pub(super) struct Chunk {
     pub(super) segments: Segments,
 }
 
+/// A subtree that one thread builds, from the chunks that it consists of, in Morton order.
+#[derive(Debug)]
+pub(super) struct Subtree {
+    pub(super) key: NodeKey,
+    pub(super) chunks: Vec<Chunk>,
+}
+
 /// Levels by which a cell that is too large is divided at once.
 const SPLIT_LEVELS: u32 = 3;
 
-/// The chunks of the cloud, in Morton order, none larger than `max_points` unless its points share one place; and what
-/// these lists take.
+/// The largest subtrees of at most `unit_points` in Morton order, in chunks of at most `chunk_points`, unless the points of
+/// one share one place; and what these lists take.
 pub(super) fn divide(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
-    max_points: u64,
-) -> Result<(Vec<Chunk>, Reservation), ConvertError> {
+    unit_points: u64,
+    chunk_points: u64,
+) -> Result<(Vec<Subtree>, Reservation), ConvertError> {
+    let max_points = unit_points.min(chunk_points);
     let mut room = Reservation::new(&rt.memory, Consumer::Cells);
     let mut lists = 0;
     let mut regrouper = Regrouper::new(&cloud.store, cloud.frame.stride);
@@ -45,10 +55,27 @@ pub(super) fn divide(
             stack.extend(parts.into_iter().rev());
         }
     }
-    let mut chunks = Vec::new();
-    choose(NodeKey::ROOT, &mut cells, max_points, &mut chunks);
-    room.resize(chunks.iter().map(|chunk| chunk.segments.bytes() + size_of::<Chunk>() as u64).sum())?;
-    Ok((chunks, room))
+    let mut subtrees = Vec::new();
+    choose(NodeKey::ROOT, &mut cells, unit_points, &mut |key, cells| {
+        let mut chunks = Vec::new();
+        choose(key, cells, chunk_points, &mut |key, cells| chunks.push(Chunk::of(key, cells)));
+        subtrees.push(Subtree { key, chunks });
+    });
+    let bytes = |chunk: &Chunk| chunk.segments.bytes() + size_of::<Chunk>() as u64;
+    let of_subtree = |s: &Subtree| s.chunks.iter().map(bytes).sum::<u64>() + 2 * size_of::<Subtree>() as u64;
+    room.resize(subtrees.iter().map(of_subtree).sum())?;
+    Ok((subtrees, room))
+}
+
+impl Chunk {
+    /// Takes all records of some cells.
+    fn of(key: NodeKey, cells: &mut [Cell]) -> Self {
+        let points = cells.iter().map(|c| c.points).sum();
+        let mut segments = Segments::default();
+        cells.iter_mut().for_each(|c| segments.append(std::mem::take(&mut c.segments)));
+        segments.sort();
+        Self { key, points, segments }
+    }
 }
 
 /// The parts of a cell some levels below it, in Morton order.
@@ -75,25 +102,22 @@ fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) 
     Ok(parts.into_iter().map(part).collect())
 }
 
-/// The highest nodes that are small enough (or hold one place only) become chunks.
-fn choose(node: NodeKey, cells: &mut [Cell], max_points: u64, out: &mut Vec<Chunk>) {
+/// Finds the highest nodes that are small enough (or hold one place only), and the cells in each.
+fn choose(node: NodeKey, cells: &mut [Cell], max_points: u64, found: &mut impl FnMut(NodeKey, &mut [Cell])) {
     let points: u64 = cells.iter().map(|c| c.points).sum();
     if points == 0 {
         return;
     }
     let is_last = cells.len() == 1 && (cells[0].is_one_place || cells[0].key == node);
     if points <= max_points || is_last {
-        let mut segments = Segments::default();
-        cells.iter_mut().for_each(|c| segments.append(std::mem::take(&mut c.segments)));
-        segments.sort();
-        out.push(Chunk { key: node, points, segments });
+        found(node, cells);
         return;
     }
     let mut rest = cells;
     for child in (0..8).filter_map(|c| node.child(c)) {
         let inside = rest.iter().take_while(|c| c.key.ancestor(child.level) == Some(child)).count();
         let (mine, others) = rest.split_at_mut(inside);
-        choose(child, mine, max_points, out);
+        choose(child, mine, max_points, found);
         rest = others;
     }
     debug_assert!(rest.is_empty());

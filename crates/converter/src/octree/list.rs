@@ -1,6 +1,7 @@
 //! Records of nodes that wait for the nodes above them: in memory as long as there is room, else in a temporary file.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use super::raise::Points;
 use crate::error::ConvertError;
@@ -21,9 +22,7 @@ enum Place {
     /// `Reservation`: of the pool; none while the records are part of a chunk.
     Memory(Vec<u8>, Option<Reservation>),
     /// From a byte of the file on.
-    Disk(u64),
-    /// From a byte of a file of its own on.
-    Own(DiskFile, u64),
+    Disk(Arc<DiskFile>, u64),
 }
 
 impl Points for List {
@@ -40,7 +39,7 @@ impl List {
 
     /// Records of points that share one place, in a file of their own.
     pub(super) fn of_place(file: DiskFile, count: u64) -> Self {
-        Self { count, place: Place::Own(file, 0), is_one_place: true }
+        Self { count, place: Place::Disk(Arc::new(file), 0), is_one_place: true }
     }
 
     /// Of nothing.
@@ -49,23 +48,32 @@ impl List {
     }
 }
 
-/// Where lists are.
+/// Where lists are, for all threads.
 pub(super) struct Lists {
     pub(super) stride: usize,
     memory: Arc<Pool>,
     temp: TempFiles,
-    file: Option<DiskFile>,
+    file: Mutex<Option<Arc<DiskFile>>>,
     /// Where the next list that goes to the file begins.
-    end: u64,
+    end: AtomicU64,
+    /// Who samples a node of many points: side by side as long as there is memory.
+    pub(super) large: RwLock<()>,
 }
 
 impl Lists {
     pub(super) fn new(stride: usize, memory: &Arc<Pool>, temp: &TempFiles) -> Self {
-        Self { stride, memory: Arc::clone(memory), temp: temp.clone(), file: None, end: 0 }
+        Self {
+            stride,
+            memory: Arc::clone(memory),
+            temp: temp.clone(),
+            file: Mutex::new(None),
+            end: AtomicU64::new(0),
+            large: RwLock::new(()),
+        }
     }
 
     /// Accounts for a list of a chunk: it stays in memory if there is room.
-    pub(super) fn admit(&mut self, list: &mut List) -> Result<(), ConvertError> {
+    pub(super) fn admit(&self, list: &mut List) -> Result<(), ConvertError> {
         if let Place::Memory(records, None) = &mut list.place {
             let records = std::mem::take(records);
             list.place = self.settle(records)?;
@@ -73,14 +81,14 @@ impl Lists {
         Ok(())
     }
 
-    fn settle(&mut self, mut records: Vec<u8>) -> Result<Place, ConvertError> {
+    fn settle(&self, mut records: Vec<u8>) -> Result<Place, ConvertError> {
         records.shrink_to_fit();
         match self.reserve(records.len()) {
             Some(reservation) => Ok(Place::Memory(records, Some(reservation))),
             None => {
-                let start = self.region(records.len() as u64);
-                self.file()?.write_at(&records, start, "writing nodes that wait")?;
-                Ok(Place::Disk(start))
+                let (file, start) = (self.file()?, self.region(records.len() as u64));
+                file.write_at(&records, start, "writing nodes that wait")?;
+                Ok(Place::Disk(file, start))
             }
         }
     }
@@ -94,16 +102,15 @@ impl Lists {
     }
 
     /// A region of the file; what of it is never written takes no room on the disk.
-    fn region(&mut self, bytes: u64) -> u64 {
-        let start = self.end;
-        self.end += bytes;
-        start
+    fn region(&self, bytes: u64) -> u64 {
+        self.end.fetch_add(bytes, Ordering::Relaxed)
     }
 
-    fn file(&mut self) -> Result<&DiskFile, ConvertError> {
-        match &mut self.file {
-            Some(file) => Ok(file),
-            empty => Ok(empty.insert(self.temp.make()?)),
+    fn file(&self) -> Result<Arc<DiskFile>, ConvertError> {
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*file {
+            Some(file) => Ok(Arc::clone(file)),
+            None => Ok(Arc::clone(file.insert(Arc::new(self.temp.make()?)))),
         }
     }
 
@@ -140,14 +147,13 @@ impl Lists {
     /// Some records of a list.
     fn read<'b>(&self, list: &'b List, at: u64, count: u64, buffer: &'b mut Vec<u8>) -> Result<&'b [u8], ConvertError> {
         let (start, len) = (at * self.stride as u64, count as usize * self.stride);
-        match (&list.place, &self.file) {
-            (Place::Memory(records, _), _) => Ok(&records[start as usize..][..len]),
-            (Place::Disk(offset), Some(file)) | (Place::Own(file, offset), _) => {
+        match &list.place {
+            Place::Memory(records, _) => Ok(&records[start as usize..][..len]),
+            Place::Disk(file, offset) => {
                 buffer.resize(len, 0);
                 file.read_at(buffer, offset + start, "reading nodes that wait")?;
                 Ok(buffer)
             }
-            (Place::Disk(_), None) => Err(ConvertError::Internal("nodes that wait were lost".into())),
         }
     }
 
@@ -161,12 +167,12 @@ impl Lists {
         list.count -= 1;
         match &mut list.place {
             Place::Memory(records, _) => drop(records.drain(..self.stride)),
-            Place::Disk(offset) | Place::Own(_, offset) => *offset += self.stride as u64,
+            Place::Disk(_, offset) => *offset += self.stride as u64,
         }
     }
 
     /// Moves one record into a list of its own.
-    pub(super) fn take_one(&mut self, list: &mut List, index: u64) -> Result<List, ConvertError> {
+    pub(super) fn take_one(&self, list: &mut List, index: u64) -> Result<List, ConvertError> {
         let from = std::mem::replace(list, List::empty());
         let (mut one, mut rest) = (Writer::new(1), Writer::new(from.count - 1));
         let (mut at, mut buffer) = (0, Vec::new());
@@ -201,7 +207,7 @@ impl Writer {
     }
 
     #[inline]
-    pub(super) fn push(&mut self, record: &[u8], lists: &mut Lists) -> Result<(), ConvertError> {
+    pub(super) fn push(&mut self, record: &[u8], lists: &Lists) -> Result<(), ConvertError> {
         if self.records.len() + record.len() > self.records.capacity() {
             self.grow(lists)?;
         }
@@ -211,7 +217,7 @@ impl Writer {
     }
 
     /// Makes room for more records: in memory, or by writing those that are there.
-    fn grow(&mut self, lists: &mut Lists) -> Result<(), ConvertError> {
+    fn grow(&mut self, lists: &Lists) -> Result<(), ConvertError> {
         let stride = lists.stride;
         if self.in_file.is_none() {
             let most = usize::try_from(self.most).unwrap_or(usize::MAX).saturating_mul(stride);
@@ -235,7 +241,7 @@ impl Writer {
         Ok(())
     }
 
-    fn flush(&mut self, lists: &mut Lists) -> Result<(), ConvertError> {
+    fn flush(&mut self, lists: &Lists) -> Result<(), ConvertError> {
         if let Some((start, written)) = &mut self.in_file {
             lists.file()?.write_at(&self.records, *start + *written, "writing nodes that wait")?;
             *written += self.records.len() as u64;
@@ -245,10 +251,10 @@ impl Writer {
     }
 
     /// The list.
-    pub(super) fn finish(mut self, lists: &mut Lists) -> Result<List, ConvertError> {
+    pub(super) fn finish(mut self, lists: &Lists) -> Result<List, ConvertError> {
         self.flush(lists)?;
         let place = match self.in_file {
-            Some((start, _)) => Place::Disk(start),
+            Some((start, _)) => Place::Disk(lists.file()?, start),
             None => {
                 self.records.shrink_to_fit();
                 if let Some(room) = &mut self.room {
@@ -280,13 +286,13 @@ mod tests {
     fn lists_give_back_what_they_hold_from_memory_and_from_the_disk() {
         for room in [1 << 30, 300_000, 0] {
             let memory = Arc::new(Pool::new(room, room));
-            let mut lists = Lists::new(4, &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
+            let lists = Lists::new(4, &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
             let (mut even, mut odd) = (Writer::new(200_000), Writer::new(200_000));
             for i in 0..400_000u32 {
                 let writer = if i % 2 == 0 { &mut even } else { &mut odd };
-                writer.push(&i.to_le_bytes(), &mut lists).unwrap();
+                writer.push(&i.to_le_bytes(), &lists).unwrap();
             }
-            let (mut even, mut odd) = (even.finish(&mut lists).unwrap(), odd.finish(&mut lists).unwrap());
+            let (mut even, mut odd) = (even.finish(&lists).unwrap(), odd.finish(&lists).unwrap());
             assert_eq!(numbers(&lists, &even), (0..400_000).step_by(2).collect::<Vec<u32>>());
             let middle = lists.take_one(&mut odd, 100_000).unwrap();
             assert_eq!(numbers(&lists, &middle), [200_001]);
@@ -298,7 +304,7 @@ mod tests {
             let mut chunk = List::of_chunk(vec![7; 400], 4);
             lists.admit(&mut chunk).unwrap();
             assert_eq!(numbers(&lists, &chunk).len(), 100);
-            assert_eq!(lists.end > 0, room < 1 << 30);
+            assert_eq!(lists.end.load(Ordering::Relaxed) > 0, room < 1 << 30);
             drop((even, odd, middle, chunk));
             assert_eq!(memory.free(), room, "all was given back");
         }

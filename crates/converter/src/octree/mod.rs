@@ -1,45 +1,57 @@
-//! The octree, whatever format it is written in: chunks built in parallel and put behind one another in Morton order.
+//! The octree, whatever format it is written in.
 //!
-//! 1. [`divide`] cuts the cloud into chunks, nodes small enough to be built in memory alone.
-//! 2. [`chunk`] puts the points of a chunk in Morton order ([`order`]), divides them into nodes and moves points up the
-//!    tree by the rule of [`raise`]; inner nodes take a [`sample`] of their children.
-//! 3. [`commit`] puts chunks behind one another and builds the few nodes above them ([`top`]) as their children become
-//!    complete; what waits for that is in [`list`]s, in memory or on the disk.
+//! 1. [`divide`] cuts the cloud into subtrees, and these into chunks, small enough to be built in memory.
+//! 2. [`units`] puts subtrees and the nodes above them into the order in which they are made, [`unit`] makes one.
+//! 3. [`chunk`] puts the points of a chunk in Morton order ([`order`]), divides them into nodes and moves points up the
+//!    tree by the rule of [`raise`]; inner nodes take a [`sample`] of their children, and keep the distance to what
+//!    neighbours have taken over their [`borders`]. Nodes above a chunk do the same with [`lists`] of records, in memory or
+//!    on the disk.
+//! 4. [`commit`] puts the finished nodes of the units behind one another.
 //!
-//! Finished nodes go to a [`sink`], behind which a format stands. The order of nodes depends on the tree alone: a node's
-//! children are written, in order, once the node can no longer be asked for a point; the root comes last.
+//! Finished nodes go to a [`sink`], behind which a format stands. The order of nodes depends on the tree alone: within a
+//! unit, a node's children are written, in order, once the node can no longer be asked for a point; the root comes last.
 
+mod borders;
 mod chunk;
 mod commit;
 mod divide;
+mod finished;
 mod list;
+mod lists;
 mod order;
 mod place;
 mod raise;
 mod sample;
 mod sink;
-mod top;
+mod unit;
+mod units;
 
 pub(crate) use commit::Octree;
 #[cfg(feature = "bench")]
 pub(crate) use order::{OrderScratch, Point, order};
 pub use sample::Sampling;
-pub(crate) use sample::{SPACING_BITS, Sampler};
+pub(crate) use sample::{Sampler, Spacing};
 pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
 
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::runtime::Runtime;
-use chunk::{ChunkBuilder, ChunkPlan};
+use borders::Borders;
+use chunk::ChunkPlan;
 use commit::Committer;
-use top::TopNodes;
+use list::Lists;
+use unit::{Shared, UnitBuilder};
+use units::Work;
 
 /// How a tree is built.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OctreeSettings {
     pub(crate) sampling: Sampling,
+    pub(crate) spacing: Spacing,
     /// A node with more points is divided, unless all of them share one place.
     pub(crate) leaf_capacity: u32,
+    /// A subtree of so many points is built by one thread: part of the result.
+    pub(crate) unit_points: u64,
 }
 
 /// Builds the tree of a cloud and hands its nodes to `sink`.
@@ -49,30 +61,38 @@ pub(crate) fn build<S: NodeSink>(
     settings: OctreeSettings,
     sink: &S,
 ) -> Result<Octree, ConvertError> {
-    let (chunks, _room) = divide::divide(cloud, rt, rt.budget.chunk_points)?;
-    let plan = ChunkPlan {
-        cloud,
-        leaf_capacity: settings.leaf_capacity,
-        usual_points: rt.budget.chunk_points.min(cloud.points()),
+    let OctreeSettings { sampling, spacing, leaf_capacity, unit_points } = settings;
+    let (chunk_points, window) = rt.budget.units(unit_points.min(cloud.points()), cloud.frame.stride);
+    let (subtrees, _room) = divide::divide(cloud, rt, unit_points, chunk_points)?;
+    let units = units::in_order(subtrees);
+    let usual_points = chunk_points.min(cloud.points());
+    let shared = Shared {
+        plan: ChunkPlan { cloud, leaf_capacity, unit_points: unit_points.min(cloud.points()), usual_points },
+        rt,
+        lists: Lists::new(cloud.frame.stride, &rt.memory, &rt.temp),
+        borders: Borders::new(spacing, &rt.memory, &rt.temp),
+        chunk_points,
+        chunk_bytes: rt.budget.chunk_bytes(),
     };
-    let keys = chunks.iter().map(|c| c.key).collect();
-    let top = TopNodes::new(cloud, rt, Sampler::new(settings.sampling), sink);
-    let committer = Committer::new(keys, rt.budget.window, sink, top);
+    let committer = Committer::new(units.len(), window, sink, &shared.lists, rt);
     rt.in_parallel_or(
-        chunks.len(),
-        || ChunkBuilder::new(&plan, Sampler::new(settings.sampling), sink.encoder()),
+        units.len(),
+        || UnitBuilder::new(&shared, Sampler::new(sampling, spacing), sink.encoder()),
         |builder, index| {
+            let unit = &units[index];
             let Some(buffer) = committer.admit(index) else { return Ok(()) };
             rt.check_stop()?; // it may have waited long
-            let chunk = &chunks[index];
-            let built = if chunk.points > rt.budget.chunk_points {
-                builder.release();
-                place::build(&plan, chunk, rt, rt.budget.chunk_bytes())?
-            } else {
-                builder.build(chunk, buffer)?
+            let wait = || committer.wait_for(index, unit.class_start);
+            let built = match &unit.work {
+                Work::Subtree(chunks) => builder.subtree(unit.key, chunks, buffer, wait)?,
+                Work::Above(children) => match wait() {
+                    true => Some(builder.above(unit.key, committer.take(children)?)?),
+                    false => None,
+                },
             };
-            committer.submit(index, built)?;
-            rt.advance(chunks[index].points);
+            let Some(built) = built else { return Ok(()) };
+            committer.submit(index, built, &mut builder.encoder)?;
+            rt.advance(unit.points());
             Ok(())
         },
         |_| (),

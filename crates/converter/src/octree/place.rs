@@ -1,6 +1,6 @@
 //! A chunk that cannot be divided, because all of its points share one place: its records are put in order on the disk.
 
-use super::chunk::{BuiltChunk, ChunkPlan};
+use super::chunk::ChunkPlan;
 use super::divide::Chunk;
 use super::list::List;
 use super::raise::Pending;
@@ -12,15 +12,16 @@ use crate::runtime::Runtime;
 /// Bytes of records that are written together.
 const WRITE_BYTES: usize = 1 << 20;
 
-/// Builds a chunk of points of one place, in `memory_bytes` of memory: a leaf.
+/// Builds a chunk of points of one place, in `memory_bytes` of memory: a leaf. Also returns whether it is above the
+/// capacity: 1 or 0.
 pub(super) fn build(
     plan: &ChunkPlan<'_>,
     chunk: &Chunk,
     rt: &Runtime<'_>,
     memory_bytes: u64,
-) -> Result<BuiltChunk, ConvertError> {
+    ledger: &mut Ledger,
+) -> Result<(Pending<List>, u64), ConvertError> {
     let Cloud { store, facts, frame, .. } = plan.cloud;
-    let mut ledger = Ledger::default();
     // points of one place are in order of their bytes
     let mut sort = BigSort::new(rt, frame.stride, memory_bytes, |a: &[u8], b: &[u8]| a.cmp(b));
     sort.fill(&chunk.segments, |segment, records| ledger.load(store, segment, frame.stride, &facts.widening, records))?;
@@ -47,6 +48,5 @@ pub(super) fn build(
     file.write_at(&bytes, written, "writing the points of one place")?;
     let count = (written + bytes.len() as u64) / frame.stride as u64;
     let root = Pending::leaf(chunk.key, List::of_place(file, count));
-    let overfull_leaves = u64::from(count > u64::from(plan.leaf_capacity));
-    Ok(BuiltChunk { payloads: Vec::new(), nodes: Vec::new(), root, ledger, overfull_leaves })
+    Ok((root, u64::from(count > u64::from(plan.leaf_capacity))))
 }

@@ -2,8 +2,8 @@
 //!
 //! A node is a leaf if it holds no more points than the capacity, or if all of them share one place. An inner node
 //! takes a sample of what its children hold; they keep the rest. A leaf that loses everything is omitted. An inner
-//! node that loses everything takes one point back from below, so that no inner node is empty and yet no sample has a
-//! hole. That is why nodes stay *pending* until nothing above can ask them any more; nearly always that is known at
+//! node that loses everything, or all of whose candidates are too near to points of its neighbours, takes one point back
+//! from below, so that no inner node is empty and yet no sample has a hole. That is why nodes stay *pending* until nothing above can ask them any more; nearly always that is known at
 //! once, because a node has many pairs of points of which its parent can take one only.
 
 use pointmill_format::NodeKey;
@@ -86,7 +86,7 @@ impl<L: Points> Pending<L> {
         }
     }
 
-    /// If an inner node has no point left, takes one from the child that has most.
+    /// If an inner node has no point, takes one from the child that has most.
     fn refill(&mut self, nodes: &mut impl Nodes<L>) -> Result<(), ConvertError> {
         if !self.is_inner || self.points.count() > 0 {
             return Ok(());
@@ -94,7 +94,8 @@ impl<L: Points> Pending<L> {
         let Some(most) = self.children.iter().map(|c| c.points.count()).max() else { return Ok(()) };
         if let Some(at) = self.children.iter().position(|c| c.points.count() == most) {
             let donor = &mut self.children[at];
-            if most > 0 {
+            donor.refill(nodes)?;
+            if donor.points.count() > 0 {
                 // The middle one in Morton order: any is right, this one is most likely near the others.
                 self.points = nodes.take_middle(&mut donor.points)?;
             }

@@ -46,8 +46,9 @@ pub(crate) trait NodeEncoder {
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError>;
 
-    /// True if the bytes of a node are those of its points one after the other, so that they may be encoded in parts.
-    fn is_row_by_row(&self) -> bool;
+    /// Bytes of a point, if the bytes of a node are those of its points one after the other, so that they may be encoded in
+    /// parts.
+    fn row_bytes(&self) -> Option<u64>;
 
     /// Bytes of memory that encoding takes for each point of a node beside its record, otherwise.
     fn bytes_per_point(&self) -> u64;
@@ -57,18 +58,4 @@ pub(crate) trait NodeEncoder {
 pub(super) fn points_of(count: u64) -> Result<u32, ConvertError> {
     u32::try_from(count)
         .map_err(|_| crate::error::Unsupported::CrowdedNode { points: count, max: u64::from(u32::MAX) }.into())
-}
-
-/// Appends the bytes of a node to `out`; its offset counts from the start of `out`.
-pub(super) fn finish_node<'r>(
-    encoder: &mut impl NodeEncoder,
-    key: NodeKey,
-    records: impl ExactSizeIterator<Item = &'r [u8]>,
-    written: &mut Checksum,
-    out: &mut Vec<u8>,
-) -> Result<FinishedNode, ConvertError> {
-    let (count, start) = (records.len(), out.len());
-    let points = points_of(count as u64)?;
-    encoder.encode(key, records, written, out)?;
-    Ok(FinishedNode { key, points, byte_offset: start as u64, byte_size: (out.len() - start) as u64 })
 }

@@ -31,6 +31,11 @@ pub(crate) trait Output: Debug + Send + Sync {
         0
     }
 
+    /// The minimum of bytes of its own that a thread must have in memory together, beside points.
+    fn least_bytes(&self) -> u64 {
+        0
+    }
+
     /// What it takes on disk; `kept`: bytes per point of the attributes that the plan keeps.
     fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize;
 

@@ -15,6 +15,8 @@ pub enum Setting {
     Outputs,
     /// Maximum points of an octree leaf.
     LeafCapacity,
+    /// Distance between points in the root of an octree.
+    Spacing,
     /// Quality of Brotli compression.
     BrotliQuality,
     /// Maximum points of a leaf of a binary tree.
@@ -42,6 +44,7 @@ impl Setting {
             Self::Inputs => "inputs",
             Self::Outputs => "outputs",
             Self::LeafCapacity => "leaf capacity",
+            Self::Spacing => "spacing",
             Self::BrotliQuality => "Brotli quality",
             Self::Capacity => "capacity",
             Self::LodCell => "cell of the coarsest level of detail",
@@ -94,6 +97,14 @@ pub enum PlanFault {
     /// A length that is not positive and finite.
     #[error("must be a number above 0")]
     NotPositive,
+    /// A length that this scene does not permit.
+    #[error("must be between {least} and {most} for this scene")]
+    NotBetween {
+        /// The least that it permits.
+        least: f64,
+        /// The greatest that it permits.
+        most: f64,
+    },
     /// A value that is none of the choices.
     #[error("must be {0}")]
     NotOneOf(&'static str),

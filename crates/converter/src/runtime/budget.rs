@@ -15,7 +15,7 @@ const GATHER_BYTES: u64 = 20 << 20;
 const BUILD_BYTES: u64 = 6 << 20;
 
 /// Less than this in the pool is not worth beginning.
-const LEAST_POOL_BYTES: u64 = 24 << 20;
+const LEAST_POOL_BYTES: u64 = 32 << 20;
 
 /// Larger chunks gain nothing: they leave the caches and the threads uneven.
 pub(crate) const MAX_CHUNK_POINTS: u64 = 400_000;
@@ -28,6 +28,8 @@ const AHEAD_PER_THREAD: usize = 2;
 pub(crate) struct Least {
     /// Points that must be in memory together.
     points: u64,
+    /// Bytes of output that a building thread must have in memory together, beside twenty thousand points.
+    unit_bytes: u64,
     /// Bytes that decoding takes at most, on one thread.
     decode_bytes: u64,
     /// Bytes that all inputs take as long as the run goes on.
@@ -37,7 +39,12 @@ pub(crate) struct Least {
 impl Least {
     /// Of outputs that need as many points together.
     pub(crate) fn of(points: impl IntoIterator<Item = u64>, decode_bytes: u64, input_bytes: u64) -> Self {
-        Self { points: points.into_iter().fold(10_000, u64::max), decode_bytes, input_bytes }
+        Self { points: points.into_iter().fold(10_000, u64::max), unit_bytes: 0, decode_bytes, input_bytes }
+    }
+
+    /// The same, where a thread puts as many bytes of output together.
+    pub(crate) fn with_units(self, unit_bytes: impl IntoIterator<Item = u64>) -> Self {
+        Self { unit_bytes: unit_bytes.into_iter().fold(self.unit_bytes, u64::max), ..self }
     }
 }
 
@@ -57,6 +64,8 @@ pub(crate) struct Budget {
     reader_bytes: u64,
     bytes_per_chunk_point: u64,
     fixed_bytes: u64,
+    /// The least points of a chunk.
+    least_points: u64,
     /// For tests.
     asked_task_points: Option<u64>,
 }
@@ -72,7 +81,8 @@ impl Budget {
         // Allocators keep some of what is freed.
         let usable = ceiling - ceiling / 10;
         let bytes_per_chunk_point = bytes_per_chunk_point(stride, window as u64, threads);
-        let least_chunk = least.points.max(20_000);
+        let of_unit = least.unit_bytes + least.points.max(20_000) * chunk_point_in_unit(stride);
+        let least_chunk = least.points.max(20_000).max(of_unit.div_ceil(bytes_per_chunk_point));
         let least_build = BUILD_BYTES + least_chunk.saturating_mul(bytes_per_chunk_point);
         let of_threads = threads.saturating_mul(reader_bytes.max(least_build));
         let least_bytes = fixed_bytes.saturating_add(of_threads).saturating_add(LEAST_POOL_BYTES);
@@ -97,6 +107,7 @@ impl Budget {
             reader_bytes,
             bytes_per_chunk_point,
             fixed_bytes,
+            least_points: least.points,
             asked_task_points: plan.task_points,
         })
     }
@@ -120,6 +131,17 @@ impl Budget {
         self.threads * BUILD_BYTES + chunks * self.bytes_per_chunk_point
     }
 
+    /// How a thread builds units of at most `unit_points` whose output it puts together: points of the chunks that it has in
+    /// memory at a time, and how many units may be in flight.
+    pub(crate) fn units(&self, unit_points: u64, stride: usize) -> (u64, usize) {
+        if self.chunk_points >= unit_points {
+            return (unit_points, self.window);
+        }
+        let output = unit_points * stride as u64;
+        let points = self.chunk_bytes().saturating_sub(output) / chunk_point_in_unit(stride);
+        (points.max(self.least_points), self.threads as usize)
+    }
+
     /// Bytes of a thread for the unit of work that it builds.
     pub(crate) fn chunk_bytes(&self) -> u64 {
         self.chunk_points * self.bytes_per_chunk_point
@@ -141,6 +163,12 @@ impl Budget {
         let data = points.saturating_mul(stride as u64).min(self.record_bytes(points));
         self.fixed_bytes + data + self.build_bytes(points).max(self.threads * self.reader_bytes)
     }
+}
+
+/// The same of a chunk whose payloads are part of a larger unit: records, tree coordinates, keys twice, points and lists;
+/// and copies of what the nodes above take.
+fn chunk_point_in_unit(stride: usize) -> u64 {
+    2 * stride as u64 + 12 + 16 + 16 + 8
 }
 
 /// A chunk's records, tree coordinates, keys twice, points and lists; and its share of finished payloads in flight.

@@ -1,40 +1,48 @@
-//! One point for each occupied cell of the node's 128³ grid. In Morton order a cell is one run of candidates.
+//! One point for each occupied cell of the node's grid. In Morton order a cell is one run of candidates.
 
 use pointmill_format::NodeKey;
 
-use super::spacing::cell_shift;
 use crate::cloud::TreePoint;
 
+/// Candidates of a part of a node, and which of them may be taken.
+pub(super) struct Candidates<'a> {
+    pub(super) points: &'a [TreePoint],
+    /// False: too near to what a neighbour has taken.
+    pub(super) are_free: &'a [bool],
+    /// Bits of a cell.
+    pub(super) shift: u32,
+}
+
 /// Takes the point nearest to the centre of its cell; of equals the first.
-pub(super) fn nearest_to_center(level: u8, candidates: &[TreePoint], accepted: &mut [bool]) {
-    let shift = cell_shift(level);
-    let mask = (1u64 << shift) - 1;
+pub(super) fn nearest_to_center(candidates: &Candidates<'_>, accepted: &mut [bool]) {
+    let mask = (1u64 << candidates.shift) - 1;
     // Twice the distance, so that the centre of an even-sized cell is a whole number.
     let off_center =
         |t: &TreePoint| -> u64 { t.0.iter().map(|v| (2 * (u64::from(*v) & mask)).abs_diff(mask).pow(2)).sum() };
-    for_each_cell(shift, candidates, |run, start| {
-        let best = (0..run.len()).min_by_key(|&i| off_center(&run[i])).unwrap_or(0);
-        accepted[start + best] = true;
-    });
+    candidates.take_least(off_center, accepted);
 }
 
 /// Takes a pseudo-random point of each cell: the smallest hash of seed, node and position; of equals the first.
-pub(super) fn random(node: NodeKey, seed: u64, candidates: &[TreePoint], accepted: &mut [bool]) {
+pub(super) fn random(node: NodeKey, seed: u64, candidates: &Candidates<'_>, accepted: &mut [bool]) {
     let salt = mix(seed ^ mix(u64::from(node.level) + 1));
-    for_each_cell(cell_shift(node.level), candidates, |run, start| {
-        let hash = |t: &TreePoint| mix(mix(salt ^ (u64::from(t[0]) << 32 | u64::from(t[1]))) ^ u64::from(t[2]));
-        let best = (0..run.len()).min_by_key(|&i| hash(&run[i])).unwrap_or(0);
-        accepted[start + best] = true;
-    });
+    let hash = |t: &TreePoint| mix(mix(salt ^ (u64::from(t[0]) << 32 | u64::from(t[1]))) ^ u64::from(t[2]));
+    candidates.take_least(hash, accepted);
 }
 
-fn for_each_cell(shift: u32, candidates: &[TreePoint], mut visit: impl FnMut(&[TreePoint], usize)) {
-    let mut start = 0;
-    while start < candidates.len() {
-        let cell = candidates[start].cell(shift);
-        let len = candidates[start..].iter().take_while(|t| t.cell(shift) == cell).count();
-        visit(&candidates[start..start + len], start);
-        start += len;
+impl Candidates<'_> {
+    /// Takes of each cell the free point of least `rank`.
+    fn take_least(&self, rank: impl Fn(&TreePoint) -> u64, accepted: &mut [bool]) {
+        let Self { points, are_free, shift } = self;
+        let mut start = 0;
+        while start < points.len() {
+            let cell = points[start].cell(*shift);
+            let len = points[start..].iter().take_while(|t| t.cell(*shift) == cell).count();
+            let free = (start..start + len).filter(|i| are_free[*i]);
+            if let Some(best) = free.min_by_key(|i| rank(&points[*i])) {
+                accepted[best] = true;
+            }
+            start += len;
+        }
     }
 }
 
@@ -50,19 +58,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_cell_gives_its_most_central_point() {
-        // Level 23: cells are 2 units wide; level 22: 4 units.
-        let candidates = [[0, 0, 0], [1, 1, 1], [3, 0, 0], [4, 0, 0]].map(TreePoint);
+    fn each_cell_gives_its_most_central_point_that_is_free() {
+        // cells of 4 units
+        let points = [[0, 0, 0], [1, 1, 1], [3, 0, 0], [4, 0, 0]].map(TreePoint);
         let mut accepted = [false; 4];
-        nearest_to_center(22, &candidates, &mut accepted);
+        nearest_to_center(&Candidates { points: &points, are_free: &[true; 4], shift: 2 }, &mut accepted);
         assert_eq!(accepted, [false, true, false, true]);
+        accepted = [false; 4];
+        let are_free = [true, false, true, false];
+        nearest_to_center(&Candidates { points: &points, are_free: &are_free, shift: 2 }, &mut accepted);
+        assert_eq!(accepted, [true, false, false, false]);
     }
 
     #[test]
     fn random_takes_one_per_cell_and_follows_the_seed() {
-        let candidates: Vec<TreePoint> = (0..1000).map(|i| TreePoint([i, 0, 0])).collect();
+        let points: Vec<TreePoint> = (0..1000).map(|i| TreePoint([i, 0, 0])).collect();
+        let candidates = Candidates { points: &points, are_free: &[true; 1000], shift: 4 };
         let take = |seed| {
-            let mut accepted = vec![false; candidates.len()];
+            let mut accepted = vec![false; points.len()];
             random(NodeKey { level: 20, x: 0, y: 0, z: 0 }, seed, &candidates, &mut accepted);
             accepted
         };

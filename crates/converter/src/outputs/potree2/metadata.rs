@@ -9,8 +9,9 @@ use serde_json::Map;
 use super::layout::viewable;
 use super::names::Names;
 use super::settings::{Encoding, Potree2Settings};
+use super::spacing::ChosenSpacing;
 use crate::cloud::{Cloud, JobPoint, Ledger};
-use crate::octree::{Octree, SPACING_BITS};
+use crate::octree::Octree;
 use crate::outputs::attributes::Choice;
 use crate::outputs::origin::own_key;
 use crate::report::TreeReport;
@@ -19,6 +20,7 @@ use crate::report::TreeReport;
 pub(super) fn metadata(
     cloud: &Cloud<'_>,
     settings: &Potree2Settings,
+    spacing: &ChosenSpacing,
     choice: &Choice,
     names: &Names,
     ledger: &Ledger,
@@ -57,7 +59,7 @@ pub(super) fn metadata(
     own.insert("sampling".into(), settings.sampling.name().into());
     own.insert("leafCapacity".into(), settings.leaf_capacity.into());
     let box_of_root = Aabb { min: offset, max: offset.map(|v| v + side) };
-    let mut metadata = Metadata::new(lattice, box_of_root, side / f64::from(1 << SPACING_BITS), attributes);
+    let mut metadata = Metadata::new(lattice, box_of_root, spacing.root, attributes);
     metadata.name = cloud.plan.cloud_name();
     metadata.points = ledger.points();
     metadata.projection.clone_from(&facts.crs.projection);

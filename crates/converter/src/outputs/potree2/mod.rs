@@ -7,6 +7,7 @@ mod names;
 mod notes;
 mod payload;
 mod settings;
+mod spacing;
 
 use pointmill_format::DatasetKind;
 use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
@@ -18,6 +19,7 @@ pub use settings::{Encoding, Potree2Settings};
 
 use self::layout::viewable;
 use self::names::Names;
+use self::spacing::ChosenSpacing;
 use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
@@ -32,6 +34,13 @@ use crate::warning::Warning;
 
 /// Elements of an attribute that readers of the format accept.
 const MAX_ELEMENTS: usize = 16;
+
+/// Bytes of the payloads of a subtree that one thread builds. Part of the result, and the same whatever else is written in
+/// the same run.
+const UNIT_BYTES: u64 = 10_000_000;
+
+/// Points of such a subtree: larger ones leave the caches and the threads uneven.
+const UNIT_POINTS: std::ops::RangeInclusive<u64> = 20_000..=300_000;
 
 /// Bytes of a hierarchy record.
 const NODE_BYTES: u64 = 22;
@@ -52,6 +61,9 @@ impl Output for Potree2Settings {
         if self.leaf_capacity == 0 {
             return refuse(Setting::LeafCapacity, PlanFault::Zero);
         }
+        if self.spacing.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
+            return refuse(Setting::Spacing, PlanFault::NotPositive);
+        }
         match self.encoding {
             Encoding::Brotli { quality } if quality > 11 => {
                 refuse(Setting::BrotliQuality, PlanFault::NotOneOf("0 to 11"))
@@ -68,6 +80,10 @@ impl Output for Potree2Settings {
         u64::from(self.leaf_capacity)
     }
 
+    fn least_bytes(&self) -> u64 {
+        UNIT_BYTES
+    }
+
     fn disk_size(&self, _: &Plan, _: &Schema, kept: u64) -> DiskSize {
         let nodes = 3000 / u64::from(self.leaf_capacity).max(1) + 1;
         DiskSize { per_point: POSITION_BYTES as u64 + kept, per_1000_points: nodes * NODE_BYTES }
@@ -77,6 +93,9 @@ impl Output for Potree2Settings {
         settings.insert("sampling".into(), self.sampling.name().into());
         if let Sampling::Random { seed } = self.sampling {
             settings.insert("seed".into(), seed.into());
+        }
+        if let Some(spacing) = self.spacing {
+            settings.insert("spacing".into(), spacing.into());
         }
         let encoding = match self.encoding {
             Encoding::Default => "default",
@@ -103,14 +122,20 @@ impl Output for Potree2Settings {
         let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
         let payloads =
             Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding, events: rt.events() };
-        let settings = OctreeSettings { sampling: self.sampling, leaf_capacity: self.leaf_capacity };
+        let spacing = ChosenSpacing::of(self, cloud)?;
+        let settings = OctreeSettings {
+            sampling: self.sampling,
+            spacing: spacing.spacing,
+            leaf_capacity: self.leaf_capacity,
+            unit_points: self.unit_points(payloads.layout.stride),
+        };
         let tree = octree::build(cloud, rt, settings, &payloads)?;
         payloads.file.sync("syncing the payloads")?;
 
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
         let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
         let names = Names::of(&notes::attributes(schema, &choice.kept));
-        let metadata = metadata::metadata(cloud, self, &choice, &names, &tree.ledger, &hierarchy);
+        let metadata = metadata::metadata(cloud, self, &spacing, &choice, &names, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
         to.write("metadata.json", json.as_bytes())?;
@@ -133,8 +158,17 @@ impl Output for Potree2Settings {
             bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
             checksum: tree.ledger.unaltered().to_string(),
             tree: metadata::tree_report(&tree),
+            details: Map::from_iter([("spacing".to_owned(), spacing.describe())]),
             ..OutputReport::default()
         })
+    }
+}
+
+impl Potree2Settings {
+    /// Points of a subtree that one thread builds, for records of `stride` bytes.
+    fn unit_points(&self, stride: usize) -> u64 {
+        let (least, most) = UNIT_POINTS.into_inner();
+        (UNIT_BYTES / stride as u64).clamp(least, most).max(self.leaf_capacity.into())
     }
 }
 

@@ -154,8 +154,8 @@ impl NodeEncoder for PayloadEncoder<'_> {
         Ok(())
     }
 
-    fn is_row_by_row(&self) -> bool {
-        self.encoding == Encoding::Default
+    fn row_bytes(&self) -> Option<u64> {
+        (self.encoding == Encoding::Default).then_some(self.layout.stride as u64)
     }
 
     fn bytes_per_point(&self) -> u64 {

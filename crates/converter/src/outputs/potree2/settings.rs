@@ -7,6 +7,8 @@ use crate::octree::Sampling;
 pub struct Potree2Settings {
     /// How inner nodes choose their points.
     pub sampling: Sampling,
+    /// Distance between points in the root, world units; half of it on each level below. Without one it is chosen.
+    pub spacing: Option<f64>,
     /// How payloads are stored.
     pub encoding: Encoding,
     /// A node with more points than this is divided, unless all of them share one position.
@@ -15,7 +17,7 @@ pub struct Potree2Settings {
 
 impl Default for Potree2Settings {
     fn default() -> Self {
-        Self { sampling: Sampling::Poisson, encoding: Encoding::Default, leaf_capacity: 10_000 }
+        Self { sampling: Sampling::Poisson, spacing: None, encoding: Encoding::Default, leaf_capacity: 10_000 }
     }
 }
 

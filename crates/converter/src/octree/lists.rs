@@ -1,0 +1,194 @@
+//! Nodes whose children are lists: their records may be on the disk, and pass by in pieces.
+
+use std::sync::{Arc, PoisonError};
+
+use pointmill_format::NodeKey;
+
+use super::borders::UnitBorders;
+use super::finished::Finished;
+use super::list::{List, Lists, Writer};
+use super::raise::{Nodes, Pairs, Pending, Points};
+use super::sample::Sampler;
+use super::sink::NodeEncoder;
+use crate::cloud::{RecordFrame, TreePoint};
+use crate::error::ConvertError;
+use crate::runtime::{Consumer, Pool, Reservation};
+
+/// Bytes of candidates that are looked at together.
+const PART_BYTES: usize = 2 << 20;
+
+/// Records of a node that are encoded in memory; those of larger ones pass by.
+const LARGE_BYTES: u64 = 4 << 20;
+
+/// Memory that a thread uses again and again.
+pub(super) struct ListMemory {
+    records: Vec<u8>,
+    part: Part,
+    /// What the sampler has.
+    sampled: Reservation,
+}
+
+impl ListMemory {
+    pub(super) fn new(sampled: Reservation) -> Self {
+        Self { records: Vec::new(), part: Part::default(), sampled }
+    }
+}
+
+/// What a sampler has of a node is kept for the next up to this size, bytes.
+const USUAL_SAMPLE_BYTES: u64 = 1 << 20;
+
+/// Nodes while they are made from lists.
+pub(super) struct ListNodes<'n, 'a, E> {
+    pub(super) frame: &'n RecordFrame,
+    pub(super) pool: &'n Arc<Pool>,
+    pub(super) lists: &'n Lists,
+    pub(super) sampler: &'n mut Sampler,
+    pub(super) encoder: &'n mut E,
+    pub(super) memory: &'n mut ListMemory,
+    pub(super) borders: &'n mut UnitBorders<'a>,
+    pub(super) finished: &'n mut Finished,
+}
+
+/// Candidates in Morton order, and their records.
+#[derive(Default)]
+struct Part {
+    records: Vec<u8>,
+    trees: Vec<TreePoint>,
+}
+
+impl<E: NodeEncoder> ListNodes<'_, '_, E> {
+    /// Samples one child; returns what it keeps.
+    fn sample_child(
+        &mut self,
+        level: u8,
+        mut list: List,
+        taken: &mut Writer,
+        is_short: bool,
+    ) -> Result<List, ConvertError> {
+        if list.is_one_place {
+            // of points that share a place a sample takes the first, if any
+            let first = self.lists.first(&list)?;
+            self.sampler.offer(std::iter::once(self.frame.tree(&first)));
+            if self.sampler.choose().first() == Some(&true) {
+                taken.push(&first, self.lists)?;
+                self.lists.drop_first(&mut list);
+            }
+            return Ok(list);
+        }
+        let mut rest = Writer::new(list.count());
+        let mut part = std::mem::take(&mut self.memory.part);
+        let (mut at, mut buffer) = (0, Vec::new());
+        while let Some(piece) = self.lists.piece(&list, at, &mut buffer)? {
+            at += (piece.len() / self.lists.stride) as u64;
+            part.records.extend_from_slice(piece);
+            part.trees.extend(piece.chunks_exact(self.lists.stride).map(|record| self.frame.tree(record)));
+            if part.records.len() >= PART_BYTES {
+                let cut = part.trees.windows(2).rposition(|w| self.sampler.may_be_cut(level, w[0], w[1]));
+                self.choose(&mut part, cut.map_or(0, |i| i + 1), taken, &mut rest)?;
+                self.account(is_short)?;
+            }
+        }
+        let all = part.trees.len();
+        self.choose(&mut part, all, taken, &mut rest)?;
+        self.account(is_short)?;
+        self.memory.part = part;
+        rest.finish(self.lists)
+    }
+
+    /// Accounts for what the sampler has, if that was not done beforehand.
+    fn account(&mut self, is_short: bool) -> Result<(), ConvertError> {
+        if is_short { self.memory.sampled.grow_to(self.sampler.bytes()) } else { Ok(()) }
+    }
+
+    /// Decides about the first `count` candidates of a part.
+    fn choose(
+        &mut self,
+        part: &mut Part,
+        count: usize,
+        taken: &mut Writer,
+        rest: &mut Writer,
+    ) -> Result<(), ConvertError> {
+        self.sampler.offer(part.trees[..count].iter().copied());
+        let stride = self.lists.stride;
+        for (record, is_taken) in part.records.chunks_exact(stride).zip(self.sampler.choose()) {
+            let writer = if *is_taken { &mut *taken } else { &mut *rest };
+            writer.push(record, self.lists)?;
+        }
+        part.records.drain(..count * stride);
+        part.trees.drain(..count);
+        Ok(())
+    }
+}
+
+impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
+    fn sample(&mut self, key: NodeKey, children: &mut [Pending<List>]) -> Result<List, ConvertError> {
+        let candidates = children.iter().map(|c| c.points.count()).sum();
+        let mut side_by_side = Some(self.lists.large.read().unwrap_or_else(PoisonError::into_inner));
+        let expected = Sampler::expected_bytes(candidates);
+        let room = self.pool.try_take(Consumer::Work, expected).then(|| {
+            Reservation::of(self.pool, Consumer::Work, expected) // given back when the node has its sample
+        });
+        // where memory is short, one node of many points at a time
+        let is_short = expected > USUAL_SAMPLE_BYTES && room.is_none();
+        let alone = is_short.then(|| {
+            side_by_side.take();
+            self.lists.large.write().unwrap_or_else(PoisonError::into_inner)
+        });
+        self.sampler.begin(key, self.borders.around(key)?);
+        self.sampler.expect(candidates);
+        let mut taken = Writer::new(candidates);
+        for child in children {
+            let list = std::mem::replace(&mut child.points, List::empty());
+            child.points = self.sample_child(key.level, list, &mut taken, alone.is_some())?;
+        }
+        self.borders.note(key, self.sampler.border());
+        if self.sampler.bytes() > USUAL_SAMPLE_BYTES {
+            self.sampler.release();
+        }
+        self.memory.sampled.resize(0)?;
+        taken.finish(self.lists)
+    }
+
+    fn take_middle(&mut self, from: &mut List) -> Result<List, ConvertError> {
+        self.lists.take_one(from, from.count() / 2)
+    }
+
+    fn excludes(&mut self, level: u8, points: &List, enough: usize) -> Result<bool, ConvertError> {
+        let mut pairs = Pairs::new(level);
+        self.lists.each(points, |records| {
+            for record in records.chunks_exact(self.lists.stride) {
+                pairs.add(self.sampler, self.frame.tree(record));
+                if pairs.count >= enough {
+                    return Ok(false);
+                }
+            }
+            Ok(true)
+        })?;
+        Ok(pairs.count >= enough)
+    }
+
+    fn write(&mut self, key: NodeKey, points: List) -> Result<(), ConvertError> {
+        let (count, stride) = (points.count(), self.lists.stride);
+        let is_large = count * stride as u64 > LARGE_BYTES;
+        if is_large && self.encoder.row_bytes().is_some() {
+            self.finished.add_large(key, points);
+            return Ok(());
+        }
+        let mut room = Reservation::new(self.pool, Consumer::Work);
+        if is_large {
+            room.resize(count * (stride as u64 + self.encoder.bytes_per_point()))?;
+        }
+        let mut records = std::mem::take(&mut self.memory.records);
+        records.clear();
+        records.reserve_exact(count as usize * stride);
+        self.lists.each(&points, |piece| {
+            records.extend_from_slice(piece);
+            Ok(true)
+        })?;
+        self.finished.encode(self.encoder, key, records.chunks_exact(stride))?;
+        if !is_large {
+            self.memory.records = records;
+        }
+        Ok(())
+    }
+}

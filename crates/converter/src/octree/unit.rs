@@ -1,0 +1,171 @@
+//! One unit: a subtree from its chunks, or a node from its children.
+
+use pointmill_format::NodeKey;
+
+use super::borders::{Borders, UnitBorders};
+use super::chunk::{ChunkMemory, ChunkPlan};
+use super::divide::Chunk;
+use super::finished::{Finished, Piece};
+use super::list::{List, Lists};
+use super::lists::{ListMemory, ListNodes};
+use super::place;
+use super::raise::{Nodes, Pending};
+use super::sample::Sampler;
+use super::sink::NodeEncoder;
+use crate::cloud::Ledger;
+use crate::error::ConvertError;
+use crate::runtime::{Consumer, Reservation, Runtime, os_hints};
+
+/// A unit, built.
+pub(super) struct BuiltUnit {
+    /// Nodes that nothing changes any more.
+    pub(super) pieces: Vec<Piece>,
+    /// What the nodes above may still change; none of the root.
+    pub(super) root: Option<Pending<List>>,
+    pub(super) ledger: Ledger,
+    /// Leaves above the capacity, because their points share one place.
+    pub(super) overfull_leaves: u64,
+}
+
+/// What threads share that build units.
+pub(super) struct Shared<'a> {
+    pub(super) plan: ChunkPlan<'a>,
+    pub(super) rt: &'a Runtime<'a>,
+    pub(super) lists: Lists,
+    pub(super) borders: Borders,
+    /// Chunks above this size are of one place.
+    pub(super) chunk_points: u64,
+    /// Memory of a chunk, bytes.
+    pub(super) chunk_bytes: u64,
+}
+
+/// One thread's means to build units.
+pub(super) struct UnitBuilder<'a, E> {
+    shared: &'a Shared<'a>,
+    pub(super) encoder: E,
+    sampler: Sampler,
+    chunk: ChunkMemory,
+    lists: ListMemory,
+}
+
+impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
+    pub(super) fn new(shared: &'a Shared<'a>, sampler: Sampler, encoder: E) -> Self {
+        let lists = ListMemory::new(Reservation::new(&shared.rt.memory, Consumer::Work));
+        Self { shared, encoder, sampler, chunk: ChunkMemory::default(), lists }
+    }
+
+    /// Builds a subtree in `buffer`, a buffer to use again. `wait` is called before the first sample is taken: it returns
+    /// when the units before are done, false if this one is not needed any more.
+    pub(super) fn subtree(
+        &mut self,
+        key: NodeKey,
+        chunks: &[Chunk],
+        buffer: Vec<u8>,
+        wait: impl FnOnce() -> bool,
+    ) -> Result<Option<BuiltUnit>, ConvertError> {
+        let mut borders = UnitBorders::new(&self.shared.borders, key);
+        let (mut finished, mut ledger, mut overfull_leaves) = (Finished::new(buffer), Ledger::default(), 0);
+        let points = chunks.iter().map(|c| c.points).sum::<u64>().min(self.shared.plan.unit_points);
+        os_hints::reserve(finished.bytes(), points as usize * self.shared.plan.cloud.frame.stride);
+        let mut stack = Vec::new();
+        let mut wait = Some(wait);
+        for (i, chunk) in chunks.iter().enumerate() {
+            let is_large = chunk.points > self.shared.chunk_points;
+            if is_large {
+                self.chunk = ChunkMemory::default();
+            } else {
+                self.chunk.load(&self.shared.plan, chunk, &mut ledger)?;
+            }
+            if wait.take().is_some_and(|wait| !wait()) {
+                return Ok(None);
+            }
+            let (root, overfull) = if is_large {
+                place::build(&self.shared.plan, chunk, self.shared.rt, self.shared.chunk_bytes, &mut ledger)?
+            } else {
+                self.chunk.build(
+                    &self.shared.plan,
+                    chunk.key,
+                    &mut self.sampler,
+                    &mut self.encoder,
+                    &mut borders,
+                    &mut finished,
+                )?
+            };
+            overfull_leaves += overfull;
+            stack.push(root);
+            let following = chunks.get(i + 1).map(|c| c.key);
+            climb(&mut stack, key, following, &mut self.nodes(&mut borders, &mut finished))?;
+        }
+        match (stack.pop(), stack.is_empty()) {
+            (Some(root), true) => self.finish(root, borders, finished, ledger, overfull_leaves).map(Some),
+            _ => Err(ConvertError::Internal("a subtree was not finished".into())),
+        }
+    }
+
+    /// Builds a node from its children.
+    pub(super) fn above(&mut self, key: NodeKey, children: Vec<Pending<List>>) -> Result<BuiltUnit, ConvertError> {
+        let mut borders = UnitBorders::new(&self.shared.borders, key);
+        let mut finished = Finished::default();
+        let root = Pending::above(key, children, &mut self.nodes(&mut borders, &mut finished))?;
+        self.finish(root, borders, finished, Ledger::default(), 0)
+    }
+
+    fn finish(
+        &mut self,
+        mut root: Pending<List>,
+        mut borders: UnitBorders<'a>,
+        mut finished: Finished,
+        mut ledger: Ledger,
+        overfull_leaves: u64,
+    ) -> Result<BuiltUnit, ConvertError> {
+        let root = if root.key == NodeKey::ROOT {
+            let mut nodes = self.nodes(&mut borders, &mut finished);
+            root.write_children(&mut nodes)?;
+            nodes.write(root.key, root.points)?;
+            None
+        } else {
+            admit(&self.shared.lists, &mut root)?;
+            Some(root)
+        };
+        borders.publish()?;
+        ledger.written.merge(&finished.written);
+        Ok(BuiltUnit { pieces: finished.into_pieces(), root, ledger, overfull_leaves })
+    }
+
+    fn nodes<'n>(&'n mut self, borders: &'n mut UnitBorders<'a>, finished: &'n mut Finished) -> ListNodes<'n, 'a, E> {
+        ListNodes {
+            frame: &self.shared.plan.cloud.frame,
+            pool: &self.shared.rt.memory,
+            lists: &self.shared.lists,
+            sampler: &mut self.sampler,
+            encoder: &mut self.encoder,
+            memory: &mut self.lists,
+            borders,
+            finished,
+        }
+    }
+}
+
+/// Accounts for the lists of a unit.
+fn admit(lists: &Lists, node: &mut Pending<List>) -> Result<(), ConvertError> {
+    lists.admit(&mut node.points)?;
+    node.children.iter_mut().try_for_each(|child| admit(lists, child))
+}
+
+/// Builds every node up to `top` all of whose chunks are in; `following`: the chunk that comes next.
+fn climb(
+    stack: &mut Vec<Pending<List>>,
+    top: NodeKey,
+    following: Option<NodeKey>,
+    nodes: &mut impl Nodes<List>,
+) -> Result<(), ConvertError> {
+    while let Some(parent) = stack.last().filter(|last| last.key != top).and_then(|last| last.key.parent()) {
+        if following.is_some_and(|f| f.ancestor(parent.level) == Some(parent)) {
+            break;
+        }
+        let first = stack.iter().rposition(|n| n.key.parent() != Some(parent)).map_or(0, |i| i + 1);
+        let children = stack.split_off(first);
+        stack.push(Pending::above(parent, children, nodes)?);
+    }
+    Ok(())
+}
