@@ -19,6 +19,21 @@ fn octree<T: Element>(dir: &Dir, name: &str) -> Vec<(f64, T)> {
     sorted(all)
 }
 
+/// The same of an attribute of several elements.
+pub(crate) fn octree_chunks<T: Element>(dir: &Dir, name: &str) -> Vec<(f64, Vec<T>)> {
+    let dataset = Dataset::open(dir.path("out")).unwrap();
+    let mut points = NodePoints::default();
+    let mut all = Vec::new();
+    for node in dataset.read_hierarchy().unwrap() {
+        dataset.read_points(&node, &mut points).unwrap();
+        let values = points.column::<T>(name).unwrap();
+        let of_point =
+            |i: usize| values[i * values.len() / points.len()..(i + 1) * values.len() / points.len()].to_vec();
+        all.extend((0..points.len()).map(|i| (points.world(i).unwrap()[0], of_point(i))));
+    }
+    sorted(all)
+}
+
 /// The same of a binary tree.
 fn bintree<T: Element>(dir: &Dir, name: &str) -> Vec<(f64, T)> {
     let tree = Bintree::open(dir.path("out")).unwrap();

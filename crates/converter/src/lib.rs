@@ -55,7 +55,7 @@ pub use estimate::estimate;
 pub use octree::Sampling;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
-pub use outputs::potree2::{Encoding, Potree2Settings};
+pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
 pub use outputs::{StagedFiles, Target, resolve_path};
 pub use plan::{
     AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault, RgbDepth,

@@ -63,6 +63,8 @@ pub(crate) struct Rules {
     /// The job lattice's coordinate of the dataset's integer 0.
     pub(crate) shift: [i64; 3],
     pub(crate) rgb_depth: RgbDepth,
+    /// Channels of 1 to 127 are stored as 0, those of 128 to 255 as 256.
+    pub(crate) rounds_dark: bool,
     /// World coordinates, closed.
     pub(crate) bounds: Option<Aabb>,
     pub(crate) classes: Option<Vec<i64>>,
@@ -107,6 +109,7 @@ impl Rules {
                 Some("16") => RgbDepth::Sixteen,
                 _ => RgbDepth::Auto,
             },
+            rounds_dark: own["darkColours"] == "round",
             bounds,
             classes,
             every: own["filter"]["every"].as_u64().unwrap_or(1).max(1),

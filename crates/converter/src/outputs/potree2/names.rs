@@ -1,5 +1,7 @@
 //! Names that viewers stumble over, and those that the attributes get instead (docs/formats/potree2.md, "Names").
 
+use std::collections::{HashMap, HashSet};
+
 use pointmill_format::Attribute;
 
 use crate::warning::{NameFault, RenamedAttribute};
@@ -21,9 +23,12 @@ const JAVASCRIPT: [&str; 12] = [
 ];
 
 /// What viewers keep vertex data of their own under, or decode as positions or colours.
-const VIEWERS: [&str; 18] = [
+const VIEWERS: [&str; 21] = [
     "COLOR_PACKED",
     "INDICES",
+    "NORMAL",
+    "NORMAL_OCT16",
+    "NORMAL_SPHEREMAPPED",
     "POSITION_CARTESIAN",
     "RGBA",
     "aExtra",
@@ -45,7 +50,7 @@ const VIEWERS: [&str; 18] = [
 /// What BA_PointCloud decodes as positions or colours, in letters of any size.
 const ANY_SIZE: [&str; 5] = ["color_packed", "position", "position_cartesian", "rgb", "rgba"];
 
-/// iTowns makes shader definitions of names that begin with this.
+/// iTowns makes shader definitions of names that begin with this, whatever follows.
 const NORMAL: &str = "NORMAL";
 
 /// Colourings of Potree's shader, which knows them by letters and digits alone.
@@ -79,24 +84,32 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// `attributes`: in order, of different names. An underscore behind a name makes it another, or several do.
+    /// `attributes`: in order, of different names. An underscore behind a name makes it another, and a number if that is
+    /// taken.
     pub(super) fn of(attributes: &[&Attribute]) -> Self {
         let mut names = Self::default();
+        let mut taken: HashSet<String> = attributes.iter().map(|a| a.name.clone()).collect();
+        // where the numbers of a name go on: there may be very many names
+        let mut tried: HashMap<String, u64> = HashMap::new();
         for attribute in attributes {
             let name = &attribute.name;
             let Some(why) = fault(name) else {
                 names.stored.push(name.clone());
                 continue;
             };
-            let is_taken = |new: &String| {
-                attributes.iter().any(|a| a.name == *new) || names.renamed.iter().any(|r| r.stored_as == *new)
+            let stem = if why == NameFault::Text { shown(name) } else { base(name) };
+            let tried = tried.entry(stem.clone()).or_default();
+            let stored_as = loop {
+                *tried += 1;
+                let new = match *tried {
+                    1 if why == NameFault::Text => stem.clone(),
+                    1 => format!("{stem}_"),
+                    n => format!("{stem}_{n}"),
+                };
+                if fault(&new).is_none() && taken.insert(new.clone()) {
+                    break new;
+                }
             };
-            let fits = |new: &String| fault(new).is_none() && !is_taken(new);
-            let first = if why == NameFault::Text { shown(name) } else { format!("{}_", base(name)) };
-            let mut stored_as = first;
-            while !fits(&stored_as) {
-                stored_as.push('_');
-            }
             names.stored.push(stored_as.clone());
             names.renamed.push(RenamedAttribute::new(name.clone(), stored_as, why));
         }
@@ -113,7 +126,7 @@ fn fault(name: &str) -> Option<NameFault> {
         Some(NameFault::Text)
     } else if VIEWERS.contains(&name)
         || ANY_SIZE.contains(&&*name.to_ascii_lowercase())
-        || name.strip_prefix(NORMAL).is_some_and(|rest| !rest.ends_with('_') || rest != letters(rest))
+        || name.starts_with(NORMAL) && name != letters(name)
     {
         Some(NameFault::Viewers)
     } else {
@@ -182,14 +195,14 @@ mod tests {
         let expected =
             ["constructor_", "__proto___", "color_", "Position_", "RGB_", "gps time_", "return_number_", "height_"];
         assert_eq!(stored(&names), expected);
-        assert_eq!(stored(&["NORMAL", "NORMAL x", "NORMALS"]), ["NORMAL_", "NORMAL_x_", "NORMALS_"]);
+        assert_eq!(stored(&["NORMAL", "NORMAL x", "NORMALS"]), ["NORMAL_", "NORMAL_x_", "NORMALS"]);
     }
 
     #[test]
     fn names_stay_apart() {
-        assert_eq!(stored(&["color", "color_", "color__"]), ["color___", "color_", "color__"]);
-        assert_eq!(stored(&["a<b", "a>b", "a_b", ""]), ["a_b_", "a_b__", "a_b", "unnamed"]);
-        assert_eq!(stored(&["unnamed", "", " x\u{7}  y "]), ["unnamed", "unnamed_", "x_ y"]);
-        assert_eq!(stored(&[" constructor"]), ["constructor_"]);
+        assert_eq!(stored(&["color", "color_", "color__"]), ["color_2", "color_", "color__"]);
+        assert_eq!(stored(&["a<b", "a>b", "a_b", ""]), ["a_b_2", "a_b_3", "a_b", "unnamed"]);
+        assert_eq!(stored(&["unnamed", "", " x\u{7}  y "]), ["unnamed", "unnamed_2", "x_ y"]);
+        assert_eq!(stored(&[" constructor", "constructor"]), ["constructor_2", "constructor_3"]);
     }
 }
