@@ -7,9 +7,6 @@ use std::cmp::Ordering;
 
 use pointmill_format::{Aabb, Lattice, NodeKey};
 
-/// Cells a side of an inner node, at most one point each under grid and random sampling.
-pub(crate) const CELLS: f64 = 128.0;
-
 /// The geometry in the metadata.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Geometry {
@@ -29,16 +26,25 @@ impl Geometry {
         self.lattice.scale.iter().copied().fold(0.0, f64::max)
     }
 
-    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube: nothing where these are
-    /// whole steps, else less than a unit on each axis.
+    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube: nothing where steps are
+    /// whole numbers of these, else less than a unit on each axis.
     pub(crate) fn sampling_slack(&self) -> f64 {
-        let [x, y, z] = self.lattice.scale;
-        if x == y && y == z { 0.0 } else { 2.0 * (self.cube.max[0] - self.cube.min[0]) / 31f64.exp2() }
+        let side = self.cube.max[0] - self.cube.min[0];
+        let is_whole = |scale: &f64| {
+            let steps = (side / scale).round();
+            steps >= 1.0 && steps.log2().fract() == 0.0 && (side / scale - steps).abs() < 1e-6 * steps
+        };
+        if self.lattice.scale.iter().all(is_whole) { 0.0 } else { 2.0 * side / 31f64.exp2() }
     }
 
     /// Spacing of a level, world units.
     pub(crate) fn spacing_at(&self, level: u8) -> f64 {
         self.spacing / f64::from(level).exp2()
+    }
+
+    /// Cells a side of an inner node, at most one point each under grid and random sampling: as wide as the spacing.
+    fn cells(&self) -> f64 {
+        ((self.cube.max[0] - self.cube.min[0]) / self.spacing).round().max(1.0)
     }
 
     /// False for a spacing that no writer would choose (usual: side / 128): searches by cells of that size would look
@@ -106,12 +112,12 @@ impl Geometry {
         })
     }
 
-    /// The cell of the node's 128³ grid that a stored position falls into, or `None` if it lies so close to the
+    /// The cell of the node's grid that a stored position falls into, or `None` if it lies so close to the
     /// border of a cell that rounding decides (within one lattice step, unless the cells are whole lattice steps).
-    pub(crate) fn sample_cell(&self, level: u8, node: &Aabb, stored: [i32; 3]) -> Option<u32> {
-        let mut cell = 0;
+    pub(crate) fn sample_cell(&self, level: u8, node: &Aabb, stored: [i32; 3]) -> Option<u64> {
+        let (mut cell, cells) = (0, self.cells());
         for (axis, stored) in stored.into_iter().enumerate() {
-            let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / CELLS;
+            let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / cells;
             let in_steps = side / self.lattice.scale[axis];
             let origin = (node.min[axis] - self.lattice.offset[axis]) / self.lattice.scale[axis];
             let whole = (in_steps - in_steps.round()).abs() < 1e-6 && (origin - origin.round()).abs() < 1e-3;
@@ -124,7 +130,7 @@ impl Geometry {
                 }
                 u
             };
-            cell = cell << 8 | (u.floor().clamp(0.0, CELLS - 1.0) as u32);
+            cell = cell << 20 | (u.floor().clamp(0.0, cells - 1.0) as u64);
         }
         Some(cell)
     }
@@ -194,6 +200,8 @@ mod tests {
     fn sample_cells_of_whole_steps_are_exact() {
         let geometry = geometry(); // 8 steps a cell at the root
         let node = geometry.node_box(NodeKey::ROOT);
-        assert_eq!(geometry.sample_cell(0, &node, [8, 7, 1023]), Some(1 << 16 | 127));
+        assert_eq!(geometry.sample_cell(0, &node, [8, 7, 1023]), Some(1 << 40 | 127));
+        let coarse = Geometry { spacing: 0.016, ..geometry };
+        assert_eq!(coarse.sample_cell(0, &node, [16, 15, 1023]), Some(1 << 40 | 63));
     }
 }
