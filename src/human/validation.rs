@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pointmill_validate::{Accuracy, DatasetKind, LeafQuality, LevelQuality, Outcome};
+use pointmill_validate::{Accuracy, DatasetKind, FirstView, LeafQuality, LevelQuality, Outcome};
 
 use super::quantities::{at_most, count, plural, three_digits};
 use crate::printable::printable;
@@ -42,6 +42,7 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
         }
     }
     out.push_str(&accuracy(&outcome.accuracy));
+    out.push_str(&outcome.first_view.as_ref().map(first_view).unwrap_or_default());
     out.push_str(&quality(&outcome.quality, verbose));
     out.push_str(&outcome.leaves.as_ref().map(leaves).unwrap_or_default());
     out + &problems(outcome)
@@ -64,6 +65,31 @@ fn accuracy(accuracy: &Accuracy) -> String {
     out
 }
 
+/// How much there is to load at first, and what would be ideal.
+fn first_view(view: &FirstView) -> String {
+    let cube =
+        view.cube_over_extent.map_or_else(String::new, |ratio| format!("cube {ratio:.2} × the longest extent, "));
+    format!(
+        "  first view: {} in the root (good: 10,000 to 25,000), {cube}first hierarchy chunk {}; {} after {}: {}, {}\n",
+        plural(view.root_points, "point"),
+        plural(view.first_chunk_bytes, "byte"),
+        plural(view.points, "point"),
+        plural(view.requests, "request"),
+        plural(view.nodes, "node"),
+        plural(view.bytes, "byte"),
+    )
+}
+
+/// Per cent, rounded so that only none is 0 and only all is 100; `–` of nothing.
+fn share(part: u64, of: u64) -> String {
+    match (part, of) {
+        (_, 0) => "–".to_owned(),
+        (0, _) => "0 %".to_owned(),
+        (part, of) if part == of => "100 %".to_owned(),
+        (part, of) => format!("{:.2} %", (100.0 * part as f64 / of as f64).clamp(0.01, 99.99)),
+    }
+}
+
 /// Distances relative to the spacing of the level; `–` where there is nothing to measure.
 fn quality(levels: &[LevelQuality], verbose: bool) -> String {
     let mut out = String::new();
@@ -72,29 +98,33 @@ fn quality(levels: &[LevelQuality], verbose: bool) -> String {
     }
     let _ = writeln!(
         out,
-        "  level   nodes        points     spacing  nearest: min   mean   largest hole   seam: min   close"
+        "  level   nodes        points     spacing  nearest: min  median  close: inside   across  within: 1      1.5   \
+         largest hole"
     );
     let ratio = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
     for l in levels {
         let _ = writeln!(
             out,
-            "  {:>5} {:>7} {:>13} {:>11.5} {:>13} {:>6} {:>14} {:>11} {:>7}",
+            "  {:>5} {:>7} {:>13} {:>11.5} {:>13} {:>7} {:>14} {:>8} {:>10} {:>8} {:>14}",
             l.level,
             count(l.nodes),
             count(l.points),
             l.spacing,
             ratio(l.nearest_min),
-            ratio(l.nearest_mean),
+            ratio(l.nearest_median),
+            share(l.close_inside, l.sampled),
+            share(l.close_across, l.sampled),
+            share(l.offered_within_1, l.offered),
+            share(l.below_within_1_5, l.below),
             if l.largest_hole.is_some_and(|hole| hole >= 4.0) { "≥ 4".to_owned() } else { ratio(l.largest_hole) },
-            ratio(l.seam_min),
-            count(l.seam_close)
         );
     }
     if verbose {
         out.push_str(
             "  Distances are relative to the spacing of the level. Nearest: from a point of an inner node to the next of that\n  \
-             node. Largest hole: from a point of a deeper level to the next one drawn. Seam: between inner nodes; close:\n  \
-             points that have one of another node nearer than the spacing.\n",
+             node, median: to the next of the level. Close: points of inner nodes with one of the same node, of another\n  \
+             node, nearer than 0.999 spacings. Within 1: points of the next level with one drawn so near; within 1.5: points\n  \
+             of all deeper levels; largest hole: the distance of the one that is farthest from any drawn.\n",
         );
     }
     out

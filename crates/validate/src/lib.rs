@@ -45,7 +45,7 @@ pub use accuracy::{Accuracy, Integers, Merged, PositionErrors};
 pub use check::Check;
 pub use finding::{CheckResult, Finding, Severity};
 pub use options::{Options, Progress, ProgressFn};
-pub use outcome::{AgainstSummary, LeafQuality, LevelQuality, Outcome};
+pub use outcome::{AgainstSummary, FirstView, LeafQuality, LevelQuality, Outcome};
 pub use place::{BinaryNode, Place};
 pub use pointmill_format::{DatasetKind, Located, locate};
 pub use report::{Several, several};

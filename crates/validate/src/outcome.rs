@@ -27,6 +27,8 @@ pub struct Outcome {
     pub problems: Vec<Finding>,
     /// One entry per level of an octree; empty for other formats.
     pub quality: Vec<LevelQuality>,
+    /// Of an octree: what a viewer loads at first.
+    pub first_view: Option<FirstView>,
     /// Of a binary tree whose index could be read.
     pub leaves: Option<LeafQuality>,
     /// The comparison with the sources, if there was one.
@@ -49,6 +51,7 @@ impl Outcome {
             checks,
             problems,
             quality: Vec::new(),
+            first_view: None,
             leaves: None,
             against: None,
             accuracy: Accuracy::default(),
@@ -91,16 +94,38 @@ pub struct LevelQuality {
     pub points: u64,
     /// Spacing of the level, world units.
     pub spacing: f64,
+    /// Points of inner nodes.
+    pub sampled: u64,
     /// Smallest distance from a point of an inner node to another point of that node, over the spacing.
     pub nearest_min: Option<f64>,
     /// Mean of the distance from each point of an inner node to the nearest other point of that node, over the
     /// spacing; points without one within 8 spacings are not counted (`isolated`).
     pub nearest_mean: Option<f64>,
+    /// Median of the distance from each point of an inner node to the nearest other point of any inner node of the level,
+    /// over the spacing, to 0.001; of points that have one within 8 spacings.
+    pub nearest_median: Option<f64>,
     /// Points of inner nodes that have no other point of their node within 8 spacings.
     pub isolated: u64,
+    /// Points of inner nodes that have another one of an inner node of the level nearer than 0.999 spacings.
+    pub close: u64,
+    /// Points that have one of the same node so near.
+    pub close_inside: u64,
+    /// Points that have one of another node so near.
+    pub close_across: u64,
     /// The largest distance from any point of deeper levels to the nearest point drawn at this level and above, over
     /// the spacing; 4 stands for 4 and more.
     pub largest_hole: Option<f64>,
+    /// Points of the next level, from which this one took its sample, without those that are the only ones of an inner
+    /// node.
+    pub offered: u64,
+    /// How many of them are within the spacing of a point drawn at this level and above.
+    pub offered_within_1: u64,
+    /// Points of deeper levels, without those that are the only ones of an inner node.
+    pub below: u64,
+    /// How many of them are within the spacing of such a point.
+    pub below_within_1: u64,
+    /// How many of them are within one and a half spacings.
+    pub below_within_1_5: u64,
     /// Smallest distance between points of different inner nodes of this level, over the spacing, where it is at
     /// most 2.
     pub seam_min: Option<f64>,
@@ -108,6 +133,26 @@ pub struct LevelQuality {
     pub seam_points: u64,
     /// Of those, how many have it closer than the spacing (less one lattice step): what shows as a dense line.
     pub seam_close: u64,
+}
+
+/// What a viewer has to load until a cloud that it looks at as a whole shows a million points, or all. Nodes are taken by
+/// level, in a level those with most points first.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FirstView {
+    /// Points of the root, the first picture. 10,000 to 25,000 are good: enough to see something, and soon there.
+    pub root_points: u64,
+    /// Side of the cube over the longest side of the box around the points: viewers frame the cube. Ideal: 1.
+    pub cube_over_extent: Option<f64>,
+    /// Bytes of the first hierarchy chunk.
+    pub first_chunk_bytes: u64,
+    /// Points that are there then.
+    pub points: u64,
+    /// Nodes that hold them.
+    pub nodes: u64,
+    /// Requests: the metadata, hierarchy chunks, nodes.
+    pub requests: u64,
+    /// Bytes of their answers.
+    pub bytes: u64,
 }
 
 /// How large the leaves of a binary tree are, and how exact.

@@ -7,9 +7,6 @@ use std::cmp::Ordering;
 
 use pointmill_format::{Aabb, Lattice, NodeKey};
 
-/// Cells a side of an inner node, at most one point each under grid and random sampling.
-pub(crate) const CELLS: f64 = 128.0;
-
 /// The geometry in the metadata.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Geometry {
@@ -29,15 +26,25 @@ impl Geometry {
         self.lattice.scale.iter().copied().fold(0.0, f64::max)
     }
 
-    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube, rounded down: less than a
-    /// unit on each axis.
+    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube: nothing where steps are
+    /// whole numbers of these, else less than a unit on each axis.
     pub(crate) fn sampling_slack(&self) -> f64 {
-        2.0 * (self.cube.max[0] - self.cube.min[0]) / 31f64.exp2()
+        let side = self.cube.max[0] - self.cube.min[0];
+        let is_whole = |scale: &f64| {
+            let steps = (side / scale).round();
+            steps >= 1.0 && steps.log2().fract() == 0.0 && (side / scale - steps).abs() < 1e-6 * steps
+        };
+        if self.lattice.scale.iter().all(is_whole) { 0.0 } else { 2.0 * side / 31f64.exp2() }
     }
 
     /// Spacing of a level, world units.
     pub(crate) fn spacing_at(&self, level: u8) -> f64 {
         self.spacing / f64::from(level).exp2()
+    }
+
+    /// Cells a side of an inner node, at most one point each under grid and random sampling: as wide as the spacing.
+    fn cells(&self) -> f64 {
+        ((self.cube.max[0] - self.cube.min[0]) / self.spacing).round().max(1.0)
     }
 
     /// False for a spacing that no writer would choose (usual: side / 128): searches by cells of that size would look
@@ -105,28 +112,28 @@ impl Geometry {
         })
     }
 
-    /// The cell of the node's 128³ grid that a stored position falls into, or `None` if it lies so close to the
+    /// The cell of the node's grid that a stored position falls into, or `None` if it lies so close to the
     /// border of a cell that rounding decides (within one lattice step, unless the side of the cube is whole steps).
-    pub(crate) fn sample_cell(&self, level: u8, node: &Aabb, stored: [i32; 3]) -> Option<u32> {
-        let mut cell = 0;
+    pub(crate) fn sample_cell(&self, level: u8, node: &Aabb, stored: [i32; 3]) -> Option<u64> {
+        let (mut cell, cells) = (0, self.cells());
         for (axis, stored) in stored.into_iter().enumerate() {
             let own = match self.whole_steps(axis) {
                 Some((steps, own)) => {
-                    let fraction = u128::from(stored.unsigned_abs()) * own << (u32::from(level) + 7);
-                    (fraction / steps % 128) as u32
+                    let fraction = (u128::from(stored.unsigned_abs()) * own * cells as u128) << level;
+                    (fraction / steps) as u64 % cells as u64
                 }
                 None => {
-                    let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / CELLS;
+                    let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / cells;
                     let in_steps = side / self.lattice.scale[axis];
                     let origin = (node.min[axis] - self.lattice.offset[axis]) / self.lattice.scale[axis];
                     let u = (f64::from(stored) - origin) / in_steps;
                     if (u - u.round()).abs() * in_steps <= 1.0 {
                         return None;
                     }
-                    u.floor().clamp(0.0, CELLS - 1.0) as u32
+                    u.floor().clamp(0.0, cells - 1.0) as u64
                 }
             };
-            cell = cell << 8 | own;
+            cell = cell << 20 | own;
         }
         Some(cell)
     }
@@ -206,14 +213,16 @@ mod tests {
     fn sample_cells_of_whole_steps_are_exact() {
         let mut geometry = geometry(); // 8 steps a cell at the root
         let node = geometry.node_box(NodeKey::ROOT);
-        assert_eq!(geometry.sample_cell(0, &node, [8, 7, 1023]), Some(1 << 16 | 127));
+        assert_eq!(geometry.sample_cell(0, &node, [8, 7, 1023]), Some(1 << 40 | 127));
+        let coarse = Geometry { spacing: 0.016, ..geometry };
+        assert_eq!(coarse.sample_cell(0, &node, [16, 15, 1023]), Some(1 << 40 | 63));
         geometry.cube.max = geometry.cube.min.map(|v| v + 1.025);
         // 1,025 steps: cells begin at multiples of 8.0078 steps, and of 4.0039 a level below
-        let cell = |level, x| geometry.sample_cell(level, &geometry.node_box(NodeKey::ROOT), [x, 0, 0]).unwrap() >> 16;
+        let cell = |level, x| geometry.sample_cell(level, &geometry.node_box(NodeKey::ROOT), [x, 0, 0]).unwrap() >> 40;
         assert_eq!([7, 8, 9, 1024].map(|x| cell(0, x)), [0, 0, 1, 127]);
         assert_eq!([4, 5, 512, 513].map(|x| cell(1, x)), [0, 1, 127, 0]);
         geometry.lattice.scale[0] = 0.004;
-        let cell = |x| geometry.sample_cell(0, &geometry.node_box(NodeKey::ROOT), [x, 0, 0]).unwrap() >> 16;
+        let cell = |x| geometry.sample_cell(0, &geometry.node_box(NodeKey::ROOT), [x, 0, 0]).unwrap() >> 40;
         assert_eq!([2, 3, 256].map(cell), [0, 1, 127], "steps of 4 finest ones");
         geometry.lattice.scale[0] = 0.0013;
         assert_eq!(geometry.sample_cell(0, &node, [6, 0, 0]), None, "6 of 6.16 steps");

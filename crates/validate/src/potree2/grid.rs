@@ -12,6 +12,8 @@ pub(crate) enum Origin {
     Own,
     /// An inner node of the same level that touches it.
     Neighbour,
+    /// Such a node's only point, which it may hold for no other reason than not to be empty.
+    Lone,
     /// Coarser levels, and leaves of the same level.
     Other,
 }
@@ -33,6 +35,17 @@ pub(crate) struct Grid {
     cell: f64,
     cells_per_step: [f64; 3],
     scale: [f64; 3],
+}
+
+/// Squares of distances, world units; infinite where nothing was found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Nearest {
+    /// To the nearest other [`Origin::Own`] site.
+    pub(crate) own: f64,
+    /// To the nearest [`Origin::Neighbour`].
+    pub(crate) neighbour: f64,
+    /// To the nearest [`Origin::Lone`].
+    pub(crate) lone: f64,
 }
 
 /// Odd, with well-spread bits (from the golden ratio and the primes of xxHash).
@@ -100,30 +113,28 @@ impl Grid {
         best
     }
 
-    /// Squares of the distances from site `of`, an [`Origin::Own`] one, to the nearest other [`Origin::Own`] site and the nearest
-    /// [`Origin::Neighbour`]: exact for the first up to `rings` ≥ 1 cell sides, for the second up to one.
-    pub(crate) fn nearest_by_origin(&self, of: usize, rings: i32) -> (f64, f64) {
-        let (mut own, mut neighbour) = (f64::INFINITY, f64::INFINITY);
+    /// What is nearest to site `of`, an [`Origin::Own`] one: exact for others of its node up to `rings` ≥ 1 cell sides,
+    /// for those of other nodes up to one.
+    pub(crate) fn nearest_by_origin(&self, of: usize, rings: i32) -> Nearest {
+        let mut nearest = Nearest { own: f64::INFINITY, neighbour: f64::INFINITY, lone: f64::INFINITY };
         let position = self.sites[of].position;
         let cell = self.cell_of(position);
         for ring in 0..=rings {
             let _ = self.ring(position, cell, ring, &mut |i, site, d| {
                 match site.origin {
-                    Origin::Own if i != of => own = own.min(d),
-                    Origin::Neighbour => neighbour = neighbour.min(d),
+                    Origin::Own if i != of => nearest.own = nearest.own.min(d),
+                    Origin::Neighbour => nearest.neighbour = nearest.neighbour.min(d),
+                    Origin::Lone => nearest.lone = nearest.lone.min(d),
                     _ => {}
                 }
                 // a twin: nothing is nearer, and where points repeat by the thousand this ends the search at once
-                if own == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                if nearest.own == 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
-            if own == 0.0 {
-                break;
-            }
-            if ring >= 1 && own <= square(f64::from(ring) * self.cell) {
+            if nearest.own == 0.0 || ring >= 1 && nearest.own <= square(f64::from(ring) * self.cell) {
                 break;
             }
         }
-        (own, neighbour)
+        nearest
     }
 
     fn cell_of(&self, position: [i32; 3]) -> [i32; 3] {
@@ -197,11 +208,11 @@ mod tests {
     #[test]
     fn searches_agree_with_looking_at_every_site() {
         let lattice = Lattice { scale: [0.5, 0.25, 1.0], offset: [0.0; 3] };
-        let origins = [Origin::Own, Origin::Neighbour, Origin::Other];
+        let origins = [Origin::Own, Origin::Neighbour, Origin::Lone, Origin::Other];
         let sites: Vec<Site> = scatter(400, 100)
             .into_iter()
             .enumerate()
-            .map(|(i, position)| Site { position, origin: origins[i % 3] })
+            .map(|(i, position)| Site { position, origin: origins[i % 4] })
             .collect();
         let grid = Grid::new(&sites, 8.0, &lattice);
         for p in scatter(300, 110) {
@@ -214,10 +225,12 @@ mod tests {
                 let others = grid.sites().iter().enumerate().filter(|(j, s)| *j != i && s.origin == origin);
                 others.map(|(_, s)| grid.distance_squared(site.position, s.position)).fold(f64::INFINITY, f64::min)
             };
-            let (own, neighbour) = grid.nearest_by_origin(i, 20);
-            assert_eq!(own, nearest(Origin::Own));
-            let exact = nearest(Origin::Neighbour);
-            assert!(neighbour == exact || exact > 64.0);
+            let found = grid.nearest_by_origin(i, 20);
+            assert_eq!(found.own, nearest(Origin::Own));
+            for (found, origin) in [(found.neighbour, Origin::Neighbour), (found.lone, Origin::Lone)] {
+                let exact = nearest(origin);
+                assert!(found == exact || exact > 64.0);
+            }
         }
     }
 }

@@ -3,10 +3,11 @@
 //! # Tolerances
 //! * Boxes and the tight box: 4 ulps of the cube's largest coordinate on the axis; everything else about positions is
 //!   exact, on integers.
-//! * Distances (spacing, coverage): of datasets that state their sampling, two units of 31-bit fractions of the cube where
-//!   scales differ, else nothing but the last bits of doubles; of others, one step of the lattice.
-//! * Sides of the cube against each other: 10⁻⁹, relative, and two ulps of its largest coordinate; spacing against
-//!   side / 128: 10⁻⁹, relative.
+//! * Distances (spacing, seams, coverage): of datasets that state their sampling, two units of 31-bit fractions of the
+//!   cube, or nothing but the last bits of doubles where steps are whole numbers of them; of others, one step of the
+//!   lattice.
+//! * Sides of the cube against each other: 10⁻⁹, relative, and two ulps of its largest coordinate; spacing: any
+//!   from side / 1024 to side / 32 is usual.
 //! * Attributes, counts, byte ranges, checksums: none.
 //!
 //! # Memory
@@ -17,6 +18,7 @@
 mod cache;
 mod checks;
 mod expect;
+mod first_view;
 mod grid;
 mod lattices;
 mod quality;
@@ -118,6 +120,9 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     };
     let walked = on_threads(threads, folder, || walk(&task))?;
     budget.give_back(threads as u64 * (thread_bytes - node_bytes));
+    if neighbourhoods {
+        checks::seams::check(&walked.tallies, task.sampling, &findings);
+    }
     checks::ranges::check(metadata, &geometry, &walked.seen, walked.unreadable == 0, &findings);
     note_what_was_skipped(&walked, &dataset, out_of_reach, options, &findings);
     let summary = match &against {
@@ -147,6 +152,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         points: metadata.points,
         nodes: tree.nodes.len() as u64,
         quality,
+        first_view: first_view::measure(&tree, metadata, metadata_bytes),
         against: summary,
         accuracy,
         ..Outcome::new(findings)
@@ -254,6 +260,7 @@ fn note_what_was_skipped(
     }
     if let Some(why) = out_of_reach {
         findings.skip(Check::Spacing, why);
+        findings.skip(Check::Seams, why);
         findings.skip(Check::Coverage, why);
     } else if walked.unreadable > 0 {
         findings.skip(Check::Coverage, format!("the points of {} nodes could not be read", walked.unreadable));

@@ -15,6 +15,8 @@ use crate::memory::Budget;
 pub(crate) struct TreeNode {
     pub(crate) key: NodeKey,
     pub(crate) record: NodeRecord,
+    /// Bytes of the hierarchy chunk that begins with it; 0 if none does.
+    pub(crate) chunk_bytes: u64,
     /// Its payload range makes sense and may be read.
     pub(crate) readable: bool,
 }
@@ -202,7 +204,8 @@ impl Open<'_> {
             if let Some(points) = chunk.points.filter(|p| i == 0 && *p != record.points) {
                 blame("numPoints of a proxy", record.points.to_string(), points.to_string());
             }
-            tree.nodes.push(TreeNode { key, record, readable: false });
+            let chunk_bytes = if i == 0 { chunk.size } else { 0 };
+            tree.nodes.push(TreeNode { key, record, chunk_bytes, readable: false });
             for child in (0..8).filter(|c| record.child_mask >> c & 1 == 1) {
                 match key.child(child) {
                     Some(child) => self.keys.push_back(child),

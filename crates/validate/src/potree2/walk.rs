@@ -270,8 +270,11 @@ impl Walk<'_> {
             sites.extend(coarser.map(|s| Site { origin: Origin::Other, ..*s }));
         }
         for neighbour in tree.neighbours(key) {
-            let is_inner = tree.nodes[neighbour].record.child_mask != 0;
-            let origin = if is_inner { Origin::Neighbour } else { Origin::Other };
+            let origin = match tree.nodes[neighbour].record {
+                record if record.child_mask == 0 => Origin::Other,
+                record if record.points == 1 => Origin::Lone,
+                _ => Origin::Neighbour,
+            };
             let Some(positions) = self.positions(neighbour) else { continue };
             sites.extend(positions.iter().filter(|p| near(p)).map(|p| Site { position: *p, origin }));
         }

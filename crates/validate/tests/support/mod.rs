@@ -71,6 +71,14 @@ pub fn scene() -> Vec<Point> {
     points
 }
 
+/// A dense floor with a little noise on the plane between nodes, from level 2 down.
+pub fn floor() -> Vec<Point> {
+    let mut random = Random::new(11);
+    let mut next = |below: u64| random.below(below) as i32;
+    let template = scene()[0];
+    (0..8000).map(|_| Point { position: [next(1024), next(1024), SIDE / 4 - 3 + next(6)], ..template }).collect()
+}
+
 /// Points by node.
 #[derive(Debug, Clone)]
 pub struct Cloud {
@@ -78,6 +86,10 @@ pub struct Cloud {
     pub sampler: Sampler,
     /// Stored instead of what a node's points encode to.
     pub payload: Option<(NodeKey, Vec<u8>)>,
+    /// Planted: nodes are sampled as if they were alone.
+    alone: bool,
+    /// What nodes took for themselves so far, by level.
+    taken: [Vec<Point>; 32],
 }
 
 impl Cloud {
@@ -88,7 +100,13 @@ impl Cloud {
 
     /// The octree of any points.
     pub fn of(points: Vec<Point>, sampler: Sampler) -> Self {
-        let mut cloud = Self { nodes: BTreeMap::new(), sampler, payload: None };
+        Self::sampled(points, sampler, false)
+    }
+
+    /// The octree of any points, sampled by nodes that do not look over their borders if they are `alone`.
+    pub fn sampled(points: Vec<Point>, sampler: Sampler, alone: bool) -> Self {
+        let taken = Default::default();
+        let mut cloud = Self { nodes: BTreeMap::new(), sampler, payload: None, alone, taken };
         cloud.build(NodeKey::ROOT, points);
         cloud
     }
@@ -103,6 +121,7 @@ impl Cloud {
             octants[octant(p.position, key.level + 1)].push(p);
         }
         let mut taken: Vec<Point> = Vec::new();
+        let others = self.taken_around(key);
         for (child, points) in octants.into_iter().enumerate().filter(|(_, p)| !p.is_empty()) {
             let child = key.child(child as u8).unwrap();
             self.build(child, points);
@@ -110,7 +129,9 @@ impl Cloud {
             let mut left = self.nodes.remove(&child).unwrap();
             let mut count = left.len();
             left.retain(|p| {
-                let wanted = !(inner && count == 1) && fits(&taken, p, key.level, self.sampler);
+                let wanted = !(inner && count == 1)
+                    && fits(&taken, p, key.level, self.sampler)
+                    && fits(&others, p, key.level, Sampler::Poisson);
                 if wanted {
                     taken.push(*p);
                     count -= 1;
@@ -121,7 +142,23 @@ impl Cloud {
                 self.nodes.insert(child, left);
             }
         }
+        if taken.is_empty() {
+            // its neighbours cover all of it: a point comes back, because no node is empty
+            let children = (0..8).map(|c| key.child(c).unwrap()).filter(|c| self.nodes.contains_key(c));
+            let most = children.max_by_key(|c| self.nodes[c].len()).unwrap();
+            taken.extend(self.nodes.get_mut(&most).unwrap().pop());
+        }
+        self.taken[usize::from(key.level)].extend(&taken);
         self.nodes.insert(key, taken);
+    }
+
+    /// What earlier nodes of the level took, as far as it is not farther from this node than the spacing.
+    fn taken_around(&self, key: NodeKey) -> Vec<Point> {
+        let (side, spacing) = (SIDE >> key.level, (SIDE >> key.level) / 128);
+        let min = [key.x, key.y, key.z].map(|v| v as i32 * side);
+        let near = |p: &&Point| (0..3).all(|a| (min[a] - spacing..=min[a] + side + spacing).contains(&p.position[a]));
+        let of_level = if self.alone { &[][..] } else { &self.taken[usize::from(key.level)] };
+        of_level.iter().filter(near).copied().collect()
     }
 
     /// True if the node has children.

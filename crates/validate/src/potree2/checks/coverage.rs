@@ -19,7 +19,7 @@ const LIMIT: f64 = 2.0;
 
 /// How far a point may be from the sample of the node above it where the dataset promises a maximal Poisson-disk sample,
 /// in spacings.
-const SAMPLED: f64 = 1.00004;
+const SAMPLED: f64 = 1.00002;
 
 /// Holes are measured up to this many spacings; wider ones count as this.
 pub(crate) const REACH: f64 = 4.0;
@@ -64,15 +64,19 @@ pub(crate) fn check(
     let Drawn { level, limit, grid } = *drawn;
     findings.checked(Check::Coverage, positions.len() as u64);
     let spacing = geometry.spacing_at(level);
-    let limit_squared = square(limit);
+    let (limit_squared, spacing_squared) = (square(limit), square(spacing));
     let mut widest = tally.hole_squared();
-    let (mut uncovered, mut worst) = (0, 0.0);
+    let (mut within_1, mut within_1_5, mut uncovered, mut worst) = (0, 0, 0, 0.0);
     for &position in positions {
-        // Points nearer than the widest hole so far change nothing; most are settled by the first site looked at.
-        if grid.any_within(position, widest.min(limit_squared)) {
+        // Points nearer than the widest hole so far change nothing else; most are settled by the first site looked at.
+        if grid.any_within(position, spacing_squared.min(widest)) {
+            within_1 += 1;
+            within_1_5 += 1;
             continue;
         }
         let distance = grid.nearest_squared(position, 2).min(square(REACH * spacing));
+        within_1 += u64::from(distance <= spacing_squared);
+        within_1_5 += u64::from(distance <= square(1.5) * spacing_squared);
         widest = widest.max(distance);
         if distance > limit_squared {
             uncovered += 1;
@@ -80,6 +84,7 @@ pub(crate) fn check(
         }
     }
     tally.widen_hole(widest);
+    tally.add_below(positions.len() as u64, within_1, within_1_5, key.level == level + 1);
     if uncovered > 0 {
         let subject = format!("distance to the nearest point drawn at levels up to {level}");
         let expected = json!(limit);

@@ -5,5 +5,6 @@ pub(crate) mod metadata;
 pub(crate) mod node_points;
 pub(crate) mod payload_ranges;
 pub(crate) mod ranges;
+pub(crate) mod seams;
 pub(crate) mod spacing;
 pub(crate) mod structure;

@@ -7,14 +7,14 @@ use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::potree2::expect::Geometry;
 use crate::potree2::grid::{Grid, Origin, square};
-use crate::potree2::quality::Tally;
+use crate::potree2::quality::{NodeFigures, Tally};
 
 /// How inner nodes are sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sampling {
     /// No two points of a node closer than the spacing of its level.
     Poisson,
-    /// At most one point in each cell of the node's 128³ grid (grid and random sampling).
+    /// At most one point in each cell of the node's grid (grid and random sampling).
     Cells,
     /// Not stated in the dataset: one of the two, throughout.
     Unknown,
@@ -57,15 +57,15 @@ pub(crate) fn pairs(
     let spacing = geometry.spacing_at(key.level);
     let allowed_squared = sampling.allowed_squared(spacing, geometry);
     let (mut close, mut closest, mut looked_at) = (0, f64::INFINITY, 0);
-    let mut node = crate::potree2::quality::NodeFigures::default();
-    for (i, _) in grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own) {
-        let (own_squared, across_squared) = grid.nearest_by_origin(i, RINGS);
+    let own = || grid.sites().iter().enumerate().filter(|(_, s)| s.origin == Origin::Own);
+    let mut node = NodeFigures::new(own().count());
+    for (i, _) in own() {
+        let nearest = grid.nearest_by_origin(i, RINGS);
         looked_at += 1;
-        node.nearest(own_squared.sqrt() / spacing);
-        node.across(across_squared.sqrt() / spacing, across_squared < allowed_squared);
-        if own_squared < allowed_squared {
+        tally.add_nearest(node.add(&nearest, spacing, allowed_squared));
+        if nearest.own < allowed_squared {
             close += 1;
-            closest = f64::min(closest, own_squared.sqrt());
+            closest = f64::min(closest, nearest.own.sqrt());
         }
     }
     tally.add_node(&node);
@@ -77,16 +77,16 @@ pub(crate) fn pairs(
     }
 }
 
-/// Reports cells of an inner node's 128³ grid that hold more than one point.
+/// Reports cells of an inner node's grid that hold more than one point.
 pub(crate) fn cells(key: NodeKey, positions: &[[i32; 3]], geometry: &Geometry, findings: &Findings) {
     findings.checked(Check::Spacing, positions.len() as u64);
     let node = geometry.node_box(key);
-    let mut cells: Vec<u32> = positions.iter().filter_map(|p| geometry.sample_cell(key.level, &node, *p)).collect();
+    let mut cells: Vec<u64> = positions.iter().filter_map(|p| geometry.sample_cell(key.level, &node, *p)).collect();
     cells.sort_unstable();
     let surplus = cells.windows(2).filter(|w| w[0] == w[1]).count() as u64;
     if surplus > 0 {
-        let fullest = cells.chunk_by(|a, b| a == b).map(<[u32]>::len).max();
-        let finding = Finding::new(Check::Spacing, "points of a cell of the 128³ grid", 1, fullest);
+        let fullest = cells.chunk_by(|a, b| a == b).map(<[u64]>::len).max();
+        let finding = Finding::new(Check::Spacing, "points of a cell of the grid", 1, fullest);
         findings.push(finding.at(key).points(surplus));
     }
 }
