@@ -115,7 +115,7 @@ impl Geometry {
             let own = match self.whole_steps(axis) {
                 Some((steps, own)) => {
                     let cells = cells as u128;
-                    let fraction = u128::from(stored.unsigned_abs()) * own * cells << level;
+                    let fraction = (u128::from(stored.unsigned_abs()) * own * cells) << level;
                     (fraction / steps % cells) as u64
                 }
                 None => {
