@@ -92,15 +92,15 @@ impl Cube {
         let side = steps as f64 * scale[reference];
         let (shift, factor) = fraction(steps);
         let mut cube = Self { min: bounds.min, side, shift: [shift; 3], factor: [factor; 3], steps: None };
-        for a in 0..3 {
+        for (a, own) in scale.into_iter().enumerate() {
             let extent = bounds.extent(a);
             let mut start = place(extent, (steps >> 1) + 1, steps - 1);
             if a != reference {
-                let span = side / scale[a];
+                let span = side / own;
                 // far more than what the quotient is rounded by, and less than the step of the reference that is to spare
                 let last = (span * (1.0 - 2f64.powi(-40))) as u64;
                 start = place(extent, ((span / 2.0) as u64).saturating_add(1), last);
-                (cube.shift[a], cube.factor[a]) = quotient(scale[a] / side);
+                (cube.shift[a], cube.factor[a]) = quotient(own / side);
             }
             let has_room = start.saturating_add(extent) <= LARGEST_STORED;
             cube.min[a] = bounds.min[a].saturating_sub_unsigned(if has_room { start } else { 0 });
@@ -170,7 +170,7 @@ impl Cube {
 /// The upper half of a product.
 #[inline]
 pub(crate) fn high(a: u64, b: u64) -> u64 {
-    (u128::from(a) * u128::from(b) >> 64) as u64
+    ((u128::from(a) * u128::from(b)) >> 64) as u64
 }
 
 /// Where in the cube an axis begins, in its own steps: in the middle; but what fits between the middle plane (`above` is the
