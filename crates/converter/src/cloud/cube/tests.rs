@@ -48,7 +48,7 @@ fn shorter_axes_are_near_the_middle_and_thin_ones_above_its_plane() {
 #[test]
 fn tree_coordinates_are_exact_floors() {
     let mut random = Random::new(3);
-    let mut sides: Vec<u64> = (0..200).map(|_| 129 + random.below((1 << 31) - 129) | 1).collect();
+    let mut sides: Vec<u64> = (0..200).map(|_| (129 + random.below((1 << 31) - 129)) | 1).collect();
     sides.extend([129, 131, 255, 257, 65_535, 65_537, (1 << 30) - 1, (1 << 30) + 1, (1 << 31) - 3, (1 << 31) - 1]);
     for steps in sides {
         let cube = long(steps as i64 - 1);
@@ -58,7 +58,7 @@ fn tree_coordinates_are_exact_floors() {
         // the coordinates beside planes are where rounding would show
         let beside = (1..31).flat_map(|l| {
             let i = 2 * random.below(1 << (l - 1)) + 1;
-            let below = (u128::from(i) * u128::from(steps) >> l) as u64;
+            let below = ((u128::from(i) * u128::from(steps)) >> l) as u64;
             [below, below + 1]
         });
         let xs: Vec<u64> = ends.chain(beside).filter(|x| *x < steps).collect();
@@ -229,8 +229,8 @@ fn clients_decide_the_same_at_every_plane() {
             let [lo, hi] = [bounds.min, bounds.max].map(|q| q.0.map(shifted));
             let cube = Cube::around(&JobBounds::new(lo, hi), &lattice).unwrap();
             let (steps, offset) = (cube.steps.unwrap(), cube.offset(&lattice));
-            for a in 0..3 {
-                let (min, max) = (offset[a], offset[a] + cube.side);
+            for min in offset {
+                let max = min + cube.side;
                 let ulp = min.abs().max(max.abs()).next_up() - min.abs().max(max.abs());
                 assert!(4.0 * ulp < scale / 2f64.powi(level as i32), "what the page demands");
                 // first and last integer of each node by the integers
