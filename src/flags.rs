@@ -43,6 +43,10 @@ fn advice(advice: &Advice) -> String {
         Advice::SkipOriginPoints => "--origin-points skip leaves them out".to_owned(),
         Advice::DetectRgbDepth => "leave out --rgb-depth 8".to_owned(),
         Advice::SetRgbDepth => "--rgb-depth overrides this".to_owned(),
+        Advice::RoundDarkColours => {
+            "pass --dark-colours round to round them to 0 or 256, or --rgb-depth 8 if they have 8 bits".to_owned()
+        }
+        Advice::Project => "--reproject EPSG:n to a system in metres or feet gives a scene to look at".to_owned(),
         Advice::CommasSeparate => "pass --decimal point if they separate columns".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
         Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),

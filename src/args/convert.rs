@@ -59,6 +59,10 @@ pub(crate) struct ConvertArgs {
           help_heading = "Output",
           help = format!("Maximum points per leaf node [default: {}]", Potree2Settings::default().leaf_capacity))]
     pub(crate) leaf_capacity: Option<u32>,
+    /// 16-bit colour channels of 1 to 255, which viewers take for 8 bits and show too bright: keep them, or round them to 0
+    /// or 256 [default: keep]
+    #[arg(long, value_enum, help_heading = "Output")]
+    pub(crate) dark_colours: Option<DarkColoursArg>,
     #[command(flatten)]
     pub(crate) bintree: BintreeArgs,
     #[command(flatten)]
@@ -250,6 +254,12 @@ pub(crate) enum OutliersArg {
 pub(crate) enum FaultArg {
     Skip,
     Fail,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DarkColoursArg {
+    Keep,
+    Round,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, Duplicates, Encoding, Filter, OnFault, OriginPoints, Outliers,
-    Plan, Potree2Settings, Report, RgbDepth, Sampling, ScaleChoice, Target,
+    AttributeChoice, BatchesSettings, BintreeSettings, DarkColours, Duplicates, Encoding, Filter, OnFault,
+    OriginPoints, Outliers, Plan, Potree2Settings, Report, RgbDepth, Sampling, ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
 use super::report_file::ReportFile;
 use crate::args::{
-    Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DuplicatesArg, EncodingArg, FaultArg, LayoutArg,
-    OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg,
+    FaultArg, LayoutArg, OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
@@ -99,6 +99,7 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
         ("--encoding", TargetArg::Potree2, args.encoding.is_some()),
         ("--spacing", TargetArg::Potree2, args.spacing.is_some()),
         ("--leaf-capacity", TargetArg::Potree2, args.leaf_capacity.is_some()),
+        ("--dark-colours", TargetArg::Potree2, args.dark_colours.is_some()),
         ("--capacity", TargetArg::Bintree, tree.capacity.is_some()),
         ("--split", TargetArg::Bintree, tree.split.is_some()),
         ("--layout", TargetArg::Bintree, tree.layout.is_some()),
@@ -127,6 +128,10 @@ fn potree2_settings(args: &ConvertArgs) -> Potree2Settings {
         }),
         spacing: args.spacing.and_then(|s| s.0),
         leaf_capacity: args.leaf_capacity.unwrap_or(default.leaf_capacity),
+        dark_colours: args.dark_colours.map_or(default.dark_colours, |d| match d {
+            DarkColoursArg::Keep => DarkColours::Keep,
+            DarkColoursArg::Round => DarkColours::Round,
+        }),
     }
 }
 

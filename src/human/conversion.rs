@@ -25,6 +25,7 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
     };
     lines.push(format!("{}, {}{memory}{temporary}", seconds(report.seconds), rate(per_second)));
     lines.extend(points_lines(report));
+    lines.extend(colours_line(report));
     lines.extend(report.outputs.iter().map(|output| accuracy::line(output, report)));
     for output in &report.outputs {
         lines.extend(dropped_line(output, report.outputs.len() > 1));
@@ -48,6 +49,17 @@ fn output_line(output: &OutputReport, plan: &Plan) -> String {
     // joining nothing leaves a separator at the end
     let place = if output.folder.is_empty() { &plan.output } else { &place };
     format!("{}: {} in {parts}, {}", place.display(), plural(output.points, "point"), bytes(output.bytes))
+}
+
+/// Colours that are not stored as they were read. Batches have 8 bits in any case.
+fn colours_line(report: &Report) -> Option<String> {
+    let has_wide =
+        |o: &OutputReport| o.format != DatasetKind::Batches.name() && o.attributes.iter().any(|a| a == "rgb");
+    let depths: Vec<u8> = report.inputs.iter().filter_map(|input| input.rgb_depth).collect();
+    let narrow = depths.iter().filter(|depth| **depth == 8).count() as u64;
+    let of = plural(depths.len() as u64, "scan");
+    (narrow > 0 && report.outputs.iter().any(has_wide))
+        .then(|| format!("colours of 8 bits in {} of {of} with colour, stored times 257", count(narrow)))
 }
 
 /// Attributes that are not in an output, those of one reason together.

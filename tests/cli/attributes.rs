@@ -19,6 +19,21 @@ fn octree<T: Element>(dir: &Dir, name: &str) -> Vec<(f64, T)> {
     sorted(all)
 }
 
+/// The same of an attribute of several elements.
+pub(crate) fn octree_chunks<T: Element>(dir: &Dir, name: &str) -> Vec<(f64, Vec<T>)> {
+    let dataset = Dataset::open(dir.path("out")).unwrap();
+    let mut points = NodePoints::default();
+    let mut all = Vec::new();
+    for node in dataset.read_hierarchy().unwrap() {
+        dataset.read_points(&node, &mut points).unwrap();
+        let values = points.column::<T>(name).unwrap();
+        let of_point =
+            |i: usize| values[i * values.len() / points.len()..(i + 1) * values.len() / points.len()].to_vec();
+        all.extend((0..points.len()).map(|i| (points.world(i).unwrap()[0], of_point(i))));
+    }
+    sorted(all)
+}
+
 /// The same of a binary tree.
 fn bintree<T: Element>(dir: &Dir, name: &str) -> Vec<(f64, T)> {
     let tree = Bintree::open(dir.path("out")).unwrap();
@@ -53,14 +68,14 @@ fn attributes(dir: &Dir) -> String {
 }
 
 /// An ascii PLY of these properties and rows.
-fn ply(properties: &[&str], rows: &[&str]) -> Vec<u8> {
+pub(crate) fn ply(properties: &[&str], rows: &[&str]) -> Vec<u8> {
     let properties: Vec<String> = properties.iter().map(|p| format!("property {p}\n")).collect();
     let (count, properties, rows) = (rows.len(), properties.concat(), rows.join("\n"));
     format!("ply\nformat ascii 1.0\nelement vertex {count}\n{properties}end_header\n{rows}\n").into_bytes()
 }
 
 /// Points of format 2 on a line from x 0, with extra bytes: name, type, scale, and the bytes of each point.
-fn las(points: i32, extras: &[(&str, u8, Option<f64>)], bytes: impl Fn(i32) -> Vec<u8>) -> Vec<u8> {
+pub(crate) fn las(points: i32, extras: &[(&str, u8, Option<f64>)], bytes: impl Fn(i32) -> Vec<u8>) -> Vec<u8> {
     let line = Las { offset: [0.0; 3], ..Las::new((0..points).map(|i| Point::at([i * 100, 0, 0])).collect()) };
     let plain = line.bytes();
     let u32_at = |at: usize| u32::from_le_bytes(plain[at..at + 4].try_into().unwrap()) as usize;
@@ -209,11 +224,11 @@ fn octree_of<T: Element>(dir: &Dir, name: &str, bytes: &[u8]) -> Vec<(f64, T)> {
 #[test]
 fn what_a_file_lacks_is_told_and_types_hold_the_values_of_all() {
     let dir = Dir::new();
-    dir.write("a.las", &las(2, &[("height", 4, Some(0.5))], |i| (-3i16 - i as i16).to_le_bytes().to_vec()));
-    let properties = ["float x", "float y", "float z", "float intensity", "float height"];
+    dir.write("a.las", &las(2, &[("quality", 4, Some(0.5))], |i| (-3i16 - i as i16).to_le_bytes().to_vec()));
+    let properties = ["float x", "float y", "float z", "float intensity", "float quality"];
     dir.write("b.ply", &ply(&properties, &["7 0 0 0.25 1.5", "8 0 0 nan 2.5"]));
     let ended = dir.succeed(["convert", "a.las", "b.ply", "-o", "out"]);
-    assert_eq!(values(octree::<f64>(&dir, "height")), [-1.5, -2.0, 1.5, 2.5]);
+    assert_eq!(values(octree::<f64>(&dir, "quality")), [-1.5, -2.0, 1.5, 2.5]);
     assert_eq!(values(octree::<f32>(&dir, "intensity"))[..3], [0.0, 0.0, 0.25]);
     let line = "classification";
     let told = ended.stderr();

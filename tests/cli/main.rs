@@ -32,3 +32,4 @@ mod support;
 mod text_inputs;
 mod units;
 mod validating;
+mod viewers;

@@ -45,6 +45,10 @@ pub enum Advice {
     DetectRgbDepth,
     /// State the colour depth.
     SetRgbDepth,
+    /// Round channels that viewers show too bright.
+    RoundDarkColours,
+    /// Reproject to a system in metres or feet.
+    Project,
     /// State that commas of a text separate columns.
     CommasSeparate,
     /// Name the coordinate reference system by its EPSG code.
@@ -92,6 +96,8 @@ impl fmt::Display for Advice {
             Self::StopWriting => "convert again once nothing writes to the inputs",
             Self::DetectRgbDepth => "let the colour depth be detected",
             Self::SetRgbDepth => "state the colour depth to override this",
+            Self::RoundDarkColours => "round dark colours, or state that they have 8 bits",
+            Self::Project => "reproject to a system in metres or feet if it is to be looked at",
             Self::CommasSeparate => "say so if they separate columns",
             Self::NameEpsg => "name the EPSG code if viewers need the projection",
             Self::GiveProj4 => "give a proj4 definition if viewers need the projection",

@@ -30,6 +30,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
     // Which attributes are constant is not known before the points are read.
     let ranges: Vec<Range> = schema.attributes.iter().map(|a| Range::new(a.elements)).collect();
     let kept = choose_attributes(&plan.attributes, schema, &intake.unread, &ranges).kept;
+    warnings.extend(targets.iter().flat_map(|t| t.output().foresee(schema, &kept, &crs)));
     let kept_bytes = kept.iter().map(|i| schema.attributes[*i].size()).sum::<usize>() as u64;
     let sizes: Vec<DiskSize> = targets.iter().map(|t| t.output().disk_size(plan, schema, kept_bytes)).collect();
     let bytes_per_point: u64 = sizes.iter().map(|s| s.per_point).sum();

@@ -12,7 +12,8 @@ use crate::error::ConvertError;
 use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
 use crate::report::OutputReport;
 use crate::runtime::Runtime;
-use crate::sources::Schema;
+use crate::sources::{ResolvedCrs, Schema};
+use crate::warning::Warning;
 
 /// A format to write, with its settings.
 pub(crate) trait Output: Debug + Send + Sync {
@@ -40,6 +41,11 @@ pub(crate) trait Output: Debug + Send + Sync {
 
     /// Adds the settings that shape the dataset to those of the report.
     fn describe_settings(&self, settings: &mut Map<String, Value>);
+
+    /// What there is to say before any point was read. `kept`: the attributes of the schema that go in, in order.
+    fn foresee(&self, _schema: &Schema, _kept: &[usize], _crs: &ResolvedCrs) -> Vec<Warning> {
+        Vec::new()
+    }
 
     /// Builds and writes the dataset.
     fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError>;

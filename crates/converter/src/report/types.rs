@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 
 use super::accuracy::Accuracy;
 use crate::reason::GridReason;
-use crate::warning::Warning;
+use crate::warning::{RenamedAttribute, Warning};
 
 /// What a run did.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -71,6 +71,9 @@ pub struct OutputReport {
     /// Attributes with values that the format cannot hold as they were read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub attributes_changed: Vec<ChangedAttribute>,
+    /// Attributes that have another name in it than in the inputs; all other lists here have the names of the inputs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub attributes_renamed: Vec<RenamedAttribute>,
     /// Bytes of its files.
     pub bytes: u64,
     /// Wall seconds from the gathered points to the synced files.

@@ -102,7 +102,8 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
         let unit = proj4::unit(text);
         let (projection, notes) = unzip(proj4::for_viewers(text, unit), None);
         let (unit, vertical_unit) = (Some(unit), proj4::vertical_unit(text));
-        return Ok(ResolvedCrs { projection, wkt: None, label: printable(text), unit, vertical_unit, notes });
+        let (label, is_geocentric) = (printable(text), proj4::is_geocentric(text));
+        return Ok(ResolvedCrs { projection, wkt: None, label, unit, vertical_unit, is_geocentric, notes });
     }
     match wkt::is_wkt(text) {
         true if !wkt::is_whole(text) => fault(PlanFault::CutWkt),

@@ -63,6 +63,8 @@ pub(crate) struct Rules {
     /// The job lattice's coordinate of the dataset's integer 0.
     pub(crate) shift: [i64; 3],
     pub(crate) rgb_depth: RgbDepth,
+    /// Channels of 1 to 127 are stored as 0, those of 128 to 255 as 256.
+    pub(crate) rounds_dark: bool,
     /// World coordinates, closed.
     pub(crate) bounds: Option<Aabb>,
     pub(crate) classes: Option<Vec<i64>>,
@@ -81,7 +83,8 @@ pub(crate) struct Rules {
 impl Rules {
     /// `attributes`: those to compare, beside the position. `lattice`: of the dataset's integer positions. `own`:
     /// pointmill's own key of the metadata, null if it is not there.
-    pub(crate) fn new(attributes: Vec<Attribute>, lattice: Lattice, own: &Value) -> Self {
+    pub(crate) fn new(mut attributes: Vec<Attribute>, lattice: Lattice, own: &Value) -> Self {
+        rename_back(&mut attributes, &own["attributesRenamed"]);
         let rgb = attributes.iter().position(|a| a.name == "rgb" && a.elements == 3);
         let lattice_offset = vector(&own["latticeOffset"]).unwrap_or(lattice.offset);
         let shift = [0, 1, 2].map(|a| ((lattice.offset[a] - lattice_offset[a]) / lattice.scale[a]).round() as i64);
@@ -106,6 +109,7 @@ impl Rules {
                 Some("16") => RgbDepth::Sixteen,
                 _ => RgbDepth::Auto,
             },
+            rounds_dark: own["darkColours"] == "round",
             bounds,
             classes,
             every: own["filter"]["every"].as_u64().unwrap_or(1).max(1),
@@ -166,6 +170,15 @@ pub(crate) fn grey(v: u64, [lo, hi]: [u64; 2]) -> u64 {
     let span = hi.saturating_sub(lo);
     let scaled = (v.min(hi).saturating_sub(lo)).saturating_mul(255).saturating_add(span / 2);
     scaled.checked_div(span).unwrap_or(255)
+}
+
+/// Gives attributes that were renamed the names that they have in the sources.
+fn rename_back(attributes: &mut [Attribute], renamed: &Value) {
+    for attribute in attributes {
+        if let Some(name) = renamed.get(&attribute.name).and_then(Value::as_str) {
+            name.clone_into(&mut attribute.name);
+        }
+    }
 }
 
 fn constants(dropped: &Value) -> Vec<(String, Vec<f64>)> {

@@ -31,7 +31,17 @@ impl Colour {
             Self::AsIs => rgb,
             Self::Times257 => rgb.map(|v| v.min(255) * 257),
         };
+        let wide = if rules.rounds_dark { wide.map(rounded_dark) } else { wide };
         if rules.rgb_as_bytes { wide.map(|v| (v * 255 + 32_767) / 65_535) } else { wide }
+    }
+}
+
+/// A channel of 16 bits as viewers show it, where they would take it for 8.
+const fn rounded_dark(v: u64) -> u64 {
+    match v {
+        0..=127 => 0,
+        128..=255 => 256,
+        _ => v,
     }
 }
 

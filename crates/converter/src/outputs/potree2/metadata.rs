@@ -1,5 +1,6 @@
 //! The metadata of an octree, and its part of the report.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use pointmill_format::potree2::{AttributeStats, Encoding as StoredEncoding, HierarchyBytes, Metadata};
@@ -7,9 +8,11 @@ use pointmill_format::{Aabb, Attribute, AttributeType, Lattice};
 use serde_json::Map;
 
 use super::layout::viewable;
-use super::settings::{Encoding, Potree2Settings};
+use super::names::Names;
+use super::settings::{DarkColours, Encoding, Potree2Settings};
 use super::spacing::ChosenSpacing;
-use crate::cloud::{Cloud, JobPoint, Ledger};
+use super::watch::rounded_range;
+use crate::cloud::{Cloud, JobPoint, Ledger, Range};
 use crate::octree::Octree;
 use crate::outputs::attributes::Choice;
 use crate::outputs::origin::own_key;
@@ -21,6 +24,7 @@ pub(super) fn metadata(
     settings: &Potree2Settings,
     spacing: &ChosenSpacing,
     choice: &Choice,
+    names: &Names,
     ledger: &Ledger,
     hierarchy: &HierarchyBytes,
 ) -> Metadata {
@@ -33,10 +37,11 @@ pub(super) fn metadata(
     position.min = lattice.world(stored(stats.bounds.min)).to_vec();
     position.max = lattice.world(stored(stats.bounds.max)).to_vec();
     let mut attributes = vec![position];
-    attributes.extend(choice.kept.iter().map(|&i| {
+    attributes.extend(choice.kept.iter().zip(&names.stored).map(|(&i, name)| {
         let mut attribute = cloud.schema().attributes[i].clone();
+        attribute.name.clone_from(name);
         attribute.ty = viewable(attribute.ty);
-        let range = &facts.ranges[i];
+        let range = stored_range(settings, &attribute, &facts.ranges[i]);
         // A range must be there and finite; a column of NaN has none.
         let finite = |v: &[f64]| v.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect::<Vec<_>>();
         let mut described = AttributeStats::new(attribute.clone());
@@ -49,6 +54,13 @@ pub(super) fn metadata(
         described
     }));
     let mut own = own_key(cloud, &choice.dropped);
+    if !names.renamed.is_empty() {
+        let renamed = names.renamed.iter().map(|r| (r.stored_as.clone(), r.name.clone().into()));
+        own.insert("attributesRenamed".into(), renamed.collect::<Map<_, _>>().into());
+    }
+    if settings.dark_colours == DarkColours::Round {
+        own.insert("darkColours".into(), settings.dark_colours.name().into());
+    }
     own.insert("sampling".into(), settings.sampling.name().into());
     own.insert("leafCapacity".into(), settings.leaf_capacity.into());
     let box_of_root = Aabb { min: offset, max: offset.map(|v| v + side) };
@@ -64,6 +76,14 @@ pub(super) fn metadata(
     };
     metadata.extra = Map::from_iter([("pointmill".to_owned(), own.into())]);
     metadata
+}
+
+/// The range of the values that are stored.
+fn stored_range<'a>(settings: &Potree2Settings, attribute: &Attribute, range: &'a Range) -> Cow<'a, Range> {
+    match settings.dark_colours {
+        DarkColours::Round if attribute.name == "rgb" => Cow::Owned(rounded_range(range)),
+        _ => Cow::Borrowed(range),
+    }
 }
 
 pub(super) fn tree_report(tree: &Octree) -> TreeReport {

@@ -3,9 +3,12 @@
 mod accuracy;
 mod layout;
 mod metadata;
+mod names;
+mod notes;
 mod payload;
 mod settings;
 mod spacing;
+mod watch;
 
 use pointmill_format::DatasetKind;
 use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
@@ -13,10 +16,12 @@ use serde_json::{Map, Value};
 
 pub(crate) use layout::OutputLayout;
 pub(crate) use payload::PayloadEncoder;
-pub use settings::{Encoding, Potree2Settings};
+pub use settings::{DarkColours, Encoding, Potree2Settings};
 
 use self::layout::viewable;
+use self::names::Names;
 use self::spacing::ChosenSpacing;
+use self::watch::{AllSeen, Watch};
 use super::attributes::{changed, choose};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
@@ -26,7 +31,8 @@ use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Events, Runtime};
-use crate::sources::{POSITION_BYTES, Schema};
+use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
+use crate::warning::Warning;
 
 /// Elements of an attribute that readers of the format accept.
 const MAX_ELEMENTS: usize = 16;
@@ -102,6 +108,11 @@ impl Output for Potree2Settings {
         };
         settings.insert("encoding".into(), encoding.into());
         settings.insert("leaf-capacity".into(), self.leaf_capacity.into());
+        settings.insert("dark-colours".into(), self.dark_colours.name().into());
+    }
+
+    fn foresee(&self, schema: &Schema, kept: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {
+        notes::foresee(self, schema, kept, crs)
     }
 
     fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
@@ -112,8 +123,15 @@ impl Output for Potree2Settings {
             return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());
         }
         let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
-        let payloads =
-            Payloads { file: to.create("octree.bin")?, layout, encoding: self.encoding, events: rt.events() };
+        let seen = AllSeen::default();
+        let payloads = Payloads {
+            file: to.create("octree.bin")?,
+            layout,
+            encoding: self.encoding,
+            events: rt.events(),
+            watch: self.watch(cloud, &choice.kept),
+            seen: &seen,
+        };
         let spacing = ChosenSpacing::of(self, cloud)?;
         let settings = OctreeSettings {
             sampling: self.sampling,
@@ -126,15 +144,24 @@ impl Output for Potree2Settings {
 
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
         let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
-        let metadata = metadata::metadata(cloud, self, &spacing, &choice, &tree.ledger, &hierarchy);
+        let names = Names::of(&notes::attributes(schema, &choice.kept));
+        let metadata = metadata::metadata(cloud, self, &spacing, &choice, &names, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
         to.write("metadata.json", json.as_bytes())?;
+        let seen = seen.total();
         let doubled = choice.kept.iter().filter_map(|&i| {
             let (attribute, changes) = (&schema.attributes[i], cloud.stats.doubled.get(i)?);
             changed(self.kind(), attribute, viewable(attribute.ty), changes)
         });
-        let (attributes_changed, warnings) = doubled.unzip();
+        let rounded = schema.rgb().and_then(|i| {
+            let attribute = &schema.attributes[i];
+            changed(self.kind(), attribute, attribute.ty, &seen.rounded)
+        });
+        let (attributes_changed, changes): (_, Vec<_>) = doubled.chain(rounded).unzip();
+        let mut warnings = self.foresee(schema, &choice.kept, &cloud.facts.crs);
+        warnings.extend(notes::seen(self, &seen, tree.ledger.points()));
+        warnings.extend(changes);
         Ok(OutputReport {
             points: tree.ledger.points(),
             duplicates_dropped: tree.ledger.duplicates_dropped(),
@@ -142,17 +169,26 @@ impl Output for Potree2Settings {
             attributes: cloud.names(choice.kept.iter().copied()),
             attributes_dropped: choice.dropped,
             attributes_changed,
+            attributes_renamed: names.renamed,
             warnings,
             bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
             checksum: tree.ledger.unaltered().to_string(),
             tree: metadata::tree_report(&tree),
-            details: Map::from_iter([("spacing".to_owned(), spacing.describe())]),
+            details: [("spacing".to_owned(), spacing.describe())].into_iter().chain(notes::details(&seen)).collect(),
             ..OutputReport::default()
         })
     }
 }
 
 impl Potree2Settings {
+    /// What to look for in the points.
+    fn watch(&self, cloud: &Cloud<'_>, kept: &[usize]) -> Watch {
+        let (schema, facts) = (cloud.schema(), &cloud.facts);
+        let is_deep = (0..cloud.sources.all.len()).any(|source| !facts.widening.is_narrow(source));
+        let attributes = kept.iter().map(|&i| (&schema.attributes[i], &facts.ranges[i]));
+        Watch::new(attributes, is_deep, self.dark_colours)
+    }
+
     /// Points of a subtree that one thread builds, for records of `stride` bytes.
     fn unit_points(&self, stride: usize) -> u64 {
         let (least, most) = UNIT_POINTS.into_inner();
@@ -171,13 +207,15 @@ struct Payloads<'a> {
     layout: OutputLayout,
     encoding: Encoding,
     events: &'a dyn Events,
+    watch: Watch,
+    seen: &'a AllSeen,
 }
 
 impl<'a> NodeSink for Payloads<'a> {
     type Encoder = PayloadEncoder<'a>;
 
     fn encoder(&self) -> PayloadEncoder<'a> {
-        PayloadEncoder::new(self.layout.clone(), self.encoding, self.events)
+        PayloadEncoder::new(self.layout.clone(), self.encoding, self.events).watching(self.watch.clone(), self.seen)
     }
 
     fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {

@@ -10,6 +10,7 @@ use pointmill_format::{Attribute, AttributeType, NodeKey, WriteError};
 
 use super::layout::OutputLayout;
 use super::settings::Encoding;
+use super::watch::{AllSeen, Seen, Watch};
 use crate::cloud::{Checksum, copy_record};
 use crate::error::ConvertError;
 use crate::octree::NodeEncoder;
@@ -37,6 +38,7 @@ pub(crate) struct PayloadEncoder<'a> {
     layout: OutputLayout,
     encoding: Encoding,
     attributes: Arc<[Attribute]>,
+    watch: Option<(Watch, &'a AllSeen)>,
     tile: Vec<u8>,
     plain: Vec<u8>,
     scratch: BrotliScratch,
@@ -47,7 +49,13 @@ impl<'a> PayloadEncoder<'a> {
         let mut attributes = vec![Attribute::new("position", AttributeType::Int32, 3)];
         attributes.extend(layout.attributes.iter().cloned());
         let (tile, plain, scratch) = (Vec::new(), Vec::new(), BrotliScratch::default());
-        Self { events, layout, encoding, attributes: attributes.into(), tile, plain, scratch }
+        Self { events, layout, encoding, attributes: attributes.into(), watch: None, tile, plain, scratch }
+    }
+
+    /// Looks for values that viewers do not show as they are meant.
+    pub(super) fn watching(mut self, watch: Watch, seen: &'a AllSeen) -> Self {
+        self.watch = Some((watch, seen));
+        self
     }
 
     fn interleave<'r>(
@@ -59,6 +67,7 @@ impl<'a> PayloadEncoder<'a> {
         let stride = self.layout.stored_stride;
         out.reserve(records.len() * self.layout.stride);
         self.tile.resize(TILE_RECORDS * stride, 0);
+        let mut seen = Seen::default();
         loop {
             let mut count = 0;
             for (slot, record) in self.tile.chunks_exact_mut(stride).zip(&mut records) {
@@ -67,10 +76,17 @@ impl<'a> PayloadEncoder<'a> {
             }
             let tile = &self.tile[..count * stride];
             checksum.add_all(tile, stride);
+            let start = out.len();
             self.layout.write_all(tile, out);
+            if let Some((watch, _)) = &self.watch {
+                watch.look(&mut out[start..], self.layout.stride, &mut seen);
+            }
             if count < TILE_RECORDS {
                 break;
             }
+        }
+        if let Some((_, all)) = &self.watch {
+            all.add(&seen);
         }
     }
 }

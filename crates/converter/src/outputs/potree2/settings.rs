@@ -13,11 +13,39 @@ pub struct Potree2Settings {
     pub encoding: Encoding,
     /// A node with more points than this is divided, unless all of them share one position.
     pub leaf_capacity: u32,
+    /// Colour channels of 16 bits that viewers take for 8.
+    pub dark_colours: DarkColours,
 }
 
 impl Default for Potree2Settings {
     fn default() -> Self {
-        Self { sampling: Sampling::Poisson, spacing: None, encoding: Encoding::Default, leaf_capacity: 10_000 }
+        Self {
+            sampling: Sampling::Poisson,
+            spacing: None,
+            encoding: Encoding::Default,
+            leaf_capacity: 10_000,
+            dark_colours: DarkColours::Keep,
+        }
+    }
+}
+
+/// What becomes of channels of 1 to 255 of colours of 16 bits: viewers divide a channel by 256 if it is above 255, and
+/// show others as they are, too bright.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DarkColours {
+    /// They stay as they are.
+    Keep,
+    /// Those below 128 become 0, the others 256.
+    Round,
+}
+
+impl DarkColours {
+    /// The word in reports and datasets.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Keep => "keep",
+            Self::Round => "round",
+        }
     }
 }
 

@@ -46,9 +46,14 @@ pub(super) fn unit(proj4: &str) -> Unit {
     unit_of(proj4, "units", "to_meter").unwrap_or(Unit::METRE)
 }
 
+/// True if x, y and z are measured from the centre of the Earth.
+pub(super) fn is_geocentric(proj4: &str) -> bool {
+    matches!(value(proj4, "proj"), Some("geocent" | "cart"))
+}
+
 /// The unit of z, where it is said.
 pub(super) fn vertical_unit(proj4: &str) -> Option<Unit> {
-    let geocentric = || (value(proj4, "proj") == Some("geocent")).then(|| unit(proj4));
+    let geocentric = || is_geocentric(proj4).then(|| unit(proj4));
     unit_of(proj4, "vunits", "vto_meter").or_else(geocentric)
 }
 

@@ -75,6 +75,7 @@ fn from_wkt(text: &str, system: &WktSystem, found: &Crs) -> ResolvedCrs {
             ResolvedCrs { notes, unit: system.unit, ..ResolvedCrs::default() }
         }
     };
+    out.is_geocentric |= system.is_geocentric || system.proj4.as_deref().is_some_and(proj4::is_geocentric);
     if !system.is_whole {
         out.notes.push(CrsNote::CutWkt);
     }

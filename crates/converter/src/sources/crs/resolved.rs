@@ -22,6 +22,8 @@ pub struct ResolvedCrs {
     pub unit: Option<Unit>,
     /// Unit of z, where it is known: nothing is concluded from that of x and y.
     pub vertical_unit: Option<Unit>,
+    /// x, y and z are measured from the centre of the Earth, z along its axis.
+    pub is_geocentric: bool,
     /// What the user should know: why `projection` is empty although a system is named, that a unit is not the one of
     /// the code, or that WKT and GeoTIFF keys of one file disagree.
     pub notes: Vec<CrsNote>,
@@ -60,7 +62,8 @@ pub(super) fn from_code(code: u32, declared: Option<Unit>, false_easting: Option
         notes.push(CrsNote::FalseEasting { code, found, own });
     }
     let vertical_unit = proj4::vertical_unit(def.proj4);
-    ResolvedCrs { projection, wkt: None, label, unit: Some(unit), vertical_unit, notes }
+    let is_geocentric = proj4::is_geocentric(def.proj4);
+    ResolvedCrs { projection, wkt: None, label, unit: Some(unit), vertical_unit, is_geocentric, notes }
 }
 
 /// A definition knows degrees alone: that a system is in grads is in the WKT of the table.

@@ -58,6 +58,8 @@ pub(super) struct WktSystem {
     pub(super) vertical_epsg: Option<u32>,
     /// Unit of z, where the text says it.
     pub(super) vertical_unit: Option<Unit>,
+    /// The horizontal system is geocentric.
+    pub(super) is_geocentric: bool,
     /// Brackets and quotes are closed: the text is whole.
     pub(super) is_whole: bool,
 }
@@ -114,6 +116,7 @@ pub(super) fn read(text: &str) -> Option<WktSystem> {
         false_easting: false_easting(&elements, at),
         vertical_epsg: vertical.and_then(|v| epsg_of(&elements, v)),
         vertical_unit: vertical.map_or_else(|| third_unit(&elements, at), |v| unit_of(&elements, v, 0)),
+        is_geocentric: is_geocentric(&elements, at),
         is_whole,
     })
 }
@@ -167,6 +170,19 @@ fn children<'e>(elements: &'e [Element<'_>], of: usize) -> impl Iterator<Item = 
     (of + 1..elements.len())
         .take_while(move |&i| elements[i].depth > depth)
         .filter(move |&i| elements[i].depth == depth + 1)
+}
+
+/// True of `GEOCCS`, and of a geodetic system of WKT 2 with Cartesian axes.
+fn is_geocentric(elements: &[Element<'_>], of: usize) -> bool {
+    let is_cartesian =
+        |e: &Element<'_>| e.keyword.eq_ignore_ascii_case("CS") && e.values[0].trim().eq_ignore_ascii_case("Cartesian");
+    match elements[of].keyword {
+        keyword if is_one_of(keyword, &["GEOCCS"]) => true,
+        keyword => {
+            is_one_of(keyword, &["GEODCRS", "GEODETICCRS"])
+                && children(elements, of).any(|c| is_cartesian(&elements[c]))
+        }
+    }
 }
 
 fn is_one_of(keyword: &str, words: &[&str]) -> bool {
