@@ -54,3 +54,36 @@ fn whatever_order_the_inputs_come_in() {
     dir.write("list", b"scans/b.las\nscans/a.las\n");
     assert_eq!(bytes(&dir, &["--files-from", "list"]), forth);
 }
+
+#[test]
+fn whatever_a_header_says_of_the_bounds() {
+    let dir = Dir::new();
+    let honest = Las::terrain(150_000, 3).bytes();
+    // largest and least of x, then of y and z
+    let bounds = |file: &[u8]| -> Vec<f64> {
+        file[179..227].as_chunks::<8>().0.iter().map(|v| f64::from_le_bytes(*v)).collect()
+    };
+    let [max_x, min_x, ..] = bounds(&honest)[..] else { panic!("no bounds") };
+    let lies =
+        [[max_x, min_x], [max_x + 0.01, min_x], [max_x + 40.0, min_x - 3.0], [min_x + 5.0, min_x + 4.9], [9e4, -8e4]];
+    let formats = ["potree2", "bintree", "batches"];
+    let mut first = None;
+    for [max, min] in lies {
+        let mut file = honest.clone();
+        file[179..187].copy_from_slice(&max.to_le_bytes());
+        file[187..195].copy_from_slice(&min.to_le_bytes());
+        dir.write("a.las", &file);
+        let to = formats.iter().flat_map(|format| ["--to", format]);
+        let args = ["convert", "a.las", "-o", "out", "--overwrite", "--memory", "160MiB", "--threads", "2"];
+        let ended = dir.succeed(args.into_iter().chain(to));
+        assert!(!ended.stderr().contains("again"), "{}", ended.stderr());
+        let all = formats.map(|format| dataset(&dir.path("out").join(format)));
+        assert!(*first.get_or_insert(all.clone()) == all, "x from {min} to {max}");
+    }
+    dir.validate("out", &["a.las"]);
+    let metadata: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(dir.path("out/potree2/metadata.json")).unwrap()).unwrap();
+    let cube = &metadata["boundingBox"];
+    let [side, extent] = [cube["max"][0].as_f64().unwrap() - cube["min"][0].as_f64().unwrap(), max_x - min_x];
+    assert!((1.0..1.01).contains(&(side / extent)), "a cube of {side} around {extent}");
+}

@@ -65,3 +65,9 @@ pub(crate) struct SharedPlace {
 pub(crate) fn xyz(key: NodeKey) -> [u32; 3] {
     [key.x, key.y, key.z]
 }
+
+/// The node of a level with that Morton code.
+pub(crate) fn node(code: u64, level: u32) -> NodeKey {
+    let child = |key: NodeKey, l: u32| key.child((code >> (3 * l) & 7) as u8).unwrap_or(key);
+    (0..level).rev().fold(NodeKey::ROOT, child)
+}

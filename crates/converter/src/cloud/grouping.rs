@@ -40,12 +40,6 @@ pub(crate) struct Grouping {
 }
 
 impl Grouping {
-    /// Groups points, given the cell of each; cells come in ascending order of `rank`.
-    pub(crate) fn group(&mut self, cells: &[u64], rank: impl Fn(u64) -> u64) {
-        self.count(cells);
-        self.arrange(rank);
-    }
-
     /// Counts the points of each cell: `groups` are known then, in order of appearance. [`Self::arrange`] or
     /// [`Self::leave`] must follow.
     pub(crate) fn count(&mut self, cells: &[u64]) {
@@ -93,6 +87,13 @@ impl Grouping {
         }
     }
 
+    /// Keeps points of no known cell in the order in which they came.
+    pub(crate) fn keep(&mut self, points: usize) {
+        self.groups.clear();
+        self.order.clear();
+        self.order.extend(0..points as u32);
+    }
+
     /// Leaves the counted points in the order in which they came.
     pub(crate) fn leave(&mut self) {
         self.order.clear();
@@ -107,7 +108,8 @@ mod tests {
     #[test]
     fn grouping_keeps_every_point_once_and_cells_together_in_input_order() {
         let mut g = Grouping::default();
-        g.group(&[7, 7, 3, 7, 1, 3], |cell| cell);
+        g.count(&[7, 7, 3, 7, 1, 3]);
+        g.arrange(|cell| cell);
         let mut seen = 0;
         for &(cell, count) in &g.groups {
             let members = &g.order[seen..seen + count as usize];
@@ -120,5 +122,7 @@ mod tests {
         g.count(&[4, 4, 2]);
         g.leave();
         assert_eq!((&g.groups[..], &g.order[..]), (&[(4, 2), (2, 1)][..], &[0, 1, 2][..]));
+        g.keep(2);
+        assert!(g.groups.is_empty() && g.order == [0, 1]);
     }
 }

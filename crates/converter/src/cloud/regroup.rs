@@ -12,6 +12,14 @@ const POINTS: usize = 65_536;
 /// Bytes of wide records that are looked at together.
 const BYTES: usize = 4 << 20;
 
+/// What became of some records of one block.
+pub(crate) enum Sifted<'r> {
+    /// Those of a code lie behind one another.
+    Group { code: u64, segment: Segment, records: &'r [u8] },
+    /// As they came, since they have too many codes; and how many of them have each.
+    Loose { segment: Segment, codes: &'r [(u64, u32)] },
+}
+
 /// Regroups records; keeps its memory from one use to the next.
 pub(crate) struct Regrouper<'a> {
     store: &'a Store,
@@ -44,8 +52,24 @@ impl<'a> Regrouper<'a> {
     pub(crate) fn regroup<'s>(
         &mut self,
         segments: impl IntoIterator<Item = &'s Segment>,
-        mut code: impl FnMut(&[u8]) -> u64,
+        code: impl FnMut(&[u8]) -> u64,
         mut found: impl FnMut(u64, Segment),
+    ) -> Result<(), ConvertError> {
+        self.sift(segments, 0, code, |sifted| {
+            if let Sifted::Group { code, segment, .. } = sifted {
+                found(code, segment);
+            }
+        })
+    }
+
+    /// [`Self::regroup`], but records that are looked at together stay as they are if fewer than `least` of them have the
+    /// same code, on average.
+    pub(crate) fn sift<'s>(
+        &mut self,
+        segments: impl IntoIterator<Item = &'s Segment>,
+        least: usize,
+        mut code: impl FnMut(&[u8]) -> u64,
+        mut found: impl FnMut(Sifted<'_>),
     ) -> Result<(), ConvertError> {
         let mut source = None;
         for segment in segments {
@@ -63,24 +87,35 @@ impl<'a> Regrouper<'a> {
                 if let Some(source) = source.filter(|s| *s != from) {
                     // A block holds records of one source.
                     let rest = self.records.split_off(before);
-                    self.put_back(source, &mut code, &mut found)?;
+                    self.put_back(source, least, &mut code, &mut found)?;
                     self.records = rest;
                 }
                 source = Some(from);
                 if self.records.len() >= self.points * self.stride {
-                    self.put_back(from, &mut code, &mut found)?;
+                    self.put_back(from, least, &mut code, &mut found)?;
                 }
             }
         }
-        source.map_or(Ok(()), |source| self.put_back(source, &mut code, &mut found))
+        source.map_or(Ok(()), |source| self.put_back(source, least, &mut code, &mut found))
+    }
+
+    /// Copies the counted records group by group.
+    fn arrange(&mut self) {
+        self.grouping.arrange(|code| code);
+        self.sorted.clear();
+        self.sorted.reserve_exact(self.records.len());
+        for &i in &self.grouping.order {
+            self.sorted.extend_from_slice(&self.records[i as usize * self.stride..][..self.stride]);
+        }
     }
 
     /// Puts the records of one source into a new block.
     fn put_back(
         &mut self,
         source: u32,
+        least: usize,
         code: &mut impl FnMut(&[u8]) -> u64,
-        found: &mut impl FnMut(u64, Segment),
+        found: &mut impl FnMut(Sifted<'_>),
     ) -> Result<(), ConvertError> {
         let stride = self.stride;
         if self.records.is_empty() {
@@ -88,17 +123,21 @@ impl<'a> Regrouper<'a> {
         }
         self.codes.clear();
         self.codes.extend(self.records.chunks_exact(stride).map(code));
-        self.grouping.group(&self.codes, |code| code);
-        self.sorted.clear();
-        self.sorted.reserve_exact(self.records.len());
-        for &i in &self.grouping.order {
-            self.sorted.extend_from_slice(&self.records[i as usize * stride..][..stride]);
-        }
+        self.grouping.count(&self.codes);
         let block = self.store.open(source)?;
-        let mut start = 0;
-        for &(code, count) in &self.grouping.groups {
-            found(code, Segment { block, start, count });
-            start += count;
+        if self.grouping.groups.len() * least > self.codes.len() {
+            self.grouping.leave();
+            std::mem::swap(&mut self.records, &mut self.sorted);
+            let segment = Segment { block, start: 0, count: self.codes.len() as u32 };
+            found(Sifted::Loose { segment, codes: &self.grouping.groups });
+        } else {
+            self.arrange();
+            let mut start = 0;
+            for &(code, count) in &self.grouping.groups {
+                let records = &self.sorted[start as usize * stride..][..count as usize * stride];
+                found(Sifted::Group { code, segment: Segment { block, start, count }, records });
+                start += count;
+            }
         }
         self.records.clear();
         match self.is_for_all {

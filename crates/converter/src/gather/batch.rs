@@ -8,8 +8,10 @@ use pointmill_format::{Column, PointBatch, Positions};
 use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{Collected, Context};
+use super::loose::LOOSE_POINTS_PER_SEGMENT;
+use super::partition::morton_of;
 use super::visit::Visit;
-use super::{exact, moved, partition, ranges, select};
+use super::{exact, moved, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Group, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Reservation, os_hints};
@@ -25,12 +27,6 @@ const SLICE_POINTS: usize = 8_192;
 /// Points in no spatial order touch many cells; whole batches are then grouped at once, or the lists of segments would
 /// grow as large as the points.
 const MIN_POINTS_PER_SEGMENT: usize = 64;
-
-/// Whole batches with fewer points in a cell stay as they are, until all records are in and can be grouped together.
-const LOOSE_POINTS_PER_SEGMENT: usize = 32;
-
-/// A thread lists the records of that many cells; those of others stay as they are, too.
-const MOST_CELLS: usize = 1 << 16;
 
 /// One thread's part of the pass.
 pub(super) struct Worker<'a> {
@@ -138,24 +134,35 @@ impl<'a> Worker<'a> {
         let points = self.q.len();
         self.stats.points += points as u64;
         visit.seen.kept += points as u64;
+        let is_loose = self.group(is_scattered);
+        let (block, start) = self.room_for(visit.group, points)?;
+        self.assemble(&visit.intake.columns, columns, rows);
+        if is_loose {
+            let cells = self.grouping.groups.iter().map(|(cell, count)| (morton_of(*cell), *count));
+            self.collected.leave(Segment { block, start, count: points as u32 }, cells);
+        } else {
+            self.note_segments(block, start);
+        }
+        Ok(())
+    }
+
+    /// Puts the points in order of their cells; true if they stay as they are instead: no cells are known, or too many are
+    /// touched.
+    fn group(&mut self, is_scattered: bool) -> bool {
+        let points = self.q.len();
+        if !self.pass.partition.has_cells() {
+            self.grouping.keep(points);
+            return true;
+        }
         self.pass.partition.cells(&self.q, &mut self.cells);
         self.grouping.count(&self.cells);
         let is_loose = is_scattered && self.grouping.groups.len() * LOOSE_POINTS_PER_SEGMENT > points;
         if is_loose {
             self.grouping.leave();
         } else {
-            self.grouping.arrange(partition::morton_of);
+            self.grouping.arrange(morton_of);
         }
-        let (block, start) = self.room_for(visit.group, points)?;
-        self.assemble(&visit.intake.columns, columns, rows);
-        if is_loose {
-            self.collected.loose.push(Segment { block, start, count: points as u32 });
-            let census = &mut self.collected.census;
-            self.grouping.groups.iter().for_each(|(cell, count)| census.add(*cell, u64::from(*count)));
-        } else {
-            self.note_segments(block, start);
-        }
-        Ok(())
+        is_loose
     }
 
     /// The block that takes the next `points` records of a group, and the number of records it has.
@@ -264,22 +271,13 @@ impl<'a> Worker<'a> {
 
     fn note_segments(&mut self, block: u32, mut start: u32) {
         let mut first = 0;
-        let Collected { cells, loose, census, segments } = &mut self.collected;
-        *segments += self.grouping.groups.len() as u64;
         for &(cell, count) in &self.grouping.groups {
-            let segment = Segment { block, start, count };
-            census.add(cell, u64::from(count));
-            let is_full = cells.len() >= MOST_CELLS;
-            let part = if is_full { cells.get_mut(&cell) } else { Some(cells.entry(cell).or_default()) };
-            match part {
-                Some(part) => {
-                    part.segments.push(segment);
-                    if self.pass.wants_moments {
-                        part.moments.add_rows(&self.q, &self.grouping.order[first..first + count as usize]);
-                    }
+            let rows = &self.grouping.order[first..first + count as usize];
+            self.collected.add(morton_of(cell), Segment { block, start, count }, |moments| {
+                if self.pass.wants_moments {
+                    moments.add_rows(&self.q, rows);
                 }
-                None => loose.push(segment),
-            }
+            });
             first += count as usize;
             start += count;
         }

@@ -17,6 +17,9 @@ use crate::sources::Sources;
 /// Bytes of a list of segments beside the segments themselves.
 const SEGMENTS_BYTES: usize = 64;
 
+/// A thread lists the records of that many cells; those of others stay as they are.
+const MOST_CELLS: usize = 1 << 16;
+
 /// What the outputs need of the cloud beside attributes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Demand {
@@ -41,7 +44,7 @@ pub(super) struct Context<'a> {
     pub(super) store: Arc<Store>,
     pub(super) memory: &'a Arc<Pool>,
     pub(super) wants_moments: bool,
-    /// True once a point did not fit the partition: from then on only bounds are wanted.
+    /// True once a point could not be stored: from then on only bounds are wanted.
     pub(super) misled: AtomicBool,
 }
 
@@ -54,7 +57,7 @@ impl Context<'_> {
     }
 }
 
-/// The parts of cells that were seen, by packed cell.
+/// The parts of cells of one level that were seen, by Morton code.
 pub(super) type CellParts = HashMap<u64, CellPart, CellHash>;
 
 /// One thread's part of a cell.
@@ -84,6 +87,34 @@ pub(super) struct Collected {
 }
 
 impl Collected {
+    /// Adds records of a cell; `moments` adds them to what is known of the cell's.
+    pub(super) fn add(&mut self, cell: u64, segment: Segment, moments: impl FnOnce(&mut Moments)) {
+        self.census.add(cell, u64::from(segment.count));
+        self.segments += 1;
+        let is_full = self.cells.len() >= MOST_CELLS;
+        match if is_full { self.cells.get_mut(&cell) } else { Some(self.cells.entry(cell).or_default()) } {
+            Some(part) => {
+                part.segments.push(segment);
+                moments(&mut part.moments);
+            }
+            None => self.loose.push(segment),
+        }
+    }
+
+    /// Adds records that stay as they are, and how many of them each cell has.
+    pub(super) fn leave(&mut self, segment: Segment, cells: impl Iterator<Item = (u64, u32)>) {
+        self.loose.push(segment);
+        cells.for_each(|(cell, points)| self.census.add(cell, u64::from(points)));
+    }
+
+    /// All records, in order of block.
+    pub(super) fn everything(self) -> Segments {
+        let mut all = self.loose;
+        self.cells.into_values().for_each(|part| all.append(part.segments));
+        all.sort();
+        all
+    }
+
     /// Memory that all of it takes, bytes, about.
     pub(super) fn bytes(&self) -> u64 {
         // a table is up to half empty, and so is a list that grows

@@ -1,9 +1,10 @@
 //! From sources to the cloud: every point decoded once, put on the lattice of the run, and kept in blocks of records
 //! that are grouped by the cells of a coarse grid, in memory or in one spill file.
 //!
-//! Headers choose the lattice and the grid before the first point is read. Where the points prove them wrong, the pass is
-//! repeated with another lattice or the measured bounds; each pass makes its own, and the one that succeeds makes the
-//! cloud.
+//! Headers choose the lattice and the grid before the first point is read. Where the points have another cube than headers
+//! promise, or nothing is promised, records are grouped by its cells once all are in. Where they need another lattice, or do
+//! not fit the integers of records, the pass is repeated; each pass makes its own store, and the one that succeeds makes
+//! the cloud.
 
 mod axis;
 mod batch;
@@ -39,6 +40,7 @@ use crate::sources::{Fineness, Sources, far_out, intersection};
 use crate::warning::Warning;
 use far::FarPoints;
 use lattice::Loss;
+use partition::Hint;
 use pass::{Pass, PassEnd};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
@@ -66,7 +68,9 @@ pub(crate) fn gather<'a>(
 ) -> Result<Cloud<'a>, ConvertError> {
     let mut lattice = from_headers(plan, sources)?;
     let hint = sources.bounds_hint(plan.filter.bounds.as_ref());
-    let mut hint = hint.map(|bounds| quantized(&lattice.lattice, &bounds));
+    // What a box cuts has other bounds than the box, as a rule.
+    let is_promise = sources.declares_bounds() && plan.filter.bounds.is_none();
+    let mut hint = hint.map(|bounds| Hint { bounds: quantized(&lattice.lattice, &bounds), is_promise });
     let mut far_cut = None;
     for pass in 1..=MAX_PASSES {
         clock.begin(Phase::Read, sources.points_declared);
@@ -93,7 +97,7 @@ pub(crate) fn gather<'a>(
             && let Some((others, points, without)) = read.without_outliers(plan, sources, rt)?
         {
             warn(Warning::OutliersDropped { points, others });
-            hint = Some(quantized(&without.lattice, &others));
+            hint = Some(Hint { bounds: quantized(&without.lattice, &others), is_promise: false });
             (far_cut, lattice) = (Some(others), without);
             continue;
         }
@@ -102,17 +106,17 @@ pub(crate) fn gather<'a>(
         match (settled, complete) {
             (Some(other), None) => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(bounds);
+                hint = Some(Hint { bounds, is_promise: true });
                 lattice = other;
             }
             (Some(other), Some(_)) if pass < MAX_PASSES => {
                 warn(change_of_step(&lattice, &other));
-                hint = Some(bounds);
+                hint = Some(Hint { bounds, is_promise: true });
                 lattice = other;
             }
             (None, None) => {
                 warn(Warning::ReadAgain);
-                hint = Some(bounds);
+                hint = Some(Hint { bounds, is_promise: true });
             }
             (_, Some(mut gathered)) => {
                 if let Some(mark) = intake.mark {

@@ -1,8 +1,9 @@
-//! The coarse grid by which records are grouped while they are read, before the exact bounds are known.
+//! The coarse grid by which records are grouped while they are read: cells of the cube that the headers promise. Where the
+//! points have another cube, their records are grouped by its cells later ([`super::settle`]).
 
-use pointmill_format::{Lattice, NodeKey};
+use pointmill_format::Lattice;
 
-use crate::cloud::{ANCHOR_BITS, Cube, JobBounds, JobColumns, JobPoint, StoredOrigin, TREE_BITS, morton};
+use crate::cloud::{Cube, JobBounds, JobColumns, JobPoint, StoredOrigin, TREE_BITS, high, morton};
 
 /// Bits of a packed cell coordinate, per axis.
 const CELL_BITS: u32 = 21;
@@ -10,169 +11,152 @@ const CELL_BITS: u32 = 21;
 /// Aim of the grid: points in an occupied cell of a surface-like cloud.
 const POINTS_PER_CELL: u64 = 32_768;
 
+/// Levels of the grid, least and most.
+const LEVELS: (u32, u32) = (6, 8);
+
+/// Where the points are, as far as it is known before they are read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hint {
+    pub(super) bounds: JobBounds,
+    /// A header says so. Else the points will not have exactly these bounds.
+    pub(super) is_promise: bool,
+}
+
 /// Cells of the grid, and the frame in which records keep their integers.
 #[derive(Debug, Clone)]
 pub(super) struct Partition {
     /// What is stored as zeros.
     origin: StoredOrigin,
-    grid: Grid,
-}
-
-#[derive(Debug, Clone)]
-enum Grid {
-    /// Scales that are equal, or powers of two apart: cells of `2^shift` lattice steps on the absolute lattice. They are
-    /// octree nodes of any cube whose anchor is at least that coarse, so the bounds need not be known:
-    /// `cell = (q >> shift) - first`.
-    Absolute { shift: [u32; 3], first: [i64; 3] },
-    /// Other scales: cells of a cube that is believed until the bounds are known.
-    OfCube { cube: Box<Cube>, level: u32 },
+    /// The level of the octree that the cells have.
+    pub(super) level: u32,
+    /// The cube that is believed; `None`: cells would be of no use.
+    cube: Option<Cube>,
 }
 
 impl Partition {
-    /// A grid for about `points` points inside `hint`.
-    pub(super) fn choose(hint: Option<JobBounds>, lattice: &Lattice, points: u64) -> Self {
-        let hint = hint.unwrap_or(JobBounds::new([0; 3], [1 << 20; 3]));
-        let center: [i64; 3] = std::array::from_fn(|a| hint.min[a] / 2 + hint.max[a] / 2);
+    /// A grid for about `points` points.
+    pub(super) fn choose(hint: Option<Hint>, lattice: &Lattice, points: u64) -> Self {
+        let bounds = hint.map_or(JobBounds::new([0; 3], [1 << 20; 3]), |hint| hint.bounds);
+        let center: [i64; 3] = std::array::from_fn(|a| bounds.min[a] / 2 + bounds.max[a] / 2);
         // Integers of a single LAS file fit as they are; only far-apart lattices need another zero.
         let fits = |v: i64| i32::try_from(v).is_ok();
-        let origin = if hint.min.0.iter().chain(&hint.max.0).all(|v| fits(*v)) { [0; 3] } else { center };
+        let origin = if bounds.min.0.iter().chain(&bounds.max.0).all(|v| fits(*v)) { [0; 3] } else { center };
         // Surfaces: cells quadruple with each level.
-        let level = (points / POINTS_PER_CELL).max(1).ilog2().div_ceil(2).clamp(ANCHOR_BITS + 2, 8);
-        let cube = Cube::around(&hint, lattice);
-        let shift = match cube {
-            Ok(cube) => cube.aligned_shift(level).ok_or(cube),
-            Err(_) => Ok(Cube::largest_shift(lattice, level)),
-        };
-        let grid = match shift {
-            Ok(shift) => {
-                // whole multiples of what wider cells may span
-                let first = std::array::from_fn(|a| ((center[a] >> shift[a]) - (1 << (CELL_BITS - 1))) >> 8 << 8);
-                Grid::Absolute { shift, first }
-            }
-            Err(cube) => Grid::OfCube { cube: Box::new(cube), level },
-        };
-        Self { origin: StoredOrigin(JobPoint(origin)), grid }
+        let level = (points / POINTS_PER_CELL).max(1).ilog2().div_ceil(2).clamp(LEVELS.0, LEVELS.1);
+        let promised = hint.filter(|hint| hint.is_promise);
+        let cube = promised.and_then(|hint| Cube::around(&hint.bounds, lattice).ok());
+        Self { origin: StoredOrigin(JobPoint(origin)), level, cube }
     }
 
     pub(super) fn origin(&self) -> StoredOrigin {
         self.origin
     }
 
-    /// True if every point within `bounds` can be stored and has a cell.
+    /// True if every point within `bounds` can be stored.
     pub(super) fn holds(&self, bounds: &JobBounds) -> bool {
-        let stored = (0..3).all(|a| {
+        (0..3).all(|a| {
             let fits = |q: i64| q.checked_sub(self.origin.0[a]).is_some_and(|v| i32::try_from(v).is_ok());
             fits(bounds.min[a]) && fits(bounds.max[a])
-        });
-        stored
-            && match &self.grid {
-                Grid::Absolute { shift, first } => (0..3).all(|a| {
-                    (bounds.min[a] >> shift[a]) >= first[a] && (bounds.max[a] >> shift[a]) - first[a] < 1 << CELL_BITS
-                }),
-                Grid::OfCube { .. } => true,
-            }
+        })
     }
 
-    /// Packed cells of points that the partition holds.
+    /// True if points are to be grouped by its cells.
+    pub(super) fn has_cells(&self) -> bool {
+        self.cube.is_some()
+    }
+
+    /// True if its cells are nodes of that cube.
+    pub(super) fn is_of(&self, cube: &Cube) -> bool {
+        self.cube.as_ref() == Some(cube)
+    }
+
+    /// Packed cells of points. Those outside of the believed cube get some cell.
     pub(super) fn cells(&self, q: &JobColumns, out: &mut Vec<u64>) {
         out.clear();
+        let Some(cube) = &self.cube else { return };
         let [x, y, z] = &q.0;
         let points = x.iter().zip(y).zip(z);
-        match &self.grid {
-            Grid::Absolute { shift, first } => out.extend(points.map(|((x, y), z)| {
-                pack([
-                    ((x >> shift[0]) - first[0]) as u64,
-                    ((y >> shift[1]) - first[1]) as u64,
-                    ((z >> shift[2]) - first[2]) as u64,
-                ])
-            })),
-            Grid::OfCube { cube, level } => out.extend(points.map(|((x, y), z)| {
-                // Points outside the believed cube get some cell: the pass is then repeated anyway.
-                pack(cube.tree(JobPoint([*x, *y, *z])).cell(TREE_BITS - level).map(u64::from))
+        let last = (1 << self.level) - 1;
+        match cube.cell_factors(self.level) {
+            Some(factors) => {
+                let cell = |v: i64, a: usize| high(v.wrapping_sub(cube.min[a]) as u64, factors[a]).min(last);
+                out.extend(points.map(|((x, y), z)| pack([cell(*x, 0), cell(*y, 1), cell(*z, 2)])));
+            }
+            None => out.extend(points.map(|((x, y), z)| {
+                let cell = cube.tree(JobPoint([*x, *y, *z])).cell(TREE_BITS - self.level);
+                pack(cell.map(|c| u64::from(c).min(last)))
             })),
         }
     }
-
-    /// True if the cells are octree nodes of the final cube.
-    pub(super) fn fits(&self, cube: &Cube, bounds: &JobBounds) -> bool {
-        match &self.grid {
-            Grid::Absolute { shift, .. } => self.holds(bounds) && cube.is_anchored_on(*shift),
-            Grid::OfCube { cube: believed, .. } => self.holds(bounds) && **believed == *cube,
-        }
-    }
-
-    /// The octree node of a packed cell that is `wider` levels above those of the partition.
-    pub(super) fn node(&self, packed: u64, wider: u32, cube: &Cube) -> NodeKey {
-        let cell = unpack(packed);
-        match &self.grid {
-            Grid::Absolute { shift, first } => {
-                let at = |a: usize| cell[a] as i64 + (first[a] >> wider) - (cube.min[a] >> (shift[a] + wider));
-                let [x, y, z] = [0, 1, 2].map(|a| at(a) as u32);
-                NodeKey { level: (cube.level_of(*shift) - wider) as u8, x, y, z }
-            }
-            Grid::OfCube { level, .. } => {
-                let [x, y, z] = cell.map(|c| c as u32);
-                NodeKey { level: (*level - wider) as u8, x, y, z }
-            }
-        }
-    }
 }
 
-/// The cell `wider` levels above one of the partition.
-pub(super) fn coarser(packed: u64, wider: u32) -> u64 {
-    if wider == 0 { packed } else { pack(unpack(packed).map(|c| c >> wider)) }
+fn pack(cell: [u64; 3]) -> u64 {
+    cell[0] << (2 * CELL_BITS) | cell[1] << CELL_BITS | cell[2]
 }
 
-pub(super) fn pack(cell: [u64; 3]) -> u64 {
-    let mask = (1 << CELL_BITS) - 1;
-    (cell[0] & mask) << (2 * CELL_BITS) | (cell[1] & mask) << CELL_BITS | (cell[2] & mask)
-}
-
-/// Rank of a packed cell in Morton order.
+/// The Morton code of a packed cell.
 pub(super) fn morton_of(packed: u64) -> u64 {
-    morton::interleave(unpack(packed).map(|c| c as u32))
-}
-
-fn unpack(packed: u64) -> [u64; 3] {
     let mask = (1 << CELL_BITS) - 1;
-    [packed >> (2 * CELL_BITS) & mask, packed >> CELL_BITS & mask, packed & mask]
+    morton::interleave([packed >> (2 * CELL_BITS) & mask, packed >> CELL_BITS & mask, packed & mask].map(|c| c as u32))
 }
 
 #[cfg(test)]
 mod tests {
+    use pointmill_testkit::Random;
+
     use super::*;
 
-    fn check(hint: JobBounds, actual: JobBounds, scale: [f64; 3]) -> bool {
+    fn partition(bounds: JobBounds, scale: [f64; 3], points: u64) -> (Partition, Cube) {
         let lattice = Lattice { scale, offset: [0.0; 3] };
-        let partition = Partition::choose(Some(hint), &lattice, 20_000_000);
-        let cube = Cube::around(&actual, &lattice).unwrap();
-        if !partition.fits(&cube, &actual) {
-            return false;
-        }
-        // Every corner lies in the node that the partition names.
-        let mut cells = Vec::new();
-        for corner in 0..8 {
-            let q: [i64; 3] = std::array::from_fn(|a| if corner >> a & 1 == 0 { actual.min[a] } else { actual.max[a] });
-            partition.cells(&JobColumns(q.map(|v| vec![v])), &mut cells);
-            let node = partition.node(cells[0], 0, &cube);
-            assert_eq!([node.x, node.y, node.z], cube.tree(JobPoint(q)).cell(31 - u32::from(node.level)));
-        }
-        true
+        let hint = Some(Hint { bounds, is_promise: true });
+        (Partition::choose(hint, &lattice, points), Cube::around(&bounds, &lattice).unwrap())
     }
 
     #[test]
-    fn cells_are_octree_nodes_even_when_the_header_was_somewhat_wrong() {
-        let hint = JobBounds::new([1000, -70_000, 5], [101_000, 30_123, 9_000]);
-        assert!(check(hint, hint, [0.01; 3]));
-        let slightly_larger = JobBounds::new([900, -70_003, 5], [101_000, 31_123, 12_000]);
-        assert!(check(hint, slightly_larger, [0.01; 3]));
-        let half = JobBounds::new([1000, -30_000, 5], [40_000, 123, 9_000]);
-        assert!(check(hint, half, [0.01; 3]));
-        let tiny = JobBounds::new([1000; 3], [1300; 3]);
-        assert!(!check(hint, tiny, [0.01; 3]), "cells coarser than the anchor must be refused");
-        assert!(check(hint, slightly_larger, [0.25, 0.5, 0.125]), "powers of two apart");
-        assert!(check(hint, half, [0.25, 0.5, 0.125]));
-        assert!(check(hint, hint, [0.01, 0.01, 0.001]));
-        assert!(!check(hint, slightly_larger, [0.01, 0.01, 0.001]));
+    fn cells_are_nodes_of_the_promised_cube() {
+        let bounds = JobBounds::new([1000, -70_000, 5], [101_000, 30_123, 9_000]);
+        let mut random = Random::new(2);
+        for scale in [[0.01; 3], [0.25, 0.5, 0.125], [0.01, 0.01, 0.001], [0.3, 0.001, 40.0]] {
+            for points in [0, 20_000_000, 10_000_000_000] {
+                let (partition, cube) = partition(bounds, scale, points);
+                assert!(partition.has_cells() && partition.is_of(&cube));
+                let columns = JobColumns([0, 1, 2].map(|a| {
+                    let inside = (0..500).map(|_| bounds.min[a] + random.below(bounds.extent(a) + 1) as i64);
+                    [bounds.min[a], bounds.max[a]].into_iter().chain(inside).collect()
+                }));
+                let mut cells = Vec::new();
+                partition.cells(&columns, &mut cells);
+                for (i, cell) in cells.iter().enumerate() {
+                    let expected = morton::path(cube.tree(columns.point(i)), 31 - partition.level, partition.level);
+                    assert_eq!(morton_of(*cell), expected, "{scale:?} {:?}", columns.point(i));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn other_points_get_some_cell_and_other_bounds_are_another_cube() {
+        let bounds = JobBounds::new([1000, -70_000, 5], [101_000, 30_123, 9_000]);
+        let (partition, _) = partition(bounds, [0.01; 3], 20_000_000);
+        let far = [i64::MIN, -5, 999, 101_002, 1 << 40, i64::MAX].to_vec();
+        let mut cells = Vec::new();
+        partition.cells(&JobColumns([far.clone(), far.clone(), far]), &mut cells);
+        assert!(cells.iter().all(|cell| morton_of(*cell) < 1 << (3 * partition.level)));
+        let mut other = bounds;
+        other.max[0] += 2;
+        let lattice = Lattice { scale: [0.01; 3], offset: [0.0; 3] };
+        assert!(!partition.is_of(&Cube::around(&other, &lattice).unwrap()));
+        let hint = Hint { bounds, is_promise: false };
+        assert!(!Partition::choose(Some(hint), &lattice, 20_000_000).has_cells());
+        assert!(!Partition::choose(None, &lattice, 20_000_000).has_cells());
+    }
+
+    #[test]
+    fn integers_have_room_for_32_bits_around_their_zero() {
+        let far = 1 << 40;
+        let (partition, _) = partition(JobBounds::new([far; 3], [far + 1000; 3]), [0.01; 3], 1);
+        let bounds = |min: i64, max: i64| JobBounds::new([far, far, min], [far, far, max]);
+        assert!(partition.holds(&bounds(far - (1 << 31) + 500, far + (1 << 31) + 499)));
+        assert!(!partition.holds(&bounds(far, far + (1 << 31) + 500)));
     }
 }

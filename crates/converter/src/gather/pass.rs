@@ -10,11 +10,11 @@ use super::batch::Worker;
 use super::context::{CellPart, Collected, Context, Demand};
 use super::lattice::ulp;
 use super::loose::Grouper;
-use super::partition::Partition;
+use super::partition::{Hint, Partition};
 use super::visit::Visit;
 use crate::cloud::{
-    Cell, Census, CensusCell, Cube, Gathered, Intake, JobBounds, JobLattice, RecordFrame, SourceStats, Stats, Store,
-    morton, xyz,
+    Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, SourceStats, Stats, Store, morton, node,
+    xyz,
 };
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
@@ -32,7 +32,7 @@ const MIXED_LEVEL: u8 = 5;
 pub(super) enum PassEnd {
     /// All points are there.
     Complete(Box<Gathered>),
-    /// The bounds or the lattice do not fit the points, whose bounds are known now; nothing else of them is.
+    /// The points cannot be stored with these bounds or on this lattice; their bounds are known now, and nothing else of them.
     Misled(Box<Stats>),
     /// No point passed the filter (or there was none).
     Empty(Box<Stats>),
@@ -46,7 +46,7 @@ pub(super) struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    /// `hint`: the bounds that are believed; `far_cut`: the box of all points but outliers, which are dropped.
+    /// `hint`: where the points are thought to be; `far_cut`: the box of all points but outliers, which are dropped.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
         plan: &'a Plan,
@@ -54,7 +54,7 @@ impl<'a> Pass<'a> {
         intake: &'a Intake,
         demand: Demand,
         lattice: &'a JobLattice,
-        hint: Option<JobBounds>,
+        hint: Option<Hint>,
         far_cut: Option<Aabb>,
         rt: &'a Runtime<'a>,
     ) -> Self {
@@ -79,25 +79,30 @@ impl<'a> Pass<'a> {
 
     /// Reads every point.
     pub(super) fn run(self) -> Result<PassEnd, ConvertError> {
-        let (stats, collected, mut room) = self.read()?;
+        let (stats, mut collected, mut room) = self.read()?;
         let bounds = stats.bounds;
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
         }
         let Self { context: Context { partition, store, misled, intake, wants_moments, .. }, lattice, rt } = self;
         let cube = match Cube::around(&bounds, &lattice.lattice) {
-            Ok(cube) if !misled.into_inner() && partition.fits(&cube, &bounds) => cube,
+            Ok(cube) if !misled.into_inner() && partition.holds(&bounds) => cube,
             _ => return Ok(PassEnd::Misled(Box::new(stats))),
         };
         let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
+        let (grouper, level) = (Grouper { store: &store, frame: &frame, wants_moments, rt }, partition.level);
+        if !partition.is_of(&cube) {
+            let all = collected.everything();
+            room.resize(all.bytes())?;
+            (collected, room) = grouper.sift(&all, level)?;
+        }
         let Collected { cells, loose, census, .. } = collected;
-        let census = Census { cells: census.finish(&partition, &cube), bounds: HashMap::new() };
+        let census = Census { cells: census.finish(level), bounds: HashMap::new() };
         let mut nodes: Vec<(NodeKey, CellPart)> =
-            cells.into_iter().map(|(packed, part)| (partition.node(packed, 0, &cube), part)).collect();
+            cells.into_iter().map(|(code, part)| (node(code, level), part)).collect();
         if !loose.is_empty() {
             let level = level_of_loose(&nodes, loose.points(), stats.points);
             nodes = widened(nodes, level);
-            let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
             nodes.extend(grouper.group(&loose, u32::from(level))?);
         }
         let cells = finished(nodes);

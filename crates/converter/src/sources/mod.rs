@@ -194,6 +194,11 @@ impl Sources {
         (source, number - self.all.get(source).map_or(0, |s| s.first_unit as usize))
     }
 
+    /// True if headers say where all points are, as opposed to a sample.
+    pub(crate) fn declares_bounds(&self) -> bool {
+        self.all.iter().filter_map(|s| s.extent.as_ref()).all(|extent| !extent.is_sampled)
+    }
+
     /// What the headers claim (or a sample shows) of where the points are, cut by the filter; a hint.
     pub(crate) fn bounds_hint(&self, cut: Option<&Aabb>) -> Option<Aabb> {
         let extents = self.all.iter().filter_map(|s| s.extent.as_ref());

@@ -26,15 +26,10 @@ impl Geometry {
         self.lattice.scale.iter().copied().fold(0.0, f64::max)
     }
 
-    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube: nothing where steps are
-    /// whole numbers of these, else less than a unit on each axis.
+    /// What distances may lose because samplers of our own compare 31-bit fractions of the cube, rounded down: less than a
+    /// unit on each axis.
     pub(crate) fn sampling_slack(&self) -> f64 {
-        let side = self.cube.max[0] - self.cube.min[0];
-        let is_whole = |scale: &f64| {
-            let steps = (side / scale).round();
-            steps >= 1.0 && steps.log2().fract() == 0.0 && (side / scale - steps).abs() < 1e-6 * steps
-        };
-        if self.lattice.scale.iter().all(is_whole) { 0.0 } else { 2.0 * side / 31f64.exp2() }
+        2.0 * (self.cube.max[0] - self.cube.min[0]) / 31f64.exp2()
     }
 
     /// Spacing of a level, world units.
@@ -113,26 +108,40 @@ impl Geometry {
     }
 
     /// The cell of the node's grid that a stored position falls into, or `None` if it lies so close to the
-    /// border of a cell that rounding decides (within one lattice step, unless the cells are whole lattice steps).
+    /// border of a cell that rounding decides (within one lattice step, unless the side of the cube is whole steps).
     pub(crate) fn sample_cell(&self, level: u8, node: &Aabb, stored: [i32; 3]) -> Option<u64> {
-        let (mut cell, cells) = (0, self.cells());
+        let (mut cell, cells) = (0u64, self.cells());
         for (axis, stored) in stored.into_iter().enumerate() {
-            let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / cells;
-            let in_steps = side / self.lattice.scale[axis];
-            let origin = (node.min[axis] - self.lattice.offset[axis]) / self.lattice.scale[axis];
-            let whole = (in_steps - in_steps.round()).abs() < 1e-6 && (origin - origin.round()).abs() < 1e-3;
-            let u = if whole && in_steps >= 0.5 {
-                (f64::from(stored) - origin.round()) / in_steps.round()
-            } else {
-                let u = (f64::from(stored) - origin) / in_steps;
-                if (u - u.round()).abs() * in_steps <= 1.0 {
-                    return None;
+            let own = match self.whole_steps(axis) {
+                Some((steps, own)) => {
+                    let cells = cells as u128;
+                    let fraction = (u128::from(stored.unsigned_abs()) * own * cells) << level;
+                    (fraction / steps % cells) as u64
                 }
-                u
+                None => {
+                    let side = (self.cube.max[axis] - self.cube.min[axis]) / f64::from(level).exp2() / cells;
+                    let in_steps = side / self.lattice.scale[axis];
+                    let origin = (node.min[axis] - self.lattice.offset[axis]) / self.lattice.scale[axis];
+                    let u = (f64::from(stored) - origin) / in_steps;
+                    if (u - u.round()).abs() * in_steps <= 1.0 {
+                        return None;
+                    }
+                    u.floor().clamp(0.0, cells - 1.0) as u64
+                }
             };
-            cell = cell << 20 | (u.floor().clamp(0.0, cells - 1.0) as u64);
+            cell = cell << 20 | own;
         }
         Some(cell)
+    }
+
+    /// The side of the cube in steps of the finest axis, and how many of these a step of `axis` is, if both are whole but
+    /// for the rounding of the cube's corners.
+    fn whole_steps(&self, axis: usize) -> Option<(u128, u128)> {
+        let finest = self.lattice.scale.iter().copied().fold(f64::INFINITY, f64::min);
+        let (side, own) = (self.cube.max[axis] - self.cube.min[axis], self.lattice.scale[axis] / finest);
+        let steps = (side / finest).round();
+        let is_whole = (side - steps * finest).abs() <= self.tolerance(axis).min(finest / 4.0);
+        (is_whole && steps >= 1.0 && own.fract() == 0.0).then_some((steps as u128, own as u128))
     }
 }
 
@@ -198,10 +207,39 @@ mod tests {
 
     #[test]
     fn sample_cells_of_whole_steps_are_exact() {
-        let geometry = geometry(); // 8 steps a cell at the root
+        let mut geometry = geometry(); // 8 steps a cell at the root
         let node = geometry.node_box(NodeKey::ROOT);
         assert_eq!(geometry.sample_cell(0, &node, [8, 7, 1023]), Some(1 << 40 | 127));
         let coarse = Geometry { spacing: 0.016, ..geometry };
         assert_eq!(coarse.sample_cell(0, &node, [16, 15, 1023]), Some(1 << 40 | 63));
+        geometry.cube.max = geometry.cube.min.map(|v| v + 1.025);
+        // 1,025 steps: cells begin at multiples of 8.0078 steps, and of 4.0039 a level below
+        let cell = |level, x| geometry.sample_cell(level, &geometry.node_box(NodeKey::ROOT), [x, 0, 0]).unwrap() >> 40;
+        assert_eq!([7, 8, 9, 1024].map(|x| cell(0, x)), [0, 0, 1, 127]);
+        assert_eq!([4, 5, 512, 513].map(|x| cell(1, x)), [0, 1, 127, 0]);
+        geometry.lattice.scale[0] = 0.004;
+        let cell = |x| geometry.sample_cell(0, &geometry.node_box(NodeKey::ROOT), [x, 0, 0]).unwrap() >> 40;
+        assert_eq!([2, 3, 256].map(cell), [0, 1, 127], "steps of 4 finest ones");
+        geometry.lattice.scale[0] = 0.0013;
+        assert_eq!(geometry.sample_cell(0, &node, [6, 0, 0]), None, "6 of 6.16 steps");
+    }
+
+    #[test]
+    fn no_coordinate_is_near_a_border_of_a_cube_with_an_odd_number_of_steps() {
+        let mut geometry = geometry();
+        let steps = 1_000_001u64; // a kilometre of millimetres, 4,400 km away
+        geometry.cube.max = geometry.cube.min.map(|v| v + steps as f64 * 0.001);
+        for level in [1u8, 5, 12, 17] {
+            let first = |cell: u64| (cell * steps).div_ceil(1 << level) as i64;
+            for x in (0..1u64 << level).step_by(1 + (1 << level) / 4096) {
+                let key = NodeKey { level, x: x as u32, y: 0, z: (1 << level) - 1 };
+                let limits = geometry.node_limits(key);
+                let exact = [x, 0, (1 << level) - 1].map(|cell| (first(cell), first(cell + 1) - 1));
+                // outside of the cube there may be room for one more
+                assert_eq!(limits[0].0.max(0), exact[0].0, "{key:?}");
+                assert_eq!(limits[0].1.min(steps as i64 - 1), exact[0].1, "{key:?}");
+                assert_eq!((limits[1].1, limits[2].0), (exact[1].1, exact[2].0), "{key:?}");
+            }
+        }
     }
 }

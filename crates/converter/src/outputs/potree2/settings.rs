@@ -23,7 +23,7 @@ impl Default for Potree2Settings {
             sampling: Sampling::Poisson,
             spacing: None,
             encoding: Encoding::Default,
-            leaf_capacity: 10_000,
+            leaf_capacity: 20_000,
             dark_colours: DarkColours::Keep,
         }
     }
