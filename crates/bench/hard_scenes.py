@@ -28,7 +28,7 @@ RECORD = np.dtype([("xyz", "<i4", 3), ("intensity", "<u2"), ("flags", "u1"), ("c
                    ("user", "u1"), ("source", "<u2"), ("time", "<f8"), ("rgb", "<u2", 3)])
 
 
-def las(path, pieces, scale=0.001, extra=0):
+def las(path, pieces, scale=0.001, extra=0, offset=(0, 0, 0)):
     """LAS 1.2 with points of format 3 and `extra` undescribed bytes behind each."""
     record = np.dtype(RECORD.descr + ([("extra", "u1", extra)] if extra else []))
     count, least, greatest = 0, np.full(3, 2**31), np.full(3, -(2**31))
@@ -47,9 +47,9 @@ def las(path, pieces, scale=0.001, extra=0):
             least, greatest = np.minimum(least, xyz.min(0)), np.maximum(greatest, xyz.max(0))
         header = struct.pack("<4sHHIHH8sBB32s32sHHHIIBHI5I", b"LASF", 0, 0, 0, 0, 0, bytes(8), 1, 2, b"", b"", 1, 2026,
                              227, 227, 0, 3, record.itemsize, count, count, 0, 0, 0, 0)
-        header += struct.pack("<6d", scale, scale, scale, 0, 0, 0)
+        header += struct.pack("<6d", scale, scale, scale, *offset)
         for a in range(3):
-            header += struct.pack("<2d", greatest[a] * scale, least[a] * scale)
+            header += struct.pack("<2d", greatest[a] * scale + offset[a], least[a] * scale + offset[a])
         out.seek(0)
         out.write(header)
 

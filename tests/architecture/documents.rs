@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-/// Options in the documents that are not pointmill's: of cargo, and of `side_by_side` and `trade_offs` in the bench crate.
+/// Options in the documents that are not pointmill's: of cargo, and of the programs and scripts in the bench crate.
 const OTHER_OPTIONS: &[&str] = &[
     "--all-features",
     "--bin",
@@ -20,6 +20,8 @@ const OTHER_OPTIONS: &[&str] = &[
     "--path",
     "--points",
     "--profile",
+    "--quality",
+    "--raise",
     "--release",
     "--runs",
     "--scene",
