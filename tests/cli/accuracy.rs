@@ -75,15 +75,15 @@ fn planes_that_are_left_out_cost_what_is_said() {
 fn single_precision_in_a_long_leaf_costs_what_is_said() {
     let las = millimetres(&[[0; 3], [123_456_789, 987_654_321, 0], [i32::MAX - 1, i32::MAX - 1, 0]]);
     let (dir, ended) = convert(&las, &["--to", "bintree"]);
-    let line = "bintree: decoded coordinates are off by at most 0.0729 (by axis 0.0516 0.0516 0)";
+    let line = "bintree: decoded coordinates are off by at most 0.0736 (by axis 0.052 0.052 0)";
     assert!(ended.stderr().contains(line), "{}", ended.stderr());
     let found = accuracy(&dir);
-    assert!(near(&found["format"]["max"][0], 0.0515), "{found}");
-    assert!(near(&found["format"]["mean"][0], -0.028 / 3.0), "{found}");
+    assert!(near(&found["format"]["max"][0], 0.052), "{found}");
+    assert!(near(&found["format"]["mean"][0], -0.0095), "{found}");
     assert_eq!(found["integers"], json!({"points": 3, "same": 0}));
     assert_eq!(found["merged"], json!({"lattice": 0, "format": 0}));
     dir.validate("out", &["a.las"]);
-    edit(&dir, |a| a["format"]["max"][0] = json!(0.0514));
+    edit(&dir, |a| a["format"]["max"][0] = json!(0.0519));
     assert!(self::found(&dir).contains("max of the format in the report"));
 }
 
