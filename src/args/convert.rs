@@ -43,7 +43,8 @@ pub(crate) struct ConvertArgs {
           help = format!("Brotli quality, 0 (fast) to 11 (small), for --encoding brotli [default: {BROTLI_QUALITY}]"))]
     pub(crate) brotli_quality: Option<u8>,
     /// How inner nodes select their points: poisson (maximal Poisson-disk sample), grid (the point nearest to the
-    /// centre of each cell of a 128³ grid), or random (one pseudo-random point per cell) [default: poisson]
+    /// centre of each cell of a grid, by default of 128³ cells), or random (one pseudo-random point per cell)
+    /// [default: poisson]
     #[arg(long, value_enum, help_heading = "Output")]
     pub(crate) sampling: Option<SamplingArg>,
     #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true,
