@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use pointmill_converter::{Plan, Potree2Settings, Sampling, Silent, convert};
+use pointmill_converter::{Duplicates, Plan, Potree2Settings, Sampling, Silent, convert};
 use pointmill_format::NodePoints;
 use pointmill_format::potree2::{Dataset, Node};
 use pointmill_testkit::Random;
@@ -103,4 +103,30 @@ fn points_of_a_level_keep_their_distance_over_borders() {
         }
         [plenty, scarce].iter().for_each(|out| fs::remove_dir_all(out).unwrap());
     }
+}
+
+#[test]
+fn nodes_are_leaves_by_what_is_left_when_duplicates_are_dropped() {
+    let dir = tempfile::tempdir().unwrap();
+    let scan = dir.path().join("scan.las");
+    let mut four_times = planes_on_borders(100_000);
+    four_times.points = four_times.points.repeat(4);
+    fs::write(&scan, four_times.bytes()).unwrap();
+    let outs = [("plenty", 2, 4u64 << 30), ("scarce", 1, 100 << 20)].map(|(name, threads, memory_bytes)| {
+        let out = dir.path().join(name).join("out");
+        let mut plan = Plan::new(vec![scan.clone()], out.clone());
+        (plan.threads, plan.memory_bytes, plan.duplicates) = (threads, memory_bytes, Duplicates::Drop);
+        let report = convert(&plan, &[Potree2Settings::default().into()], &Silent).unwrap();
+        assert!(report.outputs[0].points <= 100_000);
+        let nodes = Dataset::open(&out).unwrap().read_hierarchy().unwrap();
+        let points: Vec<(pointmill_format::NodeKey, u64)> =
+            nodes.iter().map(|n| (n.key, u64::from(n.record.points))).collect();
+        for (key, _) in points.iter().filter(|(key, _)| nodes.iter().any(|n| n.key.parent() == Some(*key))) {
+            let below = points.iter().filter(|(k, _)| k.ancestor(key.level) == Some(*key)).map(|(_, n)| n);
+            assert!(below.sum::<u64>() > 20_000 - 2000, "{key:?} is divided");
+        }
+        fs::remove_file(out.join("report.json")).unwrap();
+        out
+    });
+    assert_same_dataset(&dataset(&outs[1]), &dataset(&outs[0]), "with other memory and threads");
 }

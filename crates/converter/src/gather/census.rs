@@ -20,7 +20,7 @@ impl Counts {
     /// Adds points of a cell.
     pub(super) fn add(&mut self, code: u64, points: u64) {
         *self.counts.entry(coarser(code, self.wider)).or_default() += points;
-        if self.counts.len() > MOST_CELLS {
+        while self.counts.len() > MOST_CELLS {
             self.widen(self.wider + 1);
         }
     }
@@ -32,7 +32,7 @@ impl Counts {
         other.widen(wider);
         for (code, points) in other.counts {
             *self.counts.entry(coarser(code, self.wider - wider)).or_default() += points;
-            if self.counts.len() > MOST_CELLS {
+            while self.counts.len() > MOST_CELLS {
                 self.widen(self.wider + 1); // what is still to come is `wider`, as before
             }
         }

@@ -1,5 +1,5 @@
 //! The coarse grid by which records are grouped while they are read: cells of the cube that the headers promise. Where the
-//! points have another cube, their records are grouped by its cells later ([`super::settle`]).
+//! points have another cube, their records are grouped by its cells later ([`super::loose`]).
 
 use pointmill_format::Lattice;
 

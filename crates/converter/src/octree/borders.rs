@@ -47,7 +47,7 @@ impl Borders {
         }
     }
 
-    /// Adds the points of `key` to `out`, as far as `filter` lets them through.
+    /// Hands the points of a node to `add`.
     fn get(&self, key: NodeKey, mut add: impl FnMut(TreePoint)) -> Result<(), ConvertError> {
         let nodes = self.nodes.read().unwrap_or_else(PoisonError::into_inner);
         match nodes.get(&key) {

@@ -144,6 +144,10 @@ impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, '_, E> {
         Ok(points)
     }
 
+    fn join(&mut self, lists: Vec<Vec<u32>>) -> Result<Vec<u32>, ConvertError> {
+        Ok(lists.concat())
+    }
+
     fn take_middle(&mut self, from: &mut Vec<u32>) -> Result<Vec<u32>, ConvertError> {
         Ok(vec![from.remove(from.len() / 2)])
     }

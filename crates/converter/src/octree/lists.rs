@@ -63,7 +63,7 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
         level: u8,
         mut list: List,
         taken: &mut Writer,
-        is_short: bool,
+        reserved: u64,
     ) -> Result<List, ConvertError> {
         if list.is_one_place {
             // of points that share a place a sample takes the first, if any
@@ -85,19 +85,19 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
             if part.records.len() >= PART_BYTES {
                 let cut = part.trees.windows(2).rposition(|w| self.sampler.may_be_cut(level, w[0], w[1]));
                 self.choose(&mut part, cut.map_or(0, |i| i + 1), taken, &mut rest)?;
-                self.account(is_short)?;
+                self.account(reserved)?;
             }
         }
         let all = part.trees.len();
         self.choose(&mut part, all, taken, &mut rest)?;
-        self.account(is_short)?;
+        self.account(reserved)?;
         self.memory.part = part;
         rest.finish(self.lists)
     }
 
-    /// Accounts for what the sampler has, if that was not done beforehand.
-    fn account(&mut self, is_short: bool) -> Result<(), ConvertError> {
-        if is_short { self.memory.sampled.grow_to(self.sampler.bytes()) } else { Ok(()) }
+    /// Accounts for what the sampler has beyond `reserved`.
+    fn account(&mut self, reserved: u64) -> Result<(), ConvertError> {
+        self.memory.sampled.grow_to(self.sampler.bytes().saturating_sub(reserved.max(USUAL_SAMPLE_BYTES)))
     }
 
     /// Decides about the first `count` candidates of a part.
@@ -124,7 +124,7 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<List>]) -> Result<List, ConvertError> {
         let candidates = children.iter().map(|c| c.points.count()).sum();
         let mut side_by_side = Some(self.lists.large.read().unwrap_or_else(PoisonError::into_inner));
-        let expected = Sampler::expected_bytes(candidates);
+        let expected = self.sampler.expected_bytes(candidates);
         let room = self.pool.try_take(Consumer::Work, expected).then(|| {
             Reservation::of(self.pool, Consumer::Work, expected) // given back when the node has its sample
         });
@@ -139,7 +139,8 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
         let mut taken = Writer::new(candidates);
         for child in children {
             let list = std::mem::replace(&mut child.points, List::empty());
-            child.points = self.sample_child(key.level, list, &mut taken, alone.is_some())?;
+            let reserved = if alone.is_some() { 0 } else { expected };
+            child.points = self.sample_child(key.level, list, &mut taken, reserved)?;
         }
         self.borders.note(key, self.sampler.border());
         if self.sampler.bytes() > USUAL_SAMPLE_BYTES {
@@ -147,6 +148,17 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
         }
         self.memory.sampled.resize(0)?;
         taken.finish(self.lists)
+    }
+
+    fn join(&mut self, lists: Vec<List>) -> Result<List, ConvertError> {
+        let mut all = Writer::new(lists.iter().map(Points::count).sum());
+        for list in &lists {
+            self.lists.each(list, |records| {
+                records.chunks_exact(self.lists.stride).try_for_each(|record| all.push(record, self.lists))?;
+                Ok(true)
+            })?;
+        }
+        all.finish(self.lists)
     }
 
     fn take_middle(&mut self, from: &mut List) -> Result<List, ConvertError> {

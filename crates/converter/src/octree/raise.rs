@@ -38,6 +38,9 @@ pub(super) trait Nodes<L: Points> {
     /// Chooses the points of the node above `children`; these keep the rest.
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<L>]) -> Result<L, ConvertError>;
 
+    /// The points of lists that follow one another, in one.
+    fn join(&mut self, lists: Vec<L>) -> Result<L, ConvertError>;
+
     /// Moves the middle one of a list into a list of its own.
     fn take_middle(&mut self, from: &mut L) -> Result<L, ConvertError>;
 
@@ -76,6 +79,22 @@ impl<L: Points> Pending<L> {
             node.write_children(nodes)?;
         }
         Ok(node)
+    }
+
+    /// The node above `children`: a leaf if they have no more than `capacity` points together, as where duplicates were
+    /// dropped.
+    pub(super) fn above_or_leaf(
+        key: NodeKey,
+        children: Vec<Self>,
+        capacity: u32,
+        nodes: &mut impl Nodes<L>,
+    ) -> Result<Self, ConvertError> {
+        let points: u64 = children.iter().map(|c| c.points.count()).sum();
+        if points > u64::from(capacity) || children.iter().any(|c| c.is_inner) {
+            return Self::above(key, children, nodes);
+        }
+        let points = nodes.join(children.into_iter().map(|c| c.points).collect())?;
+        Ok(Self::leaf(key, points))
     }
 
     /// True if nothing above can take so many points that the node needs one from below.

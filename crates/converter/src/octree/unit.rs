@@ -94,7 +94,8 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
             overfull_leaves += overfull;
             stack.push(root);
             let following = chunks.get(i + 1).map(|c| c.key);
-            climb(&mut stack, key, following, &mut self.nodes(&mut borders, &mut finished))?;
+            let capacity = self.shared.plan.leaf_capacity;
+            climb(&mut stack, key, following, capacity, &mut self.nodes(&mut borders, &mut finished))?;
         }
         match (stack.pop(), stack.is_empty()) {
             (Some(root), true) => self.finish(root, borders, finished, ledger, overfull_leaves).map(Some),
@@ -106,7 +107,8 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
     pub(super) fn above(&mut self, key: NodeKey, children: Vec<Pending<List>>) -> Result<BuiltUnit, ConvertError> {
         let mut borders = UnitBorders::new(&self.shared.borders, key);
         let mut finished = Finished::default();
-        let root = Pending::above(key, children, &mut self.nodes(&mut borders, &mut finished))?;
+        let capacity = self.shared.plan.leaf_capacity;
+        let root = Pending::above_or_leaf(key, children, capacity, &mut self.nodes(&mut borders, &mut finished))?;
         self.finish(root, borders, finished, Ledger::default(), 0)
     }
 
@@ -157,6 +159,7 @@ fn climb(
     stack: &mut Vec<Pending<List>>,
     top: NodeKey,
     following: Option<NodeKey>,
+    capacity: u32,
     nodes: &mut impl Nodes<List>,
 ) -> Result<(), ConvertError> {
     while let Some(parent) = stack.last().filter(|last| last.key != top).and_then(|last| last.key.parent()) {
@@ -165,7 +168,7 @@ fn climb(
         }
         let first = stack.iter().rposition(|n| n.key.parent() != Some(parent)).map_or(0, |i| i + 1);
         let children = stack.split_off(first);
-        stack.push(Pending::above(parent, children, nodes)?);
+        stack.push(Pending::above_or_leaf(parent, children, capacity, nodes)?);
     }
     Ok(())
 }

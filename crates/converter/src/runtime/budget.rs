@@ -11,8 +11,9 @@ const FIXED_BYTES: u64 = 32 << 20;
 /// points are grouped.
 const GATHER_BYTES: u64 = 20 << 20;
 
-/// What a building thread has beside the chunk that it builds: the sampler's grid, buffers of encoders.
-const BUILD_BYTES: u64 = 6 << 20;
+/// What a building thread has beside the chunk that it builds: the sampler's grid and candidates, records of a node and of a
+/// part of one, buffers of encoders.
+const BUILD_BYTES: u64 = 10 << 20;
 
 /// Less than this in the pool is not worth beginning.
 const LEAST_POOL_BYTES: u64 = 32 << 20;
@@ -165,16 +166,16 @@ impl Budget {
     }
 }
 
-/// The same of a chunk whose payloads are part of a larger unit: records, tree coordinates, keys twice, points and lists;
-/// and copies of what the nodes above take.
-fn chunk_point_in_unit(stride: usize) -> u64 {
-    2 * stride as u64 + 12 + 16 + 16 + 8
-}
-
 /// A chunk's records, tree coordinates, keys twice, points and lists; and its share of finished payloads in flight.
 fn bytes_per_chunk_point(stride: usize, window: u64, threads: u64) -> u64 {
     let stride = stride as u64;
     stride + 12 + 16 + 16 + 8 + stride * (window / threads + 1)
+}
+
+/// The same of a chunk whose payloads are part of a larger unit: records, tree coordinates, keys twice, points and lists;
+/// and copies of what the nodes above take.
+fn chunk_point_in_unit(stride: usize) -> u64 {
+    2 * stride as u64 + 12 + 16 + 16 + 8
 }
 
 #[cfg(test)]

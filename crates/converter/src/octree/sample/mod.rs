@@ -69,8 +69,11 @@ impl Sampler {
     }
 
     /// Memory that a node of so many candidates needs at most, bytes.
-    pub(crate) fn expected_bytes(candidates: u64) -> u64 {
-        poisson::expected_bytes(candidates)
+    pub(crate) fn expected_bytes(&self, candidates: u64) -> u64 {
+        match &self.method {
+            Method::Poisson(p) => p.expected_bytes(candidates),
+            Method::Cells { .. } => 0,
+        }
     }
 
     /// Says how many candidates of the node there will be.

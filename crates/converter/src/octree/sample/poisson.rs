@@ -32,20 +32,14 @@ const MARGIN: f32 = 3e-6;
 
 const LANES: usize = 8;
 
-/// More points of a node cannot be that far apart: spheres as dense as they can be packed, and some over the border.
-const MOST_TAKEN: u64 = 3_200_000;
-
-/// Memory that the points taken of so many candidates need at most, bytes.
-pub(super) fn expected_bytes(candidates: u64) -> u64 {
-    candidates.min(MOST_TAKEN) * size_of::<TreePoint>() as u64
-}
-
 /// The grid, kept from node to node; all empty in between.
 pub(super) struct Poisson {
     /// Squared distances (in squared units) below this conflict.
     conflict_below: f32,
     /// Of the spacing, in units; at most 1.
     reach: f64,
+    /// More points of a node cannot be that far apart: spheres as dense as they can be packed, and some over the border.
+    most_taken: u64,
     /// A node has `2^grid_bits` cells along each axis.
     grid_bits: u32,
     /// One bit for each cell from which a point was taken, a word for each column of cells: bit z of word (x, y).
@@ -140,6 +134,7 @@ impl Poisson {
         Self {
             conflict_below: (reach * reach) as f32 + MARGIN,
             reach,
+            most_taken: (2f64.sqrt() * (spacing.divisor() + 2.0).powi(3)) as u64,
             grid_bits,
             occupied: vec![0; 1 << (2 * grid_bits)],
             ranges: vec![Range::default(); 1 << (3 * grid_bits)],
@@ -154,10 +149,15 @@ impl Poisson {
         self.taken.clear();
     }
 
+    /// Memory that the points taken of so many candidates need at most, bytes.
+    pub(super) fn expected_bytes(&self, candidates: u64) -> u64 {
+        candidates.min(self.most_taken) * size_of::<TreePoint>() as u64
+    }
+
     /// Makes room for what a node may take of so many candidates, so that the list never moves: what is not touched costs
     /// no memory.
     pub(super) fn expect(&mut self, candidates: u64) {
-        self.taken.reserve_exact(candidates.min(MOST_TAKEN) as usize);
+        self.taken.reserve_exact(candidates.min(self.most_taken) as usize);
     }
 
     /// Memory of the points taken so far, bytes.

@@ -30,6 +30,9 @@ const POINTS_PER_CELL: f64 = 0.46;
 /// The level of these cells.
 const CELL_LEVEL: u8 = 7;
 
+/// The level at which occupied cells are counted: the census has it of every cloud.
+const COUNTED_LEVEL: u8 = 6;
+
 /// A spacing, and why it was chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ChosenSpacing {
@@ -110,7 +113,7 @@ impl Surface {
             let mut is_new = |key: Option<NodeKey>| last.replace(key) != Some(key);
             cells.iter().map(|c| c.key.ancestor(level)).filter(|key| is_new(*key)).count() as f64
         };
-        let level = cells.first().map_or(0, |c| c.key.level).min(CELL_LEVEL);
+        let level = cells.first().map_or(0, |c| c.key.level).min(COUNTED_LEVEL);
         let Some(above) = level.checked_sub(1) else { return Self { cells: 1.0, dimension: 0.0 } };
         let dimension = (count(level) / count(above)).log2().clamp(0.0, 3.0);
         Self { cells: count(level) * (dimension * f64::from(CELL_LEVEL - level)).exp2(), dimension }
