@@ -77,7 +77,10 @@ fn a_signal_at_any_moment_ends_the_run_within_a_second() {
             _ => {
                 assert_eq!(ended.code(), 130, "{}", ended.stderr());
                 assert!(ended.stderr().contains("interrupted"), "{}", ended.stderr());
-                assert_eq!(ended.stderr().lines().count(), 1, "{}", ended.stderr());
+                // beside what a run that was nearly over has to warn of
+                let said = ended.stderr();
+                let lines = said.lines().filter(|line| !line.starts_with("pointmill: warning: "));
+                assert_eq!(lines.count(), 1, "{said}");
                 stopped += 1;
                 ended
             }
