@@ -119,6 +119,22 @@ fn the_spacing_of_an_octree_can_be_chosen() {
 }
 
 #[test]
+fn single_points_taken_back_from_far_below_are_no_holes() {
+    let dir = Dir::new();
+    for seed in [2, 5, 7, 9, 11] {
+        let mut random = pointmill_testkit::Random::new(seed);
+        let mut at = || random.below(127) as i32;
+        let mut positions: Vec<[i32; 3]> = (0..12_000).map(|_| [at(), at(), at()]).collect();
+        positions.extend([[0; 3], [126; 3]]);
+        dir.write("a.las", &Las::numbered(positions).bytes());
+        // side / 16 of 129 steps of a centimetre
+        let options = ["--leaf-capacity", "1", "--spacing", "0.08", "--overwrite"];
+        dir.succeed(["convert", "a.las", "-q", "-o", "out"].iter().chain(&options));
+        dir.validate("out", &["a.las"]);
+    }
+}
+
+#[test]
 fn what_a_scene_drops_as_constant_is_checked_by_the_validator() {
     let dir = Dir::new();
     let mut scan = Las::terrain(500, 1);

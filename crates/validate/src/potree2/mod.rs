@@ -7,7 +7,7 @@
 //!   cube, or nothing but the last bits of doubles where steps are whole numbers of them; of others, one step of the
 //!   lattice.
 //! * Sides of the cube against each other: 10⁻⁹, relative, and two ulps of its largest coordinate; spacing: any
-//!   from side / 1024 to side / 32 is usual.
+//!   from side / 1024 to side / 16 is usual.
 //! * Attributes, counts, byte ranges, checksums: none.
 //!
 //! # Memory

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pointmill_format::potree2::{Dataset, Encoding, Node};
-use pointmill_format::{ErrorKind, NodePoints, ReadError};
+use pointmill_format::{ErrorKind, NodeKey, NodePoints, ReadError};
 use rayon::prelude::*;
 
 use crate::accuracy::{Deviation, Ordered};
@@ -237,10 +237,12 @@ impl Walk<'_> {
     }
 
     fn check_coverage(&self, node: &TreeNode, positions: &[[i32; 3]], above: Option<&Above<'_>>) {
+        // The only point of a leaf may come from any level below: a node whose children are all gone took it back.
+        let of = if node.record.points == 1 { NodeKey::MAX_LEVEL } else { node.key.level };
         let mut next = above;
         while let Some(Above { level, grid, up }) = next {
             let tally = &self.tallies[usize::from(*level)];
-            let limit = coverage::limit(&self.task.geometry, self.task.sampling, *level, node.key.level);
+            let limit = coverage::limit(&self.task.geometry, self.task.sampling, *level, of);
             let drawn = coverage::Drawn { level: *level, limit, grid };
             coverage::check(node.key, positions, &drawn, &self.task.geometry, tally, self.task.findings);
             next = *up;

@@ -64,9 +64,9 @@ fn geometry(root: &Value, judge: &Judge) {
     let spacing = root["spacing"].as_f64().filter(|s| *s > 0.0);
     judge.that(spacing.is_some(), "spacing", "a number above 0", &root["spacing"]);
     if let Some(spacing) = spacing.filter(|_| cubic) {
-        let (least, most) = (side / 1024.0, side / 32.0);
+        let (least, most) = (side / 1024.0, side / 16.0);
         if !(least..=most).contains(&spacing) {
-            let usual = format!("side / 1024 to side / 32, which are {least} to {most}");
+            let usual = format!("side / 1024 to side / 16, which are {least} to {most}");
             judge.0.push(Finding::new(Check::Metadata, "spacing", usual, spacing).warning());
         }
     }
