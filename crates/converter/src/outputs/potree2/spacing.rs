@@ -16,12 +16,12 @@ const ROOT_POINTS: f64 = 20_000.0;
 /// reference converter (128, which keep less distance); more than the greatest would make nodes of a surface too large.
 const USUAL: std::ops::RangeInclusive<f64> = 148.0..=200.0;
 
+/// The same where cells are a power of two.
+const USUAL_CELLS: f64 = 128.0;
+
 /// A root of more points than this would keep a viewer waiting, and beyond its budget of points it is not drawn at all: a
 /// cloud that fills its cube gets fewer spacings.
 const MOST_ROOT_POINTS: f64 = 40_000.0;
-
-/// The same where cells are a power of two.
-const USUAL_CELLS: f64 = 128.0;
 
 /// Points of a Poisson sample with 128 spacings along the side of the cube, for each of 128³ cells that is occupied:
 /// 0.41 (a line) to 0.51 (terrain), measured.
