@@ -13,7 +13,7 @@ use super::values::{
     parse_compress, parse_planes, parse_scale, parse_threads, whole,
 };
 
-/// The Brotli quality for node payloads; above it the time grows several times over for a few per cent.
+/// The Brotli quality for node payloads; above 9 the time grows a hundred times for up to eight per cent.
 pub(crate) const BROTLI_QUALITY: u8 = pointmill_converter::Encoding::BROTLI_QUALITY;
 
 /// The seed of random sampling.
@@ -40,7 +40,7 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_enum, help_heading = "Output")]
     pub(crate) encoding: Option<EncodingArg>,
     #[arg(long, value_name = "N", value_parser = whole::<u8>(0..=11), allow_negative_numbers = true, help_heading = "Output",
-          help = format!("Brotli quality, 0 (fast) to 11 (small), for --encoding brotli [default: {BROTLI_QUALITY}]"))]
+          help = format!("Brotli quality, 0 (fast) to 11 (small), for --encoding brotli; 5 to 9 are one, by column [default: {BROTLI_QUALITY}]"))]
     pub(crate) brotli_quality: Option<u8>,
     /// How inner nodes select their points: poisson (maximal Poisson-disk sample), grid (the point nearest to the
     /// centre of each cell of a grid, by default of 128³ cells), or random (one pseudo-random point per cell)

@@ -1,7 +1,10 @@
 //! A node's records as Potree's BROTLI encoding keeps them.
 
+use std::ops::RangeInclusive;
+
 use crate::{Attribute, AttributeType, WriteError};
 
+use super::columns::{Column, ColumnEncoder, MAX_NUMBER};
 use super::metadata::planar_size;
 use super::{brotli, morton};
 use crate::geometry::morton::morton21;
@@ -21,12 +24,20 @@ pub struct BrotliScratch {
     sorted: Vec<u8>,
     /// The planes before compression.
     planar: Vec<u8>,
+    columns: ColumnEncoder,
 }
+
+/// At these qualities the planes are encoded as the columns of numbers that they are.
+const BY_COLUMN: RangeInclusive<u8> = 5..=9;
+
+/// Nodes of fewer points are left to the library: descriptions of codes would be most of the stream.
+const MIN_POINTS: usize = 64;
 
 /// Encodes the points of one node as one complete Brotli stream (window 22) and appends it to `out`.
 ///
 /// `records`: DEFAULT records of `attributes`, interleaved, in any order; `position` (int32 × 3) is the first
-/// attribute, an `rgb` is uint16 × 3. `quality`: 0–11. The points are sorted by the Morton code of their position, then
+/// attribute, an `rgb` is uint16 × 3. `quality`: 0–11; from 5 to 9 columns are encoded as what they are, for which the
+/// library's methods are slower and larger. The points are sorted by the Morton code of their position, then
 /// by the bytes of their records, so the result does not depend on the order of `records`.
 ///
 /// Positions are stored as they are. (PotreeConverter 2.1.1 stores every coordinate plus one.)
@@ -60,7 +71,22 @@ pub fn encode_brotli_while(
     check(attributes, records.len(), record_len)?;
     scratch.sort(records, record_len);
     scratch.planarise(attributes, record_len);
-    brotli::compress(&scratch.planar, quality, goes_on, out)
+    let columns = columns(attributes).filter(|_| BY_COLUMN.contains(&quality) && scratch.order.len() >= MIN_POINTS);
+    match columns {
+        Some(columns) => scratch.columns.encode(&scratch.planar, &columns, scratch.order.len(), goes_on, out),
+        None => brotli::compress(&scratch.planar, quality, goes_on, out),
+    }
+}
+
+/// What the planes of these attributes are; `None` if there are wider ones than numbers.
+fn columns(attributes: &[Attribute]) -> Option<Vec<Column>> {
+    let column = |a: &Attribute| match (a.name.as_str(), a.size()) {
+        ("position", _) => Some(Column::Positions),
+        ("rgb", _) => Some(Column::Colours),
+        (_, size @ 1..=MAX_NUMBER) => Some(Column::Numbers(size)),
+        _ => None,
+    };
+    attributes.iter().map(column).collect()
 }
 
 fn check(attributes: &[Attribute], len: usize, record_len: usize) -> Result<(), WriteError> {

@@ -30,6 +30,7 @@
 mod brotli;
 mod chunk;
 mod chunk_cut;
+mod columns;
 mod dataset;
 mod encode_brotli;
 mod encode_hierarchy;

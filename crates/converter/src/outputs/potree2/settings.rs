@@ -63,6 +63,6 @@ pub enum Encoding {
 }
 
 impl Encoding {
-    /// Brotli's knee for node payloads: above it the time grows several times over for a few per cent.
+    /// The first quality that encodes by column: above 9 the time grows a hundred times for up to eight per cent.
     pub const BROTLI_QUALITY: u8 = 5;
 }
