@@ -110,6 +110,7 @@ mod tests {
     use std::path::PathBuf;
 
     use pointmill_bench::las_file;
+    use pointmill_bench::las_layout::{self, LasLayout};
     use pointmill_bench::scene::Scene;
 
     use super::*;
@@ -119,7 +120,7 @@ mod tests {
 
     fn scene(dir: &Path, scene: Scene, ending: &str) -> PathBuf {
         let path = dir.join(format!("{}.{ending}", scene.name()));
-        las_file::write(scene, POINTS, 7, &path).unwrap();
+        las_file::write(scene, LasLayout::COLOUR, POINTS, 7, &path).unwrap();
         path
     }
 
@@ -133,7 +134,7 @@ mod tests {
     /// the order of potree2.
     fn expected(las: &Path) -> Vec<Vec<u8>> {
         let bytes = std::fs::read(las).unwrap();
-        let points: Vec<&[u8]> = bytes[227..].chunks(las_file::RECORD_LEN).collect();
+        let points: Vec<&[u8]> = bytes[227..].chunks(las_layout::RECORD_LEN).collect();
         let axis = |point: &[u8], a: usize| i32::from_le_bytes(point[4 * a..4 * a + 4].try_into().unwrap());
         let least = [0, 1, 2].map(|a| points.iter().map(|point| axis(point, a)).min().unwrap());
         let record = |point: &&[u8]| {
