@@ -1,8 +1,11 @@
 //! Records by cell of a coarse Morton grid, as they come.
 
+use std::error::Error;
+
 use pointmill_format::{PointBatch, Positions, ScanInfo, with_column};
 
-use crate::Result;
+/// What can go wrong is told and ends the program.
+pub(crate) type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
 /// Records that are kept behind one another.
 pub(crate) const BLOCK: usize = 64;

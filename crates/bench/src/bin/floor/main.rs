@@ -11,7 +11,6 @@
 mod cells;
 mod order;
 
-use std::error::Error;
 use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -20,10 +19,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use pointmill_format::scan::las;
 use pointmill_format::{Scan, Scratch, Wanted, bytes};
 
-use cells::{Grid, Store};
+use cells::{Grid, Result, Store};
 use order::Sorter;
-
-type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
 fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
