@@ -27,6 +27,9 @@ pub(crate) struct Args {
     /// Runs only what has one of these words in its name
     #[arg(long, value_delimiter = ',')]
     pub(crate) only: Vec<String>,
+    /// More options for every conversion by pointmill, separated by blanks
+    #[arg(long, allow_hyphen_values = true, default_value = "")]
+    pub(crate) options: String,
     /// Memory that the host of a virtual machine has lent before a run starts, so that no run waits for it; 0 for none.
     /// The default is 4GiB, of large 8GiB
     #[arg(long, value_parser = parse_size)]

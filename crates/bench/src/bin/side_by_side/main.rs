@@ -60,7 +60,7 @@ fn measure(args: &Args) -> io::Result<bool> {
 fn measure_job(args: &Args, job: Job, runner: &mut Runner<'_>) -> io::Result<bool> {
     let points = args.points.unwrap_or(job.points());
     runner.lend = args.lend.unwrap_or(job.lend());
-    let mut outcomes: Vec<Outcome> = cases::list(job, points)
+    let mut outcomes: Vec<Outcome> = cases::list(job, points, &args.options)
         .into_iter()
         .filter(|case| args.only.is_empty() || args.only.iter().any(|word| case.label.contains(word)))
         .filter(|case| {
