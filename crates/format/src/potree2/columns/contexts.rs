@@ -2,7 +2,9 @@
 //! in them.
 
 use super::logs::log2;
-use super::parse::MAX_SIZE;
+
+/// Elements have no more bytes than this.
+pub(super) const MAX_SIZE: usize = 16;
 
 /// Contexts that a byte may have.
 pub(super) const CONTEXTS: usize = 64;

@@ -21,7 +21,7 @@ const fn table() -> [u16; TABLE] {
         let mut log = whole as u16;
         let mut bit = 0;
         while bit < PRECISION {
-            x = x * x >> 31;
+            x = (x * x) >> 31;
             let two = x >> 32;
             log = log << 1 | two as u16;
             x >>= two;

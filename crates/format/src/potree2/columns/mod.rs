@@ -11,6 +11,7 @@ mod contexts;
 mod literals;
 mod logs;
 mod meta_block;
+mod numbers;
 mod parse;
 mod prefix;
 #[cfg(test)]
@@ -24,7 +25,7 @@ use parse::{Kind, Part};
 use crate::WriteError;
 
 /// Numbers of more bytes are not encoded here.
-pub(super) const MAX_NUMBER: usize = 8;
+pub(super) const MAX_NUMBER: usize = numbers::MAX_NUMBER;
 
 /// Bytes of a column that a meta-block holds at most: so many that its own codes cost little, and the question whether to
 /// go on is asked often.

@@ -33,10 +33,10 @@ fn values(kind: usize, random: &mut Random, number: usize) -> u128 {
         5 => (number / 300) as u128 * 0xfedc_ba98_7654_3211,
         6 => 1 << 70 | 5 << 50 | u128::from(noise % 1_000_000),
         7 => u128::from(noise % 50) << 24 | u128::from(noise >> 8 & 0xffff) | wide << 40,
-        8 => u128::from(noise & 0xff_ffff) * 0x0100_0001 & 0xffff_ffff_ffff,
+        8 => (u128::from(noise & 0xff_ffff) * 0x0100_0001) & 0xffff_ffff_ffff,
         9 => u128::from((200_000.0 + (noise % 5_000_000) as f64 * 1e-5).to_bits()),
         _ => {
-            if noise % 50 == 0 {
+            if noise.is_multiple_of(50) {
                 wide
             } else {
                 3
