@@ -4,7 +4,7 @@ use super::channels::{Channels, Meta, State};
 use super::coder::Coder;
 use super::integer::Integer;
 use super::median::Median;
-use super::model::{Changes, Family, Tiny};
+use super::model::{Changes, Tiny, TinyFamily};
 use super::returns::{context_16, level};
 
 /// Bits of the symbol that says what differs from the last point of the channel.
@@ -37,8 +37,8 @@ struct Channel {
     changes: [Changes; 8],
     channels: Tiny,
     /// Numbers of returns, and of the return, by the last one.
-    returns: Family<16, 0>,
-    numbers: Family<16, 0>,
+    returns: TinyFamily,
+    numbers: TinyFamily,
     numbers_of_pulse: Tiny,
     dx: Integer,
     dy: Integer,
@@ -53,8 +53,8 @@ impl State for Channel {
             last: Values::default(),
             changes: std::array::from_fn(|_| Changes::new(128)),
             channels: Tiny::new(3),
-            returns: Family::new(),
-            numbers: Family::new(),
+            returns: TinyFamily::new(16),
+            numbers: TinyFamily::new(16),
             numbers_of_pulse: Tiny::new(13),
             dx: Integer::new(32, 2),
             dy: Integer::new(32, 22),

@@ -45,9 +45,8 @@ impl<'a> Coder<'a> {
     /// Starts at byte `at`.
     pub(super) fn start(bytes: &'a [u8], at: usize) -> Self {
         let mut coder = Self { bytes, at, value: 0, length: u32::MAX };
-        for _ in 0..Self::START {
-            coder.value = coder.value << 8 | u32::from(coder.byte());
-        }
+        coder.value = coder.ahead();
+        coder.at += Self::START;
         if coder.value == u32::MAX {
             coder.fail();
         }
@@ -86,19 +85,33 @@ impl<'a> Coder<'a> {
         self.value = 0;
     }
 
+    /// The next four bytes, the first the highest.
     #[inline(always)]
-    fn byte(&mut self) -> u8 {
-        let byte = self.bytes.get(self.at).copied().unwrap_or(0);
-        self.at += 1;
-        byte
+    fn ahead(&self) -> u32 {
+        match self.bytes.get(self.at..).and_then(|rest| rest.first_chunk()) {
+            Some(bytes) => u32::from_be_bytes(*bytes),
+            None => self.ahead_at_end(),
+        }
     }
 
+    #[cold]
+    fn ahead_at_end(&self) -> u32 {
+        let mut bytes = [0; 4];
+        for (byte, there) in bytes.iter_mut().zip(self.bytes.get(self.at..).unwrap_or_default()) {
+            *byte = *there;
+        }
+        u32::from_be_bytes(bytes)
+    }
+
+    /// Without a branch: how many bytes are due follows from the symbol, which nobody can predict.
     #[inline(always)]
     fn stretch(&mut self) {
-        while self.length < MIN_LENGTH {
-            self.value = self.value << 8 | u32::from(self.byte());
-            self.length <<= 8;
-        }
+        // an interval has at least a number, so that three bytes suffice
+        let by = (self.length | 1).leading_zeros() & 24;
+        let wide = u64::from(self.value) << 32 | u64::from(self.ahead());
+        self.value = (wide << by >> 32) as u32;
+        self.length <<= by;
+        self.at += (by >> 3) as usize;
     }
 
     /// A symbol of a model; less than its number of symbols.
@@ -106,11 +119,11 @@ impl<'a> Coder<'a> {
     pub(super) fn symbol<const N: usize, const T: usize>(&mut self, model: &mut Model<N, T>) -> usize {
         model.prepare();
         let unit = self.length >> SHARE_BITS;
+        let share = self.value.checked_div(unit).unwrap_or(0);
+        let (symbol, low, high) = model.take(share);
+        let start = low * unit;
         // what the division cuts off belongs to the last symbol
-        let share = self.value.checked_div(unit).unwrap_or(0).min((1 << SHARE_BITS) - 1);
-        let (symbol, low, high) = model.take(share as u16);
-        let start = u32::from(low) * unit;
-        let end = if high == END { self.length } else { u32::from(high) * unit };
+        let end = if high == u32::from(END) { self.length } else { high * unit };
         self.value -= start;
         self.length = end - start;
         self.stretch();

@@ -28,7 +28,7 @@ impl Rgb {
     }
 
     /// The colour behind `last`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn next(&mut self, coder: &mut Coder<'_>, last: [u16; 3]) -> [u16; 3] {
         let changes = coder.symbol(&mut self.changes);
         let [red, green, blue] = last.map(u16::to_le_bytes);
@@ -74,7 +74,7 @@ impl Nir {
     }
 
     /// The value behind `last`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn next(&mut self, coder: &mut Coder<'_>, last: u16) -> u16 {
         let changes = coder.symbol(&mut self.changes);
         let mut bytes = last.to_le_bytes();

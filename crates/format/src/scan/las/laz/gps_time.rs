@@ -84,7 +84,7 @@ impl GpsTime {
     }
 
     /// The next time.
-    #[inline]
+    #[inline(always)]
     pub(super) fn next(&mut self, coder: &mut Coder<'_>) -> i64 {
         for _ in 0..=MOST_CHANGES {
             let change = if self.sequences[self.current].step == 0 { self.step_first(coder) } else { self.step(coder) };
@@ -98,7 +98,7 @@ impl GpsTime {
     }
 
     /// How many sequences further the time is to be found; 0: it is here.
-    #[inline]
+    #[inline(always)]
     fn step_first(&mut self, coder: &mut Coder<'_>) -> usize {
         let symbol = coder.symbol(&mut self.without_step) + usize::from(!self.has_same);
         let sequence = &mut self.sequences[self.current];
@@ -116,7 +116,7 @@ impl GpsTime {
     }
 
     /// As [`Self::step_first`], for a sequence that has a step.
-    #[inline]
+    #[inline(always)]
     fn step(&mut self, coder: &mut Coder<'_>) -> usize {
         let symbol = coder.symbol(&mut self.multiples);
         let symbol = symbol + usize::from(!self.has_same && symbol >= SAME);

@@ -3,7 +3,7 @@
 use super::coder::Coder;
 use super::integer::Integer;
 use super::median::Median;
-use super::model::{Bytes, Family, Flags};
+use super::model::{Bytes, BytesFamily, Flags};
 use super::returns::{context_8, level};
 
 /// Bytes of the item.
@@ -60,9 +60,9 @@ impl Values {
 pub(super) struct Point10 {
     last: Values,
     changes: Flags,
-    returns: Family<256, 128>,
-    classes: Family<256, 128>,
-    users: Family<256, 128>,
+    returns: BytesFamily,
+    classes: BytesFamily,
+    users: BytesFamily,
     angles: [Bytes; 2],
     intensity: Integer,
     source: Integer,
@@ -81,9 +81,9 @@ impl Point10 {
         Self {
             last: Values::default(),
             changes: Flags::new(64),
-            returns: Family::new(),
-            classes: Family::new(),
-            users: Family::new(),
+            returns: BytesFamily::new(256),
+            classes: BytesFamily::new(256),
+            users: BytesFamily::new(256),
             angles: [256; 2].map(Bytes::new),
             intensity: Integer::new(16, 4),
             source: Integer::new(16, 1),
@@ -101,7 +101,7 @@ impl Point10 {
         // the first intensity is predicted from nothing
         self.last = Values { intensity: 0, ..Values::read(first) };
         self.changes.reset();
-        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(Family::reset);
+        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(BytesFamily::reset);
         self.angles.iter_mut().for_each(Bytes::reset);
         [&mut self.intensity, &mut self.source, &mut self.dx, &mut self.dy, &mut self.z]
             .into_iter()
@@ -111,7 +111,7 @@ impl Point10 {
         self.heights = [0; 8];
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn next(&mut self, coder: &mut Coder<'_>, item: &mut [u8; LEN]) {
         let changes = coder.symbol(&mut self.changes);
         if changes & RETURNS != 0 {
@@ -126,7 +126,7 @@ impl Point10 {
         self.last.write(item);
     }
 
-    #[inline]
+    #[inline(always)]
     fn others(&mut self, coder: &mut Coder<'_>, changes: usize, context: usize) {
         let last = &mut self.last;
         if changes & INTENSITY != 0 {
@@ -149,7 +149,7 @@ impl Point10 {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn position(&mut self, coder: &mut Coder<'_>, context: usize, returns: u8, number: u8) {
         let single = usize::from(returns == 1);
         let [x_median, y_median] = &mut self.medians[context];

@@ -136,7 +136,7 @@ impl PointwiseModels {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn next(&mut self, coder: &mut Coder<'_>, record: &mut [u8]) {
         let Some((item, mut rest)) = record.split_first_chunk_mut::<{ point10::LEN }>() else { return };
         match &mut self.point {
@@ -174,7 +174,7 @@ impl PointwiseModels {
         self.extra(coder, rest);
     }
 
-    #[inline]
+    #[inline(always)]
     fn extra(&mut self, coder: &mut Coder<'_>, out: &mut [u8]) {
         let bytes = self.last_extra.iter_mut().zip(out);
         match &mut self.extra {

@@ -2,7 +2,7 @@
 
 use super::coder::Coder;
 use super::integer::Integer;
-use super::model::{Family, Flags, Model, Tiny};
+use super::model::{BytesFamily, Flags, Multiples, Tiny};
 use super::point10::{LEN, Values};
 
 /// Bits of the symbol that says which values differ from those of the point before.
@@ -21,9 +21,9 @@ pub(super) struct Point10 {
     differences: [[i32; 3]; 2],
     oldest: usize,
     changes: Flags,
-    returns: Family<256, 128>,
-    classes: Family<256, 128>,
-    users: Family<256, 128>,
+    returns: BytesFamily,
+    classes: BytesFamily,
+    users: BytesFamily,
     intensity: Integer,
     angle: Integer,
     source: Integer,
@@ -39,9 +39,9 @@ impl Point10 {
             differences: [[0; 3]; 2],
             oldest: 0,
             changes: Flags::new(64),
-            returns: Family::new(),
-            classes: Family::new(),
-            users: Family::new(),
+            returns: BytesFamily::new(256),
+            classes: BytesFamily::new(256),
+            users: BytesFamily::new(256),
             intensity: Integer::new(16, 1),
             angle: Integer::new(8, 2),
             source: Integer::new(16, 1),
@@ -56,7 +56,7 @@ impl Point10 {
         self.last = Values::read(first);
         (self.differences, self.oldest) = ([[0; 3]; 2], 0);
         self.changes.reset();
-        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(Family::reset);
+        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(BytesFamily::reset);
         let integers = [&mut self.intensity, &mut self.angle, &mut self.source];
         integers.into_iter().chain([&mut self.dx, &mut self.dy, &mut self.z]).for_each(Integer::reset);
     }
@@ -118,13 +118,13 @@ pub(super) struct GpsTime {
     step: i32,
     extremes: u8,
     without_step: Tiny,
-    multiples: Model<512, 128>,
+    multiples: Multiples,
     corrections: Integer,
 }
 
 impl GpsTime {
     pub(super) fn new() -> Self {
-        let (without_step, multiples) = (Tiny::new(3), Model::new(512));
+        let (without_step, multiples) = (Tiny::new(3), Multiples::new(512));
         Self { time: 0, step: 0, extremes: 0, without_step, multiples, corrections: Integer::new(32, 6) }
     }
 
