@@ -97,6 +97,7 @@ fn decode(path: &Path) -> Result<Sums> {
     let scan = las::open(path)?;
     let (wanted, mut scratch, mut sums) = (Wanted::all(scan.info()), Scratch::default(), Sums::default());
     for piece in 0..scan.pieces().len() {
+        scratch.next_piece = Some(piece + 1);
         scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
             sums.points += batch.len() as u64;
             if let Positions::Quantized(xyz) = &batch.positions {

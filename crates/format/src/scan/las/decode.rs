@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use super::ahead::{self, Ahead, Two};
 use super::decompress::{self, Decompressor, LazModels};
 use super::file::LasScan;
 use super::kernels;
@@ -32,7 +33,8 @@ pub(super) fn piece(
         let fault = Fault::NoSuchPiece { piece: index, pieces: scan.plan.pieces.len() };
         return Err(ReadError::unsupported(scan.source.path(), fault));
     };
-    let Scratch { raw, decoded, batch, kept } = scratch;
+    let Scratch { raw, decoded, batch, next_piece, kept } = scratch;
+    let next = next_piece.take();
     let batch = fitting_batch(batch, &scan.info.attributes, true);
     let mut out = Emitter {
         record_len: scan.record_len,
@@ -52,7 +54,7 @@ pub(super) fn piece(
     match scan.plan.storage {
         Storage::Records => Ok(()),
         Storage::Layered => laz.layered(models, raw, decoded, &mut out),
-        Storage::Chunk => laz.chunk(models, raw, decoded, &mut out),
+        Storage::Chunk => laz.chunk(models, next, raw, decoded, &mut out),
         Storage::Stream { chunk_points } => laz.stream(models, chunk_points, decoded, &mut out),
     }
 }
@@ -178,16 +180,62 @@ impl Laz<'_> {
     fn chunk(
         &self,
         models: &mut LazModels,
+        next: Option<usize>,
         raw: &mut Vec<u8>,
         decoded: &mut Vec<u8>,
         out: &mut Emitter<'_, '_>,
     ) -> Result<(), ReadError> {
+        let of = (self.scan.id, self.index);
+        if let Some(mut ahead) = models.ahead.take_if(|ahead| ahead.of == of) {
+            let mut decompressor = Decompressor::Ahead(ahead.reader(), self.scan.record_len);
+            let pumped = out.pump(&mut decompressor, self.piece.points, decoded);
+            models.spare = ahead.records;
+            return pumped.map(drop).map_err(|stop| self.error(out, stop));
+        }
         let Piece { byte_offset, byte_len, .. } = *self.piece;
         if byte_len > MAX_CHUNK_IN_MEMORY {
             return self.stream(models, None, decoded, out);
         }
+        if let Some(second) = next.and_then(|next| self.behind(next)) {
+            return self.two(models, second, raw, decoded, out);
+        }
         let bytes = self.scan.source.slice_at(byte_offset, byte_len, raw)?;
         self.pointwise(models, Input::Whole(bytes), None, decoded, out)
+    }
+
+    /// The piece `next`, if it is the one behind this one and may be decoded ahead.
+    fn behind(&self, next: usize) -> Option<&Piece> {
+        let piece = self.scan.plan.pieces.get(next).filter(|_| next == self.index + 1)?;
+        let is_behind = piece.byte_offset == self.piece.byte_offset + self.piece.byte_len;
+        let records = piece.points.saturating_mul(self.scan.record_len as u64);
+        (is_behind && records.max(piece.byte_len) <= ahead::MOST_BYTES).then_some(piece)
+    }
+
+    /// Decodes this piece, and the one behind it ahead.
+    fn two(
+        &self,
+        models: &mut LazModels,
+        second: &Piece,
+        raw: &mut Vec<u8>,
+        decoded: &mut Vec<u8>,
+        out: &mut Emitter<'_, '_>,
+    ) -> Result<(), ReadError> {
+        let Piece { points, byte_offset, byte_len, .. } = *self.piece;
+        let bytes = self.scan.source.slice_at(byte_offset, byte_len + second.byte_len, raw)?;
+        let (record_len, mut records) = (self.scan.record_len, std::mem::take(&mut models.spare));
+        resize(&mut records, second.points as usize * record_len);
+        let ahead = Ahead { of: (self.scan.id, self.index + 1), records, good: 0, result: Ok(()) };
+        let chunks = bytes.split_at(byte_len as usize);
+        let two = Two::new(models.pointwise(&self.laszip.items), record_len, chunks.into(), ahead);
+        let mut decompressor = Decompressor::Two(two);
+        let pumped = out.pump(&mut decompressor, points, decoded);
+        let flow = pumped.map_err(|stop| self.error(out, stop))?;
+        if let Decompressor::Two(two) = decompressor
+            && flow.is_continue()
+        {
+            models.ahead = Some(two.finish());
+        }
+        Ok(())
     }
 
     fn stream(

@@ -2,6 +2,7 @@
 
 use std::any::Any;
 
+use super::ahead::{Ahead, Reader, Two};
 use super::chunk_table::{Chunk, Layout};
 use super::laz::{Input, Item, Layered, LayeredModels, Part, Parts, Pointwise, PointwiseModels, Stop, record_len};
 use super::schema::{Layer, Schema};
@@ -13,6 +14,10 @@ use crate::scan::source::Source;
 pub(super) struct LazModels {
     pointwise: Option<PointwiseModels>,
     layered: Option<LayeredModels>,
+    /// The chunk behind the last one.
+    pub(super) ahead: Option<Ahead>,
+    /// Memory for the records of such a chunk.
+    pub(super) spare: Vec<u8>,
 }
 
 impl LazModels {
@@ -41,6 +46,8 @@ impl LazModels {
 pub(super) enum Decompressor<'m, 'a> {
     Pointwise(Pointwise<'m, 'a>),
     Layered(Layered<'m, 'a>),
+    Two(Two<'m, 'a>),
+    Ahead(Reader<'m>, usize),
 }
 
 impl<'m, 'a> Decompressor<'m, 'a> {
@@ -69,6 +76,8 @@ impl<'m, 'a> Decompressor<'m, 'a> {
         match self {
             Self::Pointwise(decoder) => decoder.fill(out),
             Self::Layered(decoder) => decoder.fill(out),
+            Self::Two(decoder) => decoder.fill(out),
+            Self::Ahead(reader, record_len) => reader.fill(out, *record_len),
         }
     }
 }

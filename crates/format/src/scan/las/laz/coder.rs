@@ -6,9 +6,6 @@
 
 use super::model::{BitModel, END, Model, SHARE_BITS};
 
-/// The interval is stretched by whole bytes when it becomes shorter.
-const MIN_LENGTH: u32 = 1 << 24;
-
 /// Added to the place of a decoder that has met what no encoder writes.
 const BROKEN: usize = usize::MAX / 2;
 
@@ -77,7 +74,7 @@ impl<'a> Coder<'a> {
     }
 
     /// Met what no encoder writes; if bytes were missing before, that is the reason.
-    #[cold]
+    #[inline(always)]
     pub(super) fn fail(&mut self) {
         if !self.is_off() {
             self.at += BROKEN;
@@ -170,6 +167,7 @@ impl<'a> Coder<'a> {
     }
 
     /// A number of 64 bits.
+    #[inline(always)]
     pub(super) fn bits_64(&mut self) -> u64 {
         let low = u64::from(self.bits(32));
         u64::from(self.bits(32)) << 32 | low
@@ -195,7 +193,7 @@ mod tests {
                 }
                 assert!(coder.symbol(&mut model) < 256);
                 coder.bit(&mut bit);
-                assert!(coder.value < coder.length && coder.length >= MIN_LENGTH);
+                assert!(coder.value < coder.length && coder.length >= 1 << 24);
                 if round % 50 == 0 {
                     coder.bits(1 + round as u32 % 31);
                 }

@@ -151,6 +151,7 @@ impl GpsTime {
     }
 
     /// Begins a sequence.
+    #[inline(always)]
     fn jump(&mut self, coder: &mut Coder<'_>) -> usize {
         let upper = (self.sequences[self.current].time >> 32) as i32;
         let upper = i64::from(self.corrections.next(coder, upper, UPPER_HALF));

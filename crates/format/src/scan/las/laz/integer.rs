@@ -1,6 +1,7 @@
 //! Integers as corrections of predictions.
 
 use super::coder::Coder;
+use super::in_turn::in_turn;
 use super::model::{BitModel, Bytes, Small};
 
 /// Corrections of up to so many bits have a model of all their values; larger ones of their upper so many bits, and the
@@ -50,6 +51,26 @@ impl Integer {
     #[inline(always)]
     pub(super) fn next(&mut self, coder: &mut Coder<'_>, predicted: i32, context: usize) -> i32 {
         let bits = coder.symbol(&mut self.bits[context]);
+        self.correct(coder, bits, predicted)
+    }
+
+    /// The next integers of several decoders, in turn.
+    #[inline(always)]
+    pub(super) fn next_of<const L: usize>(
+        mut integers: [&mut Self; L],
+        coders: &mut [Coder<'_>; L],
+        predicted: [i32; L],
+        contexts: [usize; L],
+    ) -> [i32; L] {
+        let (mut bits, mut out) = ([0; L], [0; L]);
+        in_turn!(|l| bits[l] = coders[l].symbol(&mut integers[l].bits[contexts[l]]));
+        in_turn!(|l| out[l] = integers[l].correct(&mut coders[l], bits[l], predicted[l]));
+        out
+    }
+
+    /// The integer whose correction has so many bits.
+    #[inline(always)]
+    fn correct(&mut self, coder: &mut Coder<'_>, bits: usize, predicted: i32) -> i32 {
         self.last_bits = bits;
         let Some(model) = self.corrections.get_mut(bits.wrapping_sub(1)) else {
             return predicted.wrapping_add(match bits {

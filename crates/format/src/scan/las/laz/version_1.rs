@@ -61,7 +61,7 @@ impl Point10 {
         integers.into_iter().chain([&mut self.dx, &mut self.dy, &mut self.z]).for_each(Integer::reset);
     }
 
-    pub(super) fn next(&mut self, coder: &mut Coder<'_>, item: &mut [u8; LEN]) {
+    pub(super) fn next(&mut self, coder: &mut Coder<'_>) -> Values {
         let [x, y, z] = &mut self.last.xyz;
         let dx = self.dx.next(coder, median(self.differences[0]), 0);
         let dy = self.dy.next(coder, median(self.differences[1]), self.dx.last_bits().min(19));
@@ -74,7 +74,7 @@ impl Point10 {
         if changes != 0 {
             self.others(coder, changes, bits);
         }
-        self.last.write(item);
+        self.last
     }
 
     fn others(&mut self, coder: &mut Coder<'_>, changes: usize, bits: usize) {
