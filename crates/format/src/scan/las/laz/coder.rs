@@ -6,6 +6,9 @@
 
 use super::model::{BitModel, END, Model, SHARE_BITS};
 
+/// Numbers of more bits are in two parts.
+const FEW_BITS: u32 = 19;
+
 /// Added to the place of a decoder that has met what no encoder writes.
 const BROKEN: usize = usize::MAX / 2;
 
@@ -33,6 +36,15 @@ impl Paused {
         let Self { at, value, length } = self;
         Coder { bytes, at, value, length }
     }
+}
+
+/// What is not worth the space in a loop gets a copy of the decoder, which itself may be in registers then.
+#[inline(always)]
+pub(super) fn by_copy<'a, T>(coder: &mut Coder<'a>, next: impl FnOnce(&mut Coder<'a>) -> T) -> T {
+    let mut copy = *coder;
+    let value = next(&mut copy);
+    *coder = copy;
+    value
 }
 
 impl<'a> Coder<'a> {
@@ -146,11 +158,17 @@ impl<'a> Coder<'a> {
     /// A number of `bits` (1 to 32) bits, all of its values equally likely.
     #[inline(always)]
     pub(super) fn bits(&mut self, bits: u32) -> u32 {
-        if bits > 19 {
-            let low = self.few_bits(16);
-            return self.few_bits(bits - 16) << 16 | low;
+        if bits > FEW_BITS {
+            return by_copy(self, |coder| coder.many_bits(bits));
         }
         self.few_bits(bits)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn many_bits(&mut self, bits: u32) -> u32 {
+        let low = self.few_bits(16);
+        self.few_bits(bits - 16) << 16 | low
     }
 
     #[inline(always)]

@@ -38,7 +38,7 @@ impl Rgb {
     /// The colours of several decoders, in turn.
     #[inline(always)]
     pub(super) fn next_of<const L: usize>(
-        mut models: [&mut Self; L],
+        models: [&mut Self; L],
         coders: &mut [Coder<'_>; L],
         last: [[u16; 3]; L],
     ) -> [[u16; 3]; L] {

@@ -57,7 +57,7 @@ impl Integer {
     /// The next integers of several decoders, in turn.
     #[inline(always)]
     pub(super) fn next_of<const L: usize>(
-        mut integers: [&mut Self; L],
+        integers: [&mut Self; L],
         coders: &mut [Coder<'_>; L],
         predicted: [i32; L],
         contexts: [usize; L],

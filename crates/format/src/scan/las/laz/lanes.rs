@@ -3,7 +3,7 @@
 
 use std::array::from_fn;
 
-use super::coder::{Coder, Paused};
+use super::coder::{Coder, Paused, by_copy};
 use super::colour::Rgb;
 use super::gps_time::GpsTime;
 use super::in_turn::in_turn;
@@ -216,7 +216,7 @@ impl<const L: usize> Lanes<'_, L> {
 
     /// A record of each lane.
     #[inline(always)]
-    fn next(&mut self, coders: &mut [Coder<'_>; L], mut records: [&mut [u8]; L]) {
+    fn next(&mut self, coders: &mut [Coder<'_>; L], records: [&mut [u8]; L]) {
         let mut at = point10::LEN;
         match &mut self.point {
             Versions::None => {}
@@ -231,7 +231,8 @@ impl<const L: usize> Lanes<'_, L> {
         match &mut self.time {
             Versions::None => {}
             Versions::V2(times) => {
-                in_turn!(|l| write(records[l], at, times[l].next(&mut coders[l]).to_le_bytes()));
+                let times = GpsTime::next_of(times, coders);
+                in_turn!(|l| write(records[l], at, times[l].to_le_bytes()));
                 at += 8;
             }
             Versions::V1(times) => {
@@ -282,15 +283,6 @@ impl<const L: usize> Lanes<'_, L> {
             }
         }
     }
-}
-
-/// Items that are not worth the space in the loop get a copy of the decoder, which itself may be in registers.
-#[inline(always)]
-fn by_copy<'a, T>(coder: &mut Coder<'a>, next: impl FnOnce(&mut Coder<'a>) -> T) -> T {
-    let mut copy = *coder;
-    let value = next(&mut copy);
-    *coder = copy;
-    value
 }
 
 fn bytes_of([red, green, blue]: [u16; 3]) -> [u8; 6] {

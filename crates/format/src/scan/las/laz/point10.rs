@@ -1,6 +1,6 @@
 //! `POINT10` version 2: the first 20 bytes of formats 0–5.
 
-use super::coder::Coder;
+use super::coder::{Coder, by_copy};
 use super::in_turn::in_turn;
 use super::integer::Integer;
 use super::median::Median;
@@ -132,10 +132,7 @@ impl Point10 {
                 points[l].last.intensity = points[l].intensities[contexts[l]];
             }
             if changes[l] & (CLASS | ANGLE | USER | SOURCE) != 0 {
-                // a copy: so that the decoder itself may be in registers
-                let mut coder = coders[l];
-                points[l].others(&mut coder, changes[l]);
-                coders[l] = coder;
+                by_copy(&mut coders[l], |coder| points[l].others(coder, changes[l]));
             }
         });
         Self::positions(points, coders, contexts);
@@ -146,7 +143,7 @@ impl Point10 {
     #[inline(always)]
     fn returns(&mut self, coder: &mut Coder<'_>, changes: usize) -> usize {
         if changes & RETURNS != 0 {
-            self.last.returns = coder.symbol(self.returns.of(self.last.returns)) as u8;
+            self.last.returns = by_copy(coder, |coder| coder.symbol(self.returns.of(self.last.returns))) as u8;
         }
         let (number, returns) = self.last.number_of();
         context_8(returns, number)
@@ -168,9 +165,7 @@ impl Point10 {
         } else if L > 1 {
             in_turn!(|l| {
                 if changes[l] & INTENSITY != 0 {
-                    let mut coder = coders[l];
-                    points[l].intensity(&mut coder, contexts[l]);
-                    coders[l] = coder;
+                    by_copy(&mut coders[l], |coder| points[l].intensity(coder, contexts[l]));
                 }
             });
         }
