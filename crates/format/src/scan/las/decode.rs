@@ -2,20 +2,15 @@
 
 use std::ops::ControlFlow;
 
-use super::ahead::{self, Ahead, Two};
+use super::compressed::Compressed;
 use super::decompress::{self, Decompressor, LazModels};
 use super::file::LasScan;
 use super::kernels;
-use super::laszip::LaszipRecord;
-use super::laz::{Input, Pointwise, Stop};
-use super::pieces::Storage;
+use super::laz::Stop;
 use super::schema::Schema;
 use crate::scan::decode::{batch_points, fitting_batch, point_bytes, resize};
 use crate::scan::source::Source;
-use crate::{Advice, Fault, Piece, PointBatch, ReadError, Scratch, Sink, Wanted};
-
-/// A chunk larger than this is read through a buffer instead of at once.
-pub(super) const MAX_CHUNK_IN_MEMORY: u64 = 64 << 20;
+use crate::{Fault, Piece, PointBatch, ReadError, Scratch, Sink, Wanted};
 
 /// Plain records that are read at once: 139 kB of format 3, so that they are still in the second-level cache when
 /// they become columns.
@@ -48,25 +43,20 @@ pub(super) fn piece(
     let Some(laszip) = &scan.laszip else {
         return out.records(&scan.source, piece, raw);
     };
-    let laz = Laz { scan, laszip, index, piece };
+    let parts = decompress::parts(&scan.schema, wanted);
     let mut own = LazModels::default();
     let models = LazModels::of(kept).unwrap_or(&mut own);
-    match scan.plan.storage {
-        Storage::Records => Ok(()),
-        Storage::Layered => laz.layered(models, raw, decoded, &mut out),
-        Storage::Chunk => laz.chunk(models, next, raw, decoded, &mut out),
-        Storage::Stream { chunk_points } => laz.stream(models, chunk_points, decoded, &mut out),
-    }
+    Compressed { scan, laszip, index, piece, parts, out, models, decoded }.decode(raw, next)
 }
 
 /// Turns records into columns and hands them over.
-struct Emitter<'a, 's> {
+pub(super) struct Emitter<'a, 's> {
     record_len: usize,
     /// Records that become one batch.
     batch_points: u64,
     schema: &'a Schema,
     wanted: &'a Wanted,
-    next_point: u64,
+    pub(super) next_point: u64,
     batch: &'a mut PointBatch,
     sink: &'a mut Sink<'s>,
 }
@@ -100,7 +90,7 @@ impl Emitter<'_, '_> {
     }
 
     /// Decodes `points` points and hands them over, until the sink breaks.
-    fn pump(
+    pub(super) fn pump(
         &mut self,
         decompressor: &mut Decompressor<'_, '_>,
         points: u64,
@@ -148,146 +138,5 @@ impl Emitter<'_, '_> {
             }
         }
         (good, Ok(()))
-    }
-}
-
-/// Decoding of one compressed piece.
-struct Laz<'a> {
-    scan: &'a LasScan,
-    laszip: &'a LaszipRecord,
-    index: usize,
-    piece: &'a Piece,
-}
-
-impl Laz<'_> {
-    fn layered(
-        &self,
-        models: &mut LazModels,
-        raw: &mut Vec<u8>,
-        decoded: &mut Vec<u8>,
-        out: &mut Emitter<'_, '_>,
-    ) -> Result<(), ReadError> {
-        let Piece { points, byte_offset, byte_len, .. } = *self.piece;
-        let bytes = self.scan.source.slice_at(byte_offset, byte_len, raw)?;
-        let layout = self.scan.layout(self.laszip);
-        let parts = decompress::parts(&self.scan.schema, out.wanted);
-        Decompressor::layered(models.layered(&self.laszip.items), layout, parts, bytes, points)
-            .and_then(|mut decompressor| out.pump(&mut decompressor, points, decoded))
-            .map(drop)
-            .map_err(|stop| self.error(out, stop))
-    }
-
-    fn chunk(
-        &self,
-        models: &mut LazModels,
-        next: Option<usize>,
-        raw: &mut Vec<u8>,
-        decoded: &mut Vec<u8>,
-        out: &mut Emitter<'_, '_>,
-    ) -> Result<(), ReadError> {
-        let of = (self.scan.id, self.index);
-        if let Some(mut ahead) = models.ahead.take_if(|ahead| ahead.of == of) {
-            let mut decompressor = Decompressor::Ahead(ahead.reader(), self.scan.record_len);
-            let pumped = out.pump(&mut decompressor, self.piece.points, decoded);
-            models.spare = ahead.records;
-            return pumped.map(drop).map_err(|stop| self.error(out, stop));
-        }
-        let Piece { byte_offset, byte_len, .. } = *self.piece;
-        if byte_len > MAX_CHUNK_IN_MEMORY {
-            return self.stream(models, None, decoded, out);
-        }
-        if let Some(second) = next.and_then(|next| self.behind(next)) {
-            return self.two(models, second, raw, decoded, out);
-        }
-        let bytes = self.scan.source.slice_at(byte_offset, byte_len, raw)?;
-        self.pointwise(models, Input::Whole(bytes), None, decoded, out)
-    }
-
-    /// The piece `next`, if it is the one behind this one and may be decoded ahead.
-    fn behind(&self, next: usize) -> Option<&Piece> {
-        let piece = self.scan.plan.pieces.get(next).filter(|_| next == self.index + 1)?;
-        let is_behind = piece.byte_offset == self.piece.byte_offset + self.piece.byte_len;
-        let records = piece.points.saturating_mul(self.scan.record_len as u64);
-        (is_behind && records.max(piece.byte_len) <= ahead::MOST_BYTES).then_some(piece)
-    }
-
-    /// Decodes this piece, and the one behind it ahead.
-    fn two(
-        &self,
-        models: &mut LazModels,
-        second: &Piece,
-        raw: &mut Vec<u8>,
-        decoded: &mut Vec<u8>,
-        out: &mut Emitter<'_, '_>,
-    ) -> Result<(), ReadError> {
-        let Piece { points, byte_offset, byte_len, .. } = *self.piece;
-        let bytes = self.scan.source.slice_at(byte_offset, byte_len + second.byte_len, raw)?;
-        let (record_len, mut records) = (self.scan.record_len, std::mem::take(&mut models.spare));
-        resize(&mut records, second.points as usize * record_len);
-        let ahead = Ahead { of: (self.scan.id, self.index + 1), records, good: 0, result: Ok(()) };
-        let chunks = bytes.split_at(byte_len as usize);
-        let two = Two::new(models.pointwise(&self.laszip.items), record_len, chunks.into(), ahead);
-        let mut decompressor = Decompressor::Two(two);
-        let pumped = out.pump(&mut decompressor, points, decoded);
-        let flow = pumped.map_err(|stop| self.error(out, stop))?;
-        if let Decompressor::Two(two) = decompressor
-            && flow.is_continue()
-        {
-            models.ahead = Some(two.finish());
-        }
-        Ok(())
-    }
-
-    fn stream(
-        &self,
-        models: &mut LazModels,
-        chunk_points: Option<u32>,
-        decoded: &mut Vec<u8>,
-        out: &mut Emitter<'_, '_>,
-    ) -> Result<(), ReadError> {
-        let Piece { byte_offset, byte_len, .. } = *self.piece;
-        let input = Input::of_file(&self.scan.source, byte_offset, byte_offset + byte_len);
-        self.pointwise(models, input, chunk_points, decoded, out)
-    }
-
-    /// Records one after the other; a chunk ends after `chunk_points` points and the next one follows at once (the
-    /// encoder pads each chunk so that the decoder stops reading at its last byte).
-    fn pointwise(
-        &self,
-        models: &mut LazModels,
-        input: Input<'_>,
-        chunk_points: Option<u32>,
-        decoded: &mut Vec<u8>,
-        out: &mut Emitter<'_, '_>,
-    ) -> Result<(), ReadError> {
-        let models = models.pointwise(&self.laszip.items);
-        let mut decompressor = Decompressor::Pointwise(Pointwise::new(models, input));
-        let mut left = self.piece.points;
-        while left > 0 {
-            let n = left.min(chunk_points.map_or(u64::MAX, u64::from));
-            let flow = out.pump(&mut decompressor, n, decoded).map_err(|stop| self.error(out, stop))?;
-            if flow.is_break() {
-                return Ok(());
-            }
-            left -= n;
-            decompressor.next_chunk();
-        }
-        Ok(())
-    }
-
-    fn error(&self, out: &Emitter<'_, '_>, stop: Stop) -> ReadError {
-        let Piece { first_point, points, byte_offset, byte_len } = *self.piece;
-        let decoded = out.next_point - first_point;
-        let pieces = self.scan.plan.pieces.len();
-        let (at, why, advice) = match stop {
-            Stop::CutShort => (byte_len, "the bytes end".to_owned(), Advice::CutShort),
-            // the layers lie inside the chunk: one that ends early is damaged, not cut
-            Stop::LayerEnds { at, layer } => (at as u64, format!("the layer of {layer} ends early"), Advice::Damaged),
-            Stop::Corrupt { at, why } => (at, why, Advice::Damaged),
-            Stop::Read(error) => return error,
-        };
-        let (piece, bytes) = (self.index, byte_len);
-        let fault = Fault::Decode { piece, pieces, bytes, decoded, points, why };
-        ReadError::broken(self.scan.source.path(), byte_offset + at.min(byte_len), fault).advise(advice)
     }
 }

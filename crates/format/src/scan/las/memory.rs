@@ -1,6 +1,7 @@
 //! How much memory decoding takes.
 
-use super::decode::{MAX_CHUNK_IN_MEMORY, READ_RECORDS};
+use super::compressed::MAX_CHUNK_IN_MEMORY;
+use super::decode::READ_RECORDS;
 use super::file::LasScan;
 use super::kernels::BLOCK;
 use super::laz::WINDOW;

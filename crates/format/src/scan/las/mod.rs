@@ -36,6 +36,7 @@ mod ahead;
 mod bytes;
 mod chunk_table;
 mod compatible;
+mod compressed;
 mod crs;
 mod decode;
 mod decompress;

@@ -2,6 +2,7 @@
 
 use super::channels::{Channels, Meta, State};
 use super::coder::Coder;
+use super::in_turn::in_turn;
 use super::integer::Integer;
 use super::median::Median;
 use super::model::{Changes, Tiny, TinyFamily};
@@ -81,14 +82,14 @@ impl State for Channel {
 
 impl Channel {
     /// What differs from the last point of the channel.
-    #[inline]
+    #[inline(always)]
     fn changes(&mut self, coder: &mut Coder<'_>) -> usize {
         let Values { returns, number, new_time, .. } = self.last;
         let context = usize::from(number == 1) | usize::from(number >= returns) << 1 | usize::from(new_time) << 2;
         coder.symbol(&mut self.changes[context])
     }
 
-    #[inline]
+    #[inline(always)]
     fn returns(&mut self, coder: &mut Coder<'_>, changes: usize) {
         let Values { returns, number, new_time, .. } = &mut self.last;
         *new_time = changes & TIME != 0;
@@ -105,7 +106,7 @@ impl Channel {
     }
 
     /// Returns the context of the height.
-    #[inline]
+    #[inline(always)]
     fn position(&mut self, coder: &mut Coder<'_>) -> usize {
         let Values { x, y, returns, number, new_time } = &mut self.last;
         let single = usize::from(*returns == 1);
@@ -162,28 +163,31 @@ impl Base {
         channel
     }
 
-    /// Decodes points, and writes what this layer knows to records that begin as the first one of the chunk.
-    pub(super) fn run(
-        &mut self,
-        paused: &mut Coder<'_>,
-        points: &mut [Meta],
-        records: &mut [u8],
+    /// Decodes points of chunks that are decoded in turn, and writes what this layer knows to records that begin as the
+    /// first one of the chunk. Each chunk has as many points and records.
+    pub(super) fn run<const L: usize>(
+        layers: [&mut Self; L],
+        paused: [&mut Coder<'_>; L],
+        points: [&mut [Meta]; L],
+        records: [&mut [u8]; L],
         record_len: usize,
-    ) -> usize {
-        let mut coder = *paused;
-        let mut good = 0;
-        for (meta, record) in points.iter_mut().zip(records.chunks_exact_mut(record_len)) {
-            *meta = self.next(&mut coder, record);
-            if coder.is_off() {
+    ) -> [usize; L] {
+        let mut coders = paused.each_ref().map(|coder| **coder);
+        let count = points.iter().map(|points| points.len()).min().unwrap_or(0);
+        let mut good = [count; L];
+        for point in 0..count {
+            let place = point * record_len..(point + 1) * record_len;
+            in_turn!(|l| points[l][point] = layers[l].next(&mut coders[l], &mut records[l][place.clone()]));
+            if coders.iter().any(Coder::is_off) {
+                in_turn!(|l| good[l] = point + usize::from(!coders[l].is_off()));
                 break;
             }
-            good += 1;
         }
-        *paused = coder;
+        in_turn!(|l| *paused[l] = coders[l]);
         good
     }
 
-    #[inline]
+    #[inline(always)]
     fn next(&mut self, coder: &mut Coder<'_>, record: &mut [u8]) -> Meta {
         let from = self.channel;
         let state = self.channels.of(from);

@@ -115,8 +115,9 @@ impl<'a> Coder<'a> {
     /// Without a branch: how many bytes are due follows from the symbol, which nobody can predict.
     #[inline(always)]
     fn stretch(&mut self) {
+        let is_below = |bits: u32| u32::from(self.length < 1 << bits);
         // an interval has at least a number, so that three bytes suffice
-        let by = (self.length | 1).leading_zeros() & 24;
+        let by = (is_below(24) + is_below(16) + is_below(8)) * 8;
         let wide = u64::from(self.value) << 32 | u64::from(self.ahead());
         self.value = (wide << by >> 32) as u32;
         self.length <<= by;

@@ -45,39 +45,62 @@ impl Rgb {
         let mut changes = [0; L];
         in_turn!(|l| changes[l] = coders[l].symbol(&mut models[l].changes));
         let last = last.map(|colour| colour.map(u16::to_le_bytes));
-        let mut new = [[[0; 2]; 3]; L];
-        let mut by_red = [[0; 2]; L];
-        for half in 0..2 {
-            in_turn!(|l| {
-                let red = last[l][0][half];
-                new[l][0][half] = models[l].byte(&mut coders[l], changes[l], half, red, red);
-                by_red[l][half] = i32::from(new[l][0][half]) - i32::from(red);
-            });
-        }
-        // green is expected to change as red did, blue as both did on average
-        for half in 0..2 {
-            in_turn!(|l| {
-                if changes[l] & COLOURED != 0 {
-                    let green = last[l][1][half];
-                    let predicted = moved(green, by_red[l][half]);
-                    new[l][1][half] = models[l].byte(&mut coders[l], changes[l], GREEN + half, green, predicted);
-                }
-            });
-            in_turn!(|l| {
-                if changes[l] & COLOURED != 0 {
-                    let by_green = i32::from(new[l][1][half]) - i32::from(last[l][1][half]);
-                    let blue = last[l][2][half];
-                    let predicted = moved(blue, (by_red[l][half] + by_green) / 2);
-                    new[l][2][half] = models[l].byte(&mut coders[l], changes[l], BLUE + half, blue, predicted);
-                }
-            });
-        }
+        let (mut models, mut new) = (models, [[[0; 2]; 3]; L]);
+        // written out: a loop would keep the decoders in memory
+        Self::reds(&mut models, coders, changes, 0, &last, &mut new);
+        Self::reds(&mut models, coders, changes, 1, &last, &mut new);
+        Self::greens_and_blues(&mut models, coders, changes, 0, &last, &mut new);
+        Self::greens_and_blues(&mut models, coders, changes, 1, &last, &mut new);
         let mut out = [[0; 3]; L];
         in_turn!(|l| {
             let [red, green, blue] = new[l].map(u16::from_le_bytes);
             out[l] = if changes[l] & COLOURED == 0 { [red; 3] } else { [red, green, blue] };
         });
         out
+    }
+
+    #[inline(always)]
+    fn reds<const L: usize>(
+        models: &mut [&mut Self; L],
+        coders: &mut [Coder<'_>; L],
+        changes: [usize; L],
+        half: usize,
+        last: &[[[u8; 2]; 3]; L],
+        new: &mut [[[u8; 2]; 3]; L],
+    ) {
+        in_turn!(|l| {
+            let red = last[l][0][half];
+            new[l][0][half] = models[l].byte(&mut coders[l], changes[l], half, red, red);
+        });
+    }
+
+    /// Green is expected to change as red did, blue as both did on average.
+    #[inline(always)]
+    fn greens_and_blues<const L: usize>(
+        models: &mut [&mut Self; L],
+        coders: &mut [Coder<'_>; L],
+        changes: [usize; L],
+        half: usize,
+        last: &[[[u8; 2]; 3]; L],
+        new: &mut [[[u8; 2]; 3]; L],
+    ) {
+        let mut by_red = [0; L];
+        in_turn!(|l| {
+            if changes[l] & COLOURED != 0 {
+                by_red[l] = i32::from(new[l][0][half]) - i32::from(last[l][0][half]);
+                let green = last[l][1][half];
+                let predicted = moved(green, by_red[l]);
+                new[l][1][half] = models[l].byte(&mut coders[l], changes[l], GREEN + half, green, predicted);
+            }
+        });
+        in_turn!(|l| {
+            if changes[l] & COLOURED != 0 {
+                let by_green = i32::from(new[l][1][half]) - i32::from(last[l][1][half]);
+                let blue = last[l][2][half];
+                let predicted = moved(blue, (by_red[l] + by_green) / 2);
+                new[l][2][half] = models[l].byte(&mut coders[l], changes[l], BLUE + half, blue, predicted);
+            }
+        });
     }
 
     /// The byte of that number.

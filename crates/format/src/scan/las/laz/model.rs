@@ -9,7 +9,7 @@ pub(super) const END: u16 = u16::MAX;
 /// Bounds that are looked at beside the first one, before the search becomes a loop.
 const AHEAD: usize = 3;
 
-/// A model of at most `N` − 3 symbols, as LASzip's: counts of the symbols so far, and bounds that are worked out anew
+/// A model of at most `N` − 3 symbols, a power of two,, as LASzip's: counts of the symbols so far, and bounds that are worked out anew
 /// now and then. `T`: entries of the table that shortens the search for a symbol, a power of two.
 ///
 /// A model that was not used since [`Self::reset`] costs nothing: it is filled when its first symbol is due.
@@ -32,25 +32,25 @@ pub(super) struct Model<const N: usize, const T: usize> {
 }
 
 /// Models of up to 16 symbols.
-pub(super) type Tiny = Model<20, 32>;
-/// Models of up to 37 symbols.
-pub(super) type Small = Model<40, 64>;
+pub(super) type Tiny = Model<19, 32>;
+/// Models of up to 64 symbols, but far fewer as a rule.
+pub(super) type Small = Model<67, 128>;
 /// Models of 64 symbols.
-pub(super) type Flags = Model<68, 128>;
+pub(super) type Flags = Model<67, 128>;
 /// Models of 128 symbols.
-pub(super) type Changes = Model<132, 256>;
+pub(super) type Changes = Model<131, 256>;
 /// Models of the values of a byte, or of the upper bits of a number.
-pub(super) type Bytes = Model<260, 256>;
+pub(super) type Bytes = Model<259, 256>;
 /// Models of the multiples of a time step.
-pub(super) type Multiples = Model<520, 256>;
+pub(super) type Multiples = Model<1027, 256>;
 
 impl<const N: usize, const T: usize> Model<N, T> {
     /// Counts are halved when they sum to more.
     const MAX_TOTAL: u32 = 1 << SHARE_BITS;
-    /// Entries of the table are bytes.
-    const UNIT: usize = N.div_ceil(1 + AHEAD + u8::MAX as usize);
     /// The most symbols.
     const MOST: usize = N - AHEAD;
+    /// Entries of the table are bytes.
+    const UNIT: usize = Self::MOST.div_ceil(1 + u8::MAX as usize);
 
     /// A model of `symbols` (2 to `N` − 3) symbols.
     pub(super) fn new(symbols: usize) -> Self {
@@ -72,14 +72,15 @@ impl<const N: usize, const T: usize> Model<N, T> {
     pub(super) fn take(&mut self, share: u32) -> (usize, u32, u32) {
         let (symbol, low, high) = self.find(share);
         self.counts[symbol] += 1;
-        self.left -= 1;
         (symbol, low, high)
     }
 
     /// To be called before [`Self::take`].
     #[inline(always)]
     pub(super) fn prepare(&mut self) {
-        if self.left == 0 {
+        let (left, is_due) = self.left.overflowing_sub(1);
+        self.left = left;
+        if is_due {
             self.renew();
         }
     }
@@ -89,7 +90,7 @@ impl<const N: usize, const T: usize> Model<N, T> {
     fn find(&self, share: u32) -> (usize, u32, u32) {
         // a share above all others begins its search at some symbol before its own
         let part = share >> self.part_bits;
-        let first = (usize::from(self.table[part as usize & (T - 1)]) * Self::UNIT).min(Self::MOST - 1);
+        let first = usize::from(self.table[part as usize & (T - 1)]) * Self::UNIT & (Self::MOST - 1);
         let bound = |ahead: usize| u32::from(self.bounds[first + ahead]);
         let [b0, b1, b2, b3] = [bound(0), bound(1), bound(2), bound(3)];
         if share >= b3 {
@@ -111,7 +112,7 @@ impl<const N: usize, const T: usize> Model<N, T> {
         (symbol, bound(symbol), bound(symbol + 1))
     }
 
-    /// Starts the model, or works out bounds from the counts.
+    /// Starts the model, or works out bounds from the counts, before a symbol.
     #[cold]
     #[inline(never)]
     fn renew(&mut self) {
@@ -127,7 +128,7 @@ impl<const N: usize, const T: usize> Model<N, T> {
             }
             self.cycle = (u32::from(self.cycle) * 5 / 4).min((symbols + 6) << 3) as u16;
         }
-        self.left = self.cycle;
+        self.left = self.cycle - 1;
         self.share_out();
     }
 
@@ -206,9 +207,9 @@ impl BitModel {
 }
 
 /// Families of such models.
-pub(super) type TinyFamily = Family<20, 32>;
-pub(super) type FlagsFamily = Family<68, 128>;
-pub(super) type BytesFamily = Family<260, 256>;
+pub(super) type TinyFamily = Family<19, 32>;
+pub(super) type FlagsFamily = Family<67, 128>;
+pub(super) type BytesFamily = Family<259, 256>;
 
 /// A model for each of up to 256 contexts, made when its context first occurs.
 #[derive(Debug, Clone)]
@@ -282,17 +283,17 @@ mod tests {
     #[test]
     fn the_search_finds_the_symbol_of_every_share() {
         let random = |x: u32| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        check::<20, 32>(2, random);
-        check::<20, 32>(16, random);
-        check::<40, 64>(33, random);
-        check::<68, 128>(64, random);
-        check::<260, 256>(32, random);
-        check::<260, 256>(256, random);
-        check::<520, 256>(515, random);
+        check::<19, 32>(2, random);
+        check::<19, 32>(16, random);
+        check::<67, 128>(33, random);
+        check::<67, 128>(64, random);
+        check::<259, 256>(32, random);
+        check::<259, 256>(256, random);
+        check::<1027, 256>(515, random);
         // the first symbol alone, then the last alone: shares as unequal as can be
-        check::<260, 256>(256, |_| 0);
-        check::<260, 256>(256, |_| u32::MAX);
-        check::<20, 32>(6, |_| u32::MAX);
+        check::<259, 256>(256, |_| 0);
+        check::<259, 256>(256, |_| u32::MAX);
+        check::<19, 32>(6, |_| u32::MAX);
     }
 
     #[test]
@@ -308,7 +309,7 @@ mod tests {
 
     #[test]
     fn models_of_a_family_are_separate_and_start_anew() {
-        let mut family = Family::<68, 128>::new(64);
+        let mut family = Family::<67, 128>::new(64);
         for context in [7, 200, 7] {
             let model = family.of(context);
             model.prepare();
