@@ -54,7 +54,15 @@ impl<S: State> Channels<S> {
 
     #[inline(always)]
     pub(super) fn of(&mut self, channel: u8) -> &mut S {
-        self.states[usize::from(channel & 3)].get_or_insert_with(|| Box::new(S::new()))
+        match &mut self.states[usize::from(channel & 3)] {
+            Some(state) => state,
+            empty => Self::fill(empty),
+        }
+    }
+
+    #[cold]
+    fn fill(empty: &mut Option<Box<S>>) -> &mut S {
+        empty.get_or_insert_with(|| Box::new(S::new()))
     }
 
     /// Begins a channel behind a point of the channel `from`.

@@ -167,7 +167,7 @@ impl<'a> Chunk<'a> {
     /// Decodes at most [`BLOCK`] records.
     fn block(&mut self, lane: &mut Lane, records: &mut [u8]) -> Filled {
         let mut block = Block::new(self, lane, records);
-        (0..block.layers.len()).for_each(|layer| block.go_on(layer, 0));
+        (0..block.layers.len()).for_each(|layer| block.go_on(layer, None));
         (block.good, block.result)
     }
 
@@ -180,9 +180,9 @@ impl<'a> Chunk<'a> {
         let mut one = Block::new(one, one_lane, one_records);
         let mut other = Block::new(other, other_lane, other_records);
         for layer in 0..one.layers.len() {
-            let [of_one, of_other] = Block::in_turn(&mut one, &mut other, layer);
-            one.go_on(layer, of_one);
-            other.go_on(layer, of_other);
+            let done = Block::in_turn(&mut one, &mut other, layer);
+            one.go_on(layer, done.map(|[done, _]| done));
+            other.go_on(layer, done.map(|[_, done]| done));
         }
         [(one.good, one.result), (other.good, other.result)]
     }
@@ -211,11 +211,12 @@ impl<'b, 'a> Block<'b, 'a> {
 
     /// Decodes a layer of two chunks in turn, if both have it, as far as both have points and no error shows. Returns how
     /// many points are done.
-    fn in_turn(one: &mut Self, other: &mut Self, layer: usize) -> [usize; LANES] {
+    fn in_turn(one: &mut Self, other: &mut Self, layer: usize) -> Option<[usize; LANES]> {
         let (both, len) = (one.good.min(other.good), one.record_len);
-        let (Some(place), Some(other_place)) = (&mut one.layers[layer], &mut other.layers[layer]) else {
-            return [0; LANES];
-        };
+        let (Some(place), Some(other_place)) = (&mut one.layers[layer], &mut other.layers[layer]) else { return None };
+        if both == 0 || place.coder.is_off() || other_place.coder.is_off() {
+            return None;
+        }
         Decoder::run_two(
             [&mut one.decoders[layer], &mut other.decoders[layer]],
             [&mut place.coder, &mut other_place.coder],
@@ -223,16 +224,16 @@ impl<'b, 'a> Block<'b, 'a> {
             [&mut one.records[..both * len], &mut other.records[..both * len]],
             len,
         )
-        .unwrap_or_default()
     }
 
-    /// Decodes the rest of a layer, of which so many points are done.
-    fn go_on(&mut self, layer: usize, done: usize) {
+    /// Decodes a layer, or the rest if some points of it are done.
+    fn go_on(&mut self, layer: usize, done: Option<usize>) {
         let Self { record_len: len, layers, decoders, points, records, good, result } = self;
         let Some(place) = &mut layers[layer] else { return };
         let decoder = &mut decoders[layer];
-        let mut done = done;
-        if !place.coder.is_off() && done < *good {
+        let is_over = done.is_some() && place.coder.is_off();
+        let mut done = done.unwrap_or(0);
+        if !is_over && done < *good {
             let records = &mut records[done * *len..*good * *len];
             done += decoder.run(&mut place.coder, &mut points[done..*good], records, *len);
         }

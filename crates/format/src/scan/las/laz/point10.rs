@@ -128,7 +128,7 @@ impl Point10 {
         in_turn!(|l| contexts[l] = points[l].returns(&mut coders[l], changes[l]));
         Self::intensities(points, coders, changes, contexts);
         in_turn!(|l| {
-            if changes[l] & !RETURNS != 0 {
+            if changes[l] != 0 {
                 points[l].last.intensity = points[l].intensities[contexts[l]];
             }
             if changes[l] & (CLASS | ANGLE | USER | SOURCE) != 0 {

@@ -2,5 +2,6 @@
 
 mod damage;
 mod format;
+mod pairs;
 mod round_trip;
 mod version_1;
