@@ -8,8 +8,8 @@ use std::hint::black_box;
 use std::ops::ControlFlow;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use pointmill_bench::las_file;
 use pointmill_bench::scene::{Random, Scene};
+use pointmill_bench::{las_file, las_layout};
 use pointmill_converter::Sampling;
 use pointmill_converter::bench_api::{Chunk, Sample};
 use pointmill_format::potree2::{BrotliScratch, encode_brotli};
@@ -22,7 +22,8 @@ fn las_parse(c: &mut Criterion) {
     let mut group = c.benchmark_group("las_parse");
     for (ending, points) in [("las", 1_000_000), ("laz", 200_000)] {
         let path = dir.path().join(format!("scene.{ending}"));
-        las_file::write(Scene::Aerial, points, 7, &path).expect("a scene can be written");
+        las_file::write(Scene::Aerial, las_layout::LasLayout::COLOUR, points, 7, &path)
+            .expect("a scene can be written");
         let scan = match las::open(&path) {
             Ok(scan) => scan,
             Err(error) => {
@@ -129,7 +130,7 @@ fn node_records(points: u64) -> Vec<u8> {
         let point = Scene::Aerial.point(index, TOTAL, &mut random);
         let inside = (0..2).all(|a| (0.0..side).contains(&(point.position[a] - Scene::Aerial.offset()[a] - 60.0)));
         if inside && (out.len() as u64) < points * 35 {
-            let las = las_file::record(Scene::Aerial, index, &point);
+            let las = las_layout::record(Scene::Aerial, index, &point);
             // Positions of a node are never negative: shift the lattice by a whole number of steps.
             for (a, shift) in [0i32, 0, 1 << 16].into_iter().enumerate() {
                 let q = i32::from_le_bytes([las[4 * a], las[4 * a + 1], las[4 * a + 2], las[4 * a + 3]]);

@@ -1,37 +1,30 @@
-//! Writes a scene as LAS 1.2 or LAZ, point format 3 (34 bytes: GPS time and colour), in one pass and little memory.
+//! Writes a scene as LAS or LAZ, in one pass and little memory, however many points there are.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlr};
+use laz::{LasZipCompressor, LazVlr};
 
-use crate::scene::{Random, Scene, ScenePoint};
+use crate::las_layout::{LasLayout, quantize};
+use crate::scene::{Random, Scene};
 
-/// Bytes of a record of point format 3.
-pub const RECORD_LEN: usize = 34;
-
-const HEADER_LEN: usize = 227;
 const VLR_HEADER_LEN: usize = 54;
 
-/// Writes `points` points of `scene` to `path`; compressed if its ending is `laz`. Same arguments, same bytes.
+/// Writes `points` points of `scene` to `path`, LAS 1.2 (formats 6 and 7: 1.4); compressed if its ending is `laz`. Same
+/// arguments, same bytes.
 ///
 /// # Errors
 /// Of the operating system, and a `points` above 2^32 − 1, the most that LAS 1.2 can hold.
-pub fn write(scene: Scene, points: u64, seed: u64, path: &Path) -> io::Result<()> {
+pub fn write(scene: Scene, layout: LasLayout, points: u64, seed: u64, path: &Path) -> io::Result<()> {
     let count = u32::try_from(points).map_err(|_| io::Error::other("LAS 1.2 holds at most 4,294,967,295 points"))?;
-    let vlr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("laz")).then(laz_vlr).transpose()?;
+    let laz = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("laz")).then(|| layout.laz()).transpose()?;
+    let mut header = Header::new(scene, layout, count, laz.as_ref())?;
     let mut file = BufWriter::with_capacity(1 << 20, File::create(path)?);
-    file.write_all(&[0; HEADER_LEN])?;
-    let mut header =
-        Header { scene, count, compressed: vlr.is_some(), offset_to_points: HEADER_LEN as u32, ..Header::default() };
-    if let Some(vlr) = vlr {
-        let mut bytes = Vec::new();
-        vlr.write_to(&mut &mut bytes)?;
-        header.offset_to_points += (VLR_HEADER_LEN + bytes.len()) as u32;
-        file.write_all(&vlr_header(bytes.len() as u16))?;
-        file.write_all(&bytes)?;
-        let mut compressor = LasZipCompressor::new(file, vlr).map_err(io::Error::other)?;
+    file.write_all(&header.bytes())?; // to be written again
+    file.write_all(&header.vlrs)?;
+    if let Some(laz) = laz {
+        let mut compressor = LasZipCompressor::new(file, laz).map_err(io::Error::other)?;
         header.write_points(seed, |record| compressor.compress_one(record))?;
         compressor.done()?;
         file = compressor.into_inner();
@@ -43,83 +36,82 @@ pub fn write(scene: Scene, points: u64, seed: u64, path: &Path) -> io::Result<()
     file.flush()
 }
 
-/// The LAS record of one point: quantized, `index` as GPS time at 100 kHz.
-pub fn record(scene: Scene, index: u64, point: &ScenePoint) -> [u8; RECORD_LEN] {
-    let mut out = [0; RECORD_LEN];
-    let quantized = quantize(scene, point);
-    for (a, q) in quantized.iter().enumerate() {
-        out[4 * a..4 * a + 4].copy_from_slice(&q.to_le_bytes());
-    }
-    out[12..14].copy_from_slice(&(point.rgb[1] >> 2).to_le_bytes()); // intensity
-    out[14] = point.returns | point.returns << 3; // the last of its returns
-    out[15] = point.class;
-    out[20..28].copy_from_slice(&(index as f64 * 1e-5 + 2e5).to_le_bytes());
-    for (c, v) in point.rgb.iter().enumerate() {
-        out[28 + 2 * c..30 + 2 * c].copy_from_slice(&v.to_le_bytes());
-    }
-    out
-}
-
-fn quantize(scene: Scene, point: &ScenePoint) -> [i32; 3] {
-    std::array::from_fn(|a| ((point.position[a] - scene.offset()[a]) / scene.scale()).round() as i32)
-}
-
 struct Header {
     scene: Scene,
+    layout: LasLayout,
     count: u32,
     compressed: bool,
-    offset_to_points: u32,
+    /// Variable-length records, and how many.
+    vlrs: Vec<u8>,
+    vlr_count: u32,
     by_return: [u32; 5],
     min: [i32; 3],
     max: [i32; 3],
 }
 
-impl Default for Header {
-    fn default() -> Self {
-        Self {
-            scene: Scene::Aerial,
-            count: 0,
-            compressed: false,
-            offset_to_points: 0,
-            by_return: [0; 5],
-            min: [i32::MAX; 3],
-            max: [i32::MIN; 3],
-        }
-    }
-}
-
 impl Header {
+    fn new(scene: Scene, layout: LasLayout, count: u32, laz: Option<&LazVlr>) -> io::Result<Self> {
+        let (min, max, by_return) = ([i32::MAX; 3], [i32::MIN; 3], [0; 5]);
+        let (compressed, vlrs, vlr_count) = (laz.is_some(), Vec::new(), 0);
+        let mut header = Self { scene, layout, count, compressed, vlrs, vlr_count, by_return, min, max };
+        if let Some(laz) = laz {
+            let mut record = Vec::new();
+            laz.write_to(&mut &mut record)?;
+            header.add_vlr(LazVlr::USER_ID, LazVlr::RECORD_ID, LazVlr::DESCRIPTION, &record);
+        }
+        let extra_bytes = layout.extra_bytes_record();
+        if !extra_bytes.is_empty() {
+            header.add_vlr("LASF_Spec", 4, "extra bytes", &extra_bytes);
+        }
+        Ok(header)
+    }
+
+    fn add_vlr(&mut self, user: &str, id: u16, description: &str, record: &[u8]) {
+        self.vlrs.reserve(VLR_HEADER_LEN + record.len());
+        self.vlrs.extend([0; 2]);
+        self.vlrs.extend(padded::<16>(user));
+        self.vlrs.extend(id.to_le_bytes());
+        self.vlrs.extend((record.len() as u16).to_le_bytes());
+        self.vlrs.extend(padded::<32>(description));
+        self.vlrs.extend(record);
+        self.vlr_count += 1;
+    }
+
     fn write_points(&mut self, seed: u64, mut write: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
-        let mut random = Random::new(seed);
+        let (mut random, mut record) = (Random::new(seed), vec![0; self.layout.record_len()]);
         for index in 0..u64::from(self.count) {
             let point = self.scene.point(index, u64::from(self.count), &mut random);
-            let quantized = quantize(self.scene, &point);
-            for (a, &q) in quantized.iter().enumerate() {
+            for (a, q) in quantize(self.scene, &point).into_iter().enumerate() {
                 self.min[a] = self.min[a].min(q);
                 self.max[a] = self.max[a].max(q);
             }
             self.by_return[usize::from(point.returns) - 1] += 1;
-            write(&record(self.scene, index, &point))?;
+            self.layout.put_record(self.scene, index, &point, &mut record);
+            write(&record)?;
         }
         Ok(())
     }
 
-    /// LAS 1.2, table 3 of the specification.
+    /// LAS 1.2, table 3 of the specification; what LAS 1.4 adds.
     fn bytes(&self) -> Vec<u8> {
-        let mut out = Vec::with_capacity(HEADER_LEN);
+        let is_modern = self.layout.is_modern();
+        let len: u16 = if is_modern { 375 } else { 227 };
+        let mut out = Vec::with_capacity(len.into());
         out.extend(b"LASF");
-        out.extend([0; 20]); // source id, encoding (GPS week time), GUID
-        out.extend([1, 2]);
+        out.extend([0, 0, if is_modern { 16 } else { 0 }, 0]); // source, encoding (GPS week time; WKT in LAS 1.4)
+        out.extend([0; 16]); // GUID
+        out.extend([1, if is_modern { 4 } else { 2 }]);
         out.extend(padded::<32>("generated"));
         out.extend(padded::<32>("pointmill-bench"));
         out.extend([1, 0, 0xEA, 0x07]); // 1 January 2026
-        out.extend((HEADER_LEN as u16).to_le_bytes());
-        out.extend(self.offset_to_points.to_le_bytes());
-        out.extend(u32::from(self.compressed).to_le_bytes()); // variable-length records
-        out.push(3 | u8::from(self.compressed) << 7);
-        out.extend((RECORD_LEN as u16).to_le_bytes());
-        out.extend(self.count.to_le_bytes());
-        out.extend(self.by_return.iter().flat_map(|n| n.to_le_bytes()));
+        out.extend(len.to_le_bytes());
+        out.extend((u32::from(len) + self.vlrs.len() as u32).to_le_bytes());
+        out.extend(self.vlr_count.to_le_bytes());
+        out.push(self.layout.format() | u8::from(self.compressed) << 7);
+        out.extend((self.layout.record_len() as u16).to_le_bytes());
+        let legacy = |count: u32| if is_modern { 0 } else { count }.to_le_bytes();
+        out.extend(legacy(self.count));
+        out.extend(self.by_return.iter().flat_map(|n| legacy(*n)));
         out.extend([self.scene.scale(); 3].iter().flat_map(|s| s.to_le_bytes()));
         out.extend(self.scene.offset().iter().flat_map(|o| o.to_le_bytes()));
         for a in 0..3 {
@@ -127,22 +119,14 @@ impl Header {
             out.extend(world(self.max[a]).to_le_bytes());
             out.extend(world(self.min[a]).to_le_bytes());
         }
+        if is_modern {
+            out.extend([0; 20]); // waveforms, extended records
+            out.extend(u64::from(self.count).to_le_bytes());
+            out.extend(self.by_return.iter().flat_map(|n| u64::from(*n).to_le_bytes()));
+            out.resize(len.into(), 0); // returns 6 to 15
+        }
         out
     }
-}
-
-fn laz_vlr() -> io::Result<LazVlr> {
-    let items = LazItemRecordBuilder::default_for_point_format_id(3, 0).map_err(io::Error::other)?;
-    Ok(LazVlr::from_laz_items(items))
-}
-
-fn vlr_header(len: u16) -> Vec<u8> {
-    let mut out = vec![0; 2];
-    out.extend(padded::<16>(LazVlr::USER_ID));
-    out.extend(LazVlr::RECORD_ID.to_le_bytes());
-    out.extend(len.to_le_bytes());
-    out.extend(padded::<32>(LazVlr::DESCRIPTION));
-    out
 }
 
 fn padded<const N: usize>(text: &str) -> [u8; N] {
@@ -158,26 +142,69 @@ mod tests {
 
     const POINTS: u64 = 120_000; // more than two LAZ chunks
 
+    /// What another library finds: all points inside the bounds of the header.
+    fn read(path: &Path) -> Vec<las::Point> {
+        let mut reader = las::Reader::from_path(path).unwrap();
+        let bounds = reader.header().bounds();
+        let all = reader.read_all().unwrap();
+        let points: Vec<las::Point> = all.points().map(Result::unwrap).collect();
+        let is_inside =
+            |p: &las::Point| bounds.min.x <= p.x && p.x <= bounds.max.x && bounds.min.z <= p.z && p.z <= bounds.max.z;
+        assert!(points.iter().all(is_inside));
+        points
+    }
+
     #[test]
     fn another_reader_finds_every_point_inside_the_header_bounds_in_las_and_laz_alike() {
         let dir = tempfile::tempdir().unwrap();
-        for scene in [Scene::Aerial, Scene::Terrestrial] {
-            let read = |ending: &str| {
+        for scene in [Scene::Aerial, Scene::Terrestrial, Scene::Volume] {
+            let [las, laz] = ["las", "laz"].map(|ending| {
                 let path = dir.path().join(format!("{}.{ending}", scene.name()));
-                write(scene, POINTS, 7, &path).unwrap();
-                let mut reader = las::Reader::from_path(&path).unwrap();
-                let bounds = reader.header().bounds();
-                let all = reader.read_all().unwrap();
-                let points: Vec<las::Point> = all.points().map(Result::unwrap).collect();
-                assert!(points.iter().all(|p| {
-                    bounds.min.x <= p.x && p.x <= bounds.max.x && bounds.min.z <= p.z && p.z <= bounds.max.z
-                }));
-                points
-            };
-            let (las, laz) = (read("las"), read("laz"));
+                write(scene, LasLayout::COLOUR, POINTS, 7, &path).unwrap();
+                read(&path)
+            });
             assert_eq!(las.len() as u64, POINTS);
             assert!(las == laz);
         }
+    }
+
+    #[test]
+    fn every_layout_has_its_fields_of_the_same_points() {
+        let dir = tempfile::tempdir().unwrap();
+        let read = |layout: LasLayout, ending: &str| {
+            let path = dir.path().join(format!("s.{ending}"));
+            write(Scene::Aerial, layout, 60_000, 7, &path).unwrap();
+            read(&path)
+        };
+        let colour = read(LasLayout::COLOUR, "las");
+        let other = [LasLayout::PLAIN, LasLayout::EXTRA, LasLayout::MODERN, LasLayout::MODERN_COLOUR];
+        for layout in other {
+            let points = read(layout, "las");
+            assert!(read(layout, "laz") == points, "{}", layout.name());
+            let expected = colour.iter().cloned().map(|mut p| {
+                p.gps_time = p.gps_time.filter(|_| layout.format() != 0);
+                p.color = p.color.filter(|_| matches!(layout.format(), 3 | 7));
+                p
+            });
+            let bare = points.iter().cloned().map(|mut p| {
+                p.extra_bytes.clear();
+                p
+            });
+            assert!(bare.eq(expected), "{}", layout.name());
+            let extra = if layout == LasLayout::EXTRA { 4 } else { 0 };
+            assert!(points.iter().all(|p| p.extra_bytes.len() == extra), "{}", layout.name());
+        }
+    }
+
+    #[test]
+    fn extra_bytes_are_described() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("s.las");
+        write(Scene::Aerial, LasLayout::EXTRA, 100, 7, &path).unwrap();
+        let scan = pointmill_format::scan::las::open(&path).unwrap();
+        let names: Vec<_> = scan.info().attributes.iter().rev().take(2).map(|a| (a.name.as_str(), a.size())).collect();
+        assert_eq!(names, [("deviation", 2), ("echo width", 2)]);
+        assert!(scan.info().warnings.is_empty());
     }
 
     #[test]
@@ -185,7 +212,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let bytes = |seed| {
             let path = dir.path().join("s.las");
-            write(Scene::Aerial, 1000, seed, &path).unwrap();
+            write(Scene::Aerial, LasLayout::COLOUR, 1000, seed, &path).unwrap();
             std::fs::read(path).unwrap()
         };
         assert!(bytes(7) == bytes(7));

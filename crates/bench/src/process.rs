@@ -8,12 +8,21 @@ use std::process::Command;
 pub struct Cost {
     /// From start to end, seconds.
     pub wall_secs: f64,
-    /// User and system time of the process and the children it waited for, seconds.
-    pub cpu_secs: f64,
+    /// Processor time in the program, with that of the children it waited for, seconds.
+    pub user_secs: f64,
+    /// Processor time in the kernel, likewise.
+    pub system_secs: f64,
     /// Highest resident set, bytes. Never below that of the program which measures (some MB).
     pub peak_bytes: u64,
     /// The exit code; −1 if a signal ended it.
     pub exit_code: i32,
+}
+
+impl Cost {
+    /// All processor time, seconds.
+    pub fn cpu_secs(&self) -> f64 {
+        self.user_secs + self.system_secs
+    }
 }
 
 /// Runs `command` to its end. Writes of earlier runs are brought to disk first, so that they are not paid for here.
@@ -45,7 +54,8 @@ pub fn run(command: &mut Command) -> io::Result<Cost> {
     let unit = if cfg!(target_os = "macos") { 1 } else { 1024 };
     Ok(Cost {
         wall_secs: start.elapsed().as_secs_f64(),
-        cpu_secs: secs(usage.ru_utime) + secs(usage.ru_stime),
+        user_secs: secs(usage.ru_utime),
+        system_secs: secs(usage.ru_stime),
         peak_bytes: usage.ru_maxrss as u64 * unit,
         exit_code: if libc::WIFEXITED(status) { libc::WEXITSTATUS(status) } else { -1 },
     })
@@ -69,8 +79,11 @@ mod tests {
         let mut sleeper = Command::new("sh");
         let cost = run(sleeper.args(["-c", "sleep 0.2; exit 3"])).unwrap();
         assert_eq!(cost.exit_code, 3);
-        assert!(cost.wall_secs >= 0.2 && cost.cpu_secs < cost.wall_secs, "{cost:?}");
+        assert!(cost.wall_secs >= 0.2 && cost.cpu_secs() < cost.wall_secs, "{cost:?}");
         assert!(cost.peak_bytes > 100 << 10, "{cost:?}");
+        let mut counts = Command::new("sh");
+        let cost = run(counts.args(["-c", "i=0; while [ $i -lt 100000 ]; do i=$((i+1)); done"])).unwrap();
+        assert!(cost.user_secs > 0.0 && cost.user_secs > cost.system_secs, "{cost:?}");
         let mut killed = Command::new("sh");
         assert_eq!(run(killed.args(["-c", "kill -9 $$"])).unwrap().exit_code, -1);
         assert!(run(&mut Command::new("no-such-program")).is_err());

@@ -13,6 +13,8 @@ pub enum Scene {
     Terrestrial,
     /// A knobbly ball of 20 cm, points all over it in no order, local metres on a lattice of 10 µm.
     Object,
+    /// A cube of 500 m filled evenly, points in no order, local metres on a lattice of 1 mm.
+    Volume,
 }
 
 /// One point, world coordinates in metres.
@@ -32,6 +34,7 @@ impl Scene {
             Self::Aerial => "aerial",
             Self::Terrestrial => "terrestrial",
             Self::Object => "object",
+            Self::Volume => "volume",
         }
     }
 
@@ -39,7 +42,7 @@ impl Scene {
     pub const fn offset(self) -> [f64; 3] {
         match self {
             Self::Aerial => [476_000.0, 4_428_000.0, 400.0],
-            Self::Terrestrial | Self::Object => [0.0; 3],
+            Self::Terrestrial | Self::Object | Self::Volume => [0.0; 3],
         }
     }
 
@@ -47,7 +50,7 @@ impl Scene {
     pub const fn scale(self) -> f64 {
         match self {
             Self::Aerial => 0.01,
-            Self::Terrestrial => 0.001,
+            Self::Terrestrial | Self::Volume => 0.001,
             Self::Object => 0.000_01,
         }
     }
@@ -58,6 +61,7 @@ impl Scene {
             Self::Aerial => aerial(index as f64, total as f64, random),
             Self::Terrestrial => terrestrial(index, total, random),
             Self::Object => object(random),
+            Self::Volume => volume(random),
         }
     }
 }
@@ -135,6 +139,11 @@ fn object(random: &mut Random) -> ScenePoint {
     let radius = 0.08 * (1.0 + knobs) + 0.000_02 * random.normal();
     let position = [around * azimuth.cos(), around * azimuth.sin(), z].map(|v| v * radius);
     ScenePoint { position, rgb: colour(knobs * 250.0 + 15.0, random.normal()), class: 0, returns: 1 }
+}
+
+fn volume(random: &mut Random) -> ScenePoint {
+    let position = [(); 3].map(|()| random.unit() * 500.0);
+    ScenePoint { position, rgb: colour(position[2] / 5.0 - 40.0, random.normal()), class: 1, returns: 1 }
 }
 
 /// SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014), and normal deviates of it.

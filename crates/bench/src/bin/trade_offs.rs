@@ -10,6 +10,7 @@ use std::{fs, io};
 
 use clap::Parser;
 use pointmill_bench::las_file;
+use pointmill_bench::las_layout::LasLayout;
 use pointmill_bench::scene::Scene;
 use pointmill_converter::{BatchesSettings, BintreeSettings, OutputReport, Plan, Silent, Target, convert};
 use pointmill_format::batches::{Batches, ErrorFigures};
@@ -72,7 +73,7 @@ fn scene_file(dir: &Path, scene: Scene, points: u64) -> io::Result<PathBuf> {
     if !path.exists() {
         eprintln!("generating {}", path.display());
         let part = path.with_extension("part.las");
-        las_file::write(scene, points, 7, &part)?;
+        las_file::write(scene, LasLayout::COLOUR, points, 7, &part)?;
         fs::rename(part, &path)?;
     }
     Ok(path)

@@ -2,34 +2,37 @@
 
 use std::path::PathBuf;
 
-use clap::{Parser, ValueEnum};
-use pointmill_bench::scene::Scene;
+use clap::Parser;
+
+use crate::job::Job;
 
 #[derive(Parser)]
-#[command(about = "Measures pointmill beside PotreeConverter and copc_converter on generated scans")]
+#[command(about = "Measures pointmill beside the floor, PotreeConverter and copc_converter on generated scans")]
 pub(crate) struct Args {
-    /// Points of the scene
-    #[arg(long, default_value = "20000000", value_parser = parse_count)]
-    pub(crate) points: u64,
-    /// What is scanned
-    #[arg(long, value_enum, default_value = "aerial")]
-    scene: SceneArg,
-    /// How the scene is stored
-    #[arg(long, value_enum, default_value = "las")]
-    pub(crate) format: Format,
-    /// What is compared
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "poisson,random,grid,brotli,threads")]
+    /// What is measured
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "aerial,terrestrial,random-order,large,brotli,outputs,decoder"
+    )]
     pub(crate) jobs: Vec<Job>,
-    /// Ceiling of the job `memory`, bytes or with KiB, MiB, GiB
-    #[arg(long, default_value = "1GiB", value_parser = parse_size)]
-    pub(crate) memory: u64,
-    /// Two sizes of scene that the job `growth` compares, points
-    #[arg(long, value_delimiter = ',', default_value = "5000000,100000000", value_parser = parse_count)]
-    pub(crate) growth: Vec<u64>,
-    /// Runs of each program; the median is reported
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) runs: u32,
-    /// Where scenes (kept and used again) and outputs (removed) go; the default is a folder for temporary files
+    /// Points of the scene; the default depends on the job. Figures of other numbers of points change no row of the
+    /// table of targets
+    #[arg(long, value_parser = parse_count)]
+    pub(crate) points: Option<u64>,
+    /// Runs of each program; the median is reported. The default is 5, of half-billion 1
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) runs: Option<u32>,
+    /// Runs only what has one of these words in its name
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) only: Vec<String>,
+    /// Memory that is taken from the system and given back before each run, so that no run pays for what the host of a
+    /// virtual machine has taken back from it; 0 for none
+    #[arg(long, default_value = "2GiB", value_parser = parse_size)]
+    pub(crate) lend: u64,
+    /// Where scenes (kept and used again up to 2 GiB) and outputs (removed) go; the default is a folder for
+    /// temporary files
     #[arg(long)]
     pub(crate) dir: Option<PathBuf>,
     /// The pointmill to measure; the default is built and found beside this program
@@ -38,53 +41,13 @@ pub(crate) struct Args {
     /// A line to add under the machine, such as the version of a program that does not report it
     #[arg(long)]
     pub(crate) note: Vec<String>,
-    /// Markdown file whose section of this scene is replaced or added; the default is standard output
+    /// Markdown file whose section of this job, and whose rows of the table of targets, are replaced or added; the
+    /// default is standard output
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,
-}
-
-/// A comparison that can be asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Job {
-    /// Poisson-disk sampling, with PotreeConverter's and copc_converter
-    Poisson,
-    /// Random sampling, with PotreeConverter's
-    Random,
-    /// Grid sampling
-    Grid,
-    /// Poisson-disk sampling with BROTLI payloads, with PotreeConverter's
-    Brotli,
-    /// One thread and two
-    Threads,
-    /// Under the ceiling of --memory, compared with the job poisson
-    Memory,
-    /// The sizes of --growth
-    Growth,
-    /// Binary tree and batches, each alone and beside an octree, compared with the job poisson
-    Formats,
-    /// Binary trees by mean, median and midpoint
-    Splits,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum SceneArg {
-    Aerial,
-    Terrestrial,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum Format {
-    Las,
-    Laz,
-}
-
-impl Args {
-    pub(crate) fn scene(&self) -> Scene {
-        match self.scene {
-            SceneArg::Aerial => Scene::Aerial,
-            SceneArg::Terrestrial => Scene::Terrestrial,
-        }
-    }
+    /// Takes so much memory and ends: how the program lends it
+    #[arg(long, hide = true, value_parser = parse_size)]
+    pub(crate) touch: Option<u64>,
 }
 
 fn parse_count(text: &str) -> Result<u64, String> {

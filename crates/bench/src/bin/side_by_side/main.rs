@@ -1,28 +1,37 @@
-//! Converts generated scans with pointmill and, when they are on `PATH`, with PotreeConverter and copc_converter, in
-//! turn, and writes what each run cost as Markdown, with the ratios that count.
+//! Converts generated scans with pointmill, with the floor (`floor`: read, sort, write) and, when they are on `PATH`, with
+//! PotreeConverter and copc_converter, in turn, and writes what each run cost as Markdown, with the figures that count.
 //!
 //! What the numbers do not show: disks (inputs come from the page cache), other scans than the generated ones, and
 //! the quality of what was written (`pointmill validate` reports that).
 
 mod args;
 mod cases;
+mod document;
+mod figures;
+mod job;
 mod outcome;
-mod table;
+mod programs;
+mod run;
+mod section;
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::ExitCode;
 use std::{fs, io};
 
 use clap::Parser as _;
-use pointmill_bench::process;
-use pointmill_bench::{las_file, scene::Scene};
 
-use args::{Args, Format};
-use cases::Program;
+use args::Args;
+use job::Job;
 use outcome::Outcome;
+use programs::Programs;
+use run::Runner;
 
 fn main() -> ExitCode {
-    match measure(&Args::parse()) {
+    let args = Args::parse();
+    if let Some(bytes) = args.touch {
+        touch(bytes);
+        return ExitCode::SUCCESS;
+    }
+    match measure(&args) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE, // the table says what went wrong
         Err(error) => {
@@ -35,106 +44,54 @@ fn main() -> ExitCode {
 fn measure(args: &Args) -> io::Result<bool> {
     let dir = args.dir.clone().unwrap_or_else(|| std::env::temp_dir().join("pointmill-bench"));
     fs::create_dir_all(&dir)?;
-    let pointmill = match &args.pointmill {
-        Some(path) => path.clone(),
-        None => built_pointmill()?,
-    };
-    let mut outcomes: Vec<Outcome> = cases::list(args)
+    let programs = Programs::new(args.pointmill.as_deref())?;
+    let runner = Runner { programs: &programs, dir: &dir, lend: args.lend };
+    let mut all_ran = true;
+    for job in &args.jobs {
+        all_ran &= measure_job(args, *job, &runner)?;
+    }
+    Ok(all_ran)
+}
+
+/// False if a program failed.
+fn measure_job(args: &Args, job: Job, runner: &Runner<'_>) -> io::Result<bool> {
+    let points = args.points.unwrap_or(job.points());
+    let mut outcomes: Vec<Outcome> = cases::list(job, points)
         .into_iter()
-        .filter_map(|case| {
-            let found = case.program == Program::Pointmill || on_path(case.program.name());
-            found.then_some(Outcome { case, costs: Vec::new(), output_bytes: 0, fault: None })
+        .filter(|case| args.only.is_empty() || args.only.iter().any(|word| case.label.contains(word)))
+        .filter(|case| {
+            let is_there = !case.program.is_foreign() || programs::on_path(case.program).is_some();
+            if !is_there {
+                eprintln!("{} is not on PATH: {} is omitted", case.program.binary(), case.label);
+            }
+            is_there
         })
+        .map(Outcome::new)
         .collect();
-    let extension = if matches!(args.format, Format::Las) { "las" } else { "laz" };
-    for outcome in &mut outcomes {
-        let (name, points) = (args.scene().name(), outcome.case.points);
-        outcome.case.input = scene_file(&dir.join(format!("{name}-{points}.{extension}")), args.scene(), points)?;
-    }
+    outcomes.iter().try_for_each(|outcome| runner.make_scene(&outcome.case.scene))?;
+    let runs = args.runs.unwrap_or(job.runs());
     // In turn, so that a machine that slows down slows all of them.
-    for run in 1..=args.runs {
+    for run in 1..=runs {
         for outcome in outcomes.iter_mut().filter(|o| o.fault.is_none()) {
-            eprintln!("run {run} of {}: {}", args.runs, outcome.case.label);
-            run_once(outcome, &pointmill, &dir)?;
+            eprintln!("{}, run {run} of {runs}: {}", job.name(), outcome.case.label);
+            runner.once(outcome)?;
         }
     }
-    let text = table::section(args, &outcomes, &pointmill);
+    outcomes.iter().try_for_each(|outcome| runner.drop_scene(&outcome.case.scene))?;
+    let section = section::section(args, job, points, &outcomes, runner.programs);
     match &args.out {
-        Some(path) => table::replace_section(path, &table::title(args), &text)?,
-        None => print!("{text}"),
-    }
-    Ok(outcomes.iter().all(|o| o.fault.is_none()))
-}
-
-fn run_once(outcome: &mut Outcome, pointmill: &Path, dir: &Path) -> io::Result<()> {
-    let output = dir.join(if outcome.case.program == Program::CopcConverter { "out.copc.laz" } else { "out" });
-    remove(&output)?;
-    let program =
-        if outcome.case.program == Program::Pointmill { pointmill } else { Path::new(outcome.case.program.name()) };
-    let said = dir.join("stderr.txt");
-    let mut command = Command::new(program);
-    command.args(outcome.case.arguments(&outcome.case.input, &output));
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(fs::File::create(&said)?);
-    let cost = process::run(&mut command)?;
-    outcome.output_bytes = size_of(&output).unwrap_or(0);
-    // PotreeConverter ends with 0 whatever happened; a dataset smaller than a byte a point is none.
-    if cost.exit_code != 0 || outcome.output_bytes < outcome.case.points {
-        let text = String::from_utf8_lossy(&fs::read(&said)?).into_owned();
-        let last = text.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("no word").to_owned();
-        outcome.fault = Some(format!("exit code {}, {} bytes: {last}", cost.exit_code, outcome.output_bytes));
-    } else {
-        outcome.costs.push(cost);
-    }
-    fs::remove_file(&said)?;
-    remove(&output)
-}
-
-/// The scene at `path`, generated unless it is there already, and read once so that no run pays the disk for it.
-fn scene_file(path: &Path, scene: Scene, points: u64) -> io::Result<PathBuf> {
-    if !path.exists() {
-        eprintln!("generating {}", path.display());
-        let part = path.with_extension(format!("part.{}", path.extension().unwrap_or_default().display()));
-        las_file::write(scene, points, 7, &part)?;
-        fs::rename(part, path)?;
-    }
-    io::copy(&mut fs::File::open(path)?, &mut io::sink())?;
-    Ok(path.to_path_buf())
-}
-
-/// The release binary beside this program, brought up to date first when cargo runs us.
-fn built_pointmill() -> io::Result<PathBuf> {
-    if let Some(cargo) = std::env::var_os("CARGO") {
-        let status = Command::new(cargo).args(["build", "--release", "-p", "pointmill"]).status()?;
-        if !status.success() {
-            return Err(io::Error::other("pointmill does not build"));
+        Some(path) => {
+            let figures = (points == job.points()).then_some((job, &outcomes[..]));
+            document::update(path, &job.title(points), &section, figures)?;
         }
+        None => println!("{section}\n{}", document::figures_of(job, &outcomes)),
     }
-    let path = std::env::current_exe()?.with_file_name(format!("pointmill{}", std::env::consts::EXE_SUFFIX));
-    if path.exists() {
-        return Ok(path);
-    }
-    let advice = "build it with cargo build --release, or pass --pointmill FILE";
-    Err(io::Error::other(format!("{} is not there; {advice}", path.display())))
+    Ok(outcomes.iter().all(|o| o.fault.is_none() && o.validation.is_none_or(|cost| cost.exit_code == 0)))
 }
 
-fn on_path(program: &str) -> bool {
-    let found = std::env::var_os("PATH")
-        .is_some_and(|path| std::env::split_paths(&path).any(|dir| dir.join(program).is_file()));
-    if !found {
-        eprintln!("{program} is not on PATH and is omitted");
-    }
-    found
-}
-
-fn size_of(path: &Path) -> io::Result<u64> {
-    let meta = fs::symlink_metadata(path)?;
-    if !meta.is_dir() {
-        return Ok(meta.len());
-    }
-    fs::read_dir(path)?.map(|entry| size_of(&entry?.path())).sum()
-}
-
-fn remove(path: &Path) -> io::Result<()> {
-    let result = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-    result.or_else(|e| if e.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(e) })
+/// Takes memory and writes to every page of it.
+fn touch(bytes: u64) {
+    let mut memory = vec![0u8; usize::try_from(bytes).unwrap_or(0)];
+    memory.iter_mut().step_by(4096).for_each(|byte| *byte = 1);
+    std::hint::black_box(&memory);
 }
