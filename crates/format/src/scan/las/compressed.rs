@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use super::ahead::{self, Ahead, Chunks, Two};
-use super::decode::Emitter;
 use super::decompress::{self, Decompressor, LazModels};
+use super::emitter::Emitter;
 use super::file::LasScan;
 use super::laszip::LaszipRecord;
 use super::laz::{Input, Layered, LayeredPair, Pair, Parts, Pointwise, Stop};
@@ -96,10 +96,10 @@ impl<'a> Compressed<'a, '_> {
         let pair = match storage {
             Storage::Layered => {
                 let layout = self.scan.layout(self.laszip);
-                let pieces = chunks.into_iter().zip([self.piece, second]);
+                let mut pieces = chunks.into_iter().zip([self.piece, second]);
                 let is_sound = |(chunk, piece): (&[u8], &Piece)| decompress::check_layered(layout, chunk, piece.points);
                 // a chunk that is not sound has its error alone
-                match pieces.map(is_sound).collect::<Result<(), Stop>>() {
+                match pieces.try_for_each(is_sound) {
                     Ok(()) => LayeredPair::new(self.models.layered(items), chunks, self.parts).map(Chunks::Layered),
                     Err(stop) => Err(stop),
                 }

@@ -2,7 +2,7 @@
 
 use super::ahead::is_small;
 use super::compressed::MAX_CHUNK_IN_MEMORY;
-use super::decode::READ_RECORDS;
+use super::emitter::READ_RECORDS;
 use super::file::LasScan;
 use super::kernels::BLOCK;
 use super::laz::WINDOW;

@@ -40,6 +40,7 @@ mod compressed;
 mod crs;
 mod decode;
 mod decompress;
+mod emitter;
 mod extra_bytes;
 mod file;
 mod geotiff;

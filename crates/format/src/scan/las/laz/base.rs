@@ -2,10 +2,11 @@
 
 use super::channels::{Channels, Meta, State};
 use super::coder::{Coder, by_copy};
+use super::family::TinyFamily;
 use super::in_turn::in_turn;
 use super::integer::Integer;
 use super::median::Median;
-use super::model::{Changes, Tiny, TinyFamily};
+use super::model::{Changes, Tiny};
 use super::returns::{context_16, level};
 
 /// Bits of the symbol that says what differs from the last point of the channel.

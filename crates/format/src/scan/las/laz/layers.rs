@@ -3,9 +3,9 @@
 use super::base::{CHANNEL_BITS, FLAGS_AT};
 use super::channels::{Channels, Layer, Meta, State};
 use super::coder::Coder;
+use super::family::{BytesFamily, FlagsFamily};
 use super::gps_time::GpsTime;
 use super::integer::Integer;
-use super::model::{BytesFamily, FlagsFamily};
 
 /// Where the fields are in a record.
 const Z_AT: usize = 8;

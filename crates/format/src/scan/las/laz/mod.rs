@@ -6,12 +6,20 @@
 //! layers of formats 6–10 (`base`, `layers`, `item_layers`) stand side by side in `layered`. Models are made once a thread and reset
 //! for each chunk.
 //!
+//! A thread decodes two chunks in turn where it can (`lanes`, `layered_chunk`): each symbol waits for the one before, and
+//! meanwhile the processor has the other chunk to do. What decoders do for a symbol has therefore no branch that depends on
+//! it, and is written out for both chunks (`in_turn`).
+//!
 //! Source: M. Isenburg, "LASzip: lossless compression of LiDAR data" (2013), and the files that LASzip 3.5 writes.
+
+// arrays of unique references, used by number: clippy takes that for reading them
+#![allow(clippy::needless_pass_by_value, clippy::needless_range_loop)]
 
 mod base;
 mod channels;
 mod coder;
 mod colour;
+mod family;
 mod gps_time;
 mod in_turn;
 mod input;

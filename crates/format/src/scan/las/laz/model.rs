@@ -90,7 +90,7 @@ impl<const N: usize, const T: usize> Model<N, T> {
     fn find(&self, share: u32) -> (usize, u32, u32) {
         // a share above all others begins its search at some symbol before its own
         let part = share >> self.part_bits;
-        let first = usize::from(self.table[part as usize & (T - 1)]) * Self::UNIT & (Self::MOST - 1);
+        let first = (usize::from(self.table[part as usize & (T - 1)]) * Self::UNIT) & (Self::MOST - 1);
         let bound = |ahead: usize| u32::from(self.bounds[first + ahead]);
         let [b0, b1, b2, b3] = [bound(0), bound(1), bound(2), bound(3)];
         if share >= b3 {
@@ -206,56 +206,6 @@ impl BitModel {
     }
 }
 
-/// Families of such models.
-pub(super) type TinyFamily = Family<19, 32>;
-pub(super) type FlagsFamily = Family<67, 128>;
-pub(super) type BytesFamily = Family<259, 256>;
-
-/// A model for each of up to 256 contexts, made when its context first occurs.
-#[derive(Debug, Clone)]
-pub(super) struct Family<const N: usize, const T: usize> {
-    /// One more than the index in `models`; 0 for a context that did not occur.
-    places: [u16; 256],
-    /// What a model is before its first symbol.
-    fresh: Model<N, T>,
-    models: Vec<Model<N, T>>,
-    used: usize,
-}
-
-impl<const N: usize, const T: usize> Family<N, T> {
-    /// Models of `symbols` symbols.
-    pub(super) fn new(symbols: usize) -> Self {
-        Self { places: [0; 256], fresh: Model::new(symbols), models: Vec::new(), used: 0 }
-    }
-
-    /// Forgets everything.
-    pub(super) fn reset(&mut self) {
-        if self.used > 0 {
-            self.places.fill(0);
-            self.used = 0;
-        }
-    }
-
-    #[inline]
-    pub(super) fn of(&mut self, context: u8) -> &mut Model<N, T> {
-        let context = usize::from(context);
-        if self.places[context] == 0 {
-            self.add(context);
-        }
-        &mut self.models[usize::from(self.places[context]) - 1]
-    }
-
-    #[cold]
-    fn add(&mut self, context: usize) {
-        match self.models.get_mut(self.used) {
-            Some(model) => model.reset(),
-            None => self.models.push(self.fresh.clone()),
-        }
-        self.used += 1;
-        self.places[context] = self.used as u16;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -305,18 +255,5 @@ mod tests {
                 assert!((1..1 << BitModel::SHARE_BITS).contains(&model.zero), "{}", model.zero);
             }
         }
-    }
-
-    #[test]
-    fn models_of_a_family_are_separate_and_start_anew() {
-        let mut family = Family::<67, 128>::new(64);
-        for context in [7, 200, 7] {
-            let model = family.of(context);
-            model.prepare();
-            model.take(100);
-        }
-        assert_eq!((family.of(7).total, family.of(200).counts[0], family.used), (64, 2, 2));
-        family.reset();
-        assert_eq!((family.of(200).total, family.used), (0, 1));
     }
 }

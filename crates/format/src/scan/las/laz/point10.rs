@@ -1,10 +1,11 @@
 //! `POINT10` version 2: the first 20 bytes of formats 0–5.
 
 use super::coder::{Coder, by_copy};
+use super::family::BytesFamily;
 use super::in_turn::in_turn;
 use super::integer::Integer;
 use super::median::Median;
-use super::model::{Bytes, BytesFamily, Flags};
+use super::model::{Bytes, Flags};
 use super::returns::{context_8, level};
 
 /// Bytes of the item.

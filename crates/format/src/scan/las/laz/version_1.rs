@@ -1,8 +1,9 @@
 //! The items of LASzip 1: simpler predictions than those of version 2.
 
 use super::coder::Coder;
+use super::family::BytesFamily;
 use super::integer::Integer;
-use super::model::{BytesFamily, Flags, Multiples, Tiny};
+use super::model::{Flags, Multiples, Tiny};
 use super::point10::{LEN, Values};
 
 /// Bits of the symbol that says which values differ from those of the point before.
