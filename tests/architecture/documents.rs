@@ -18,6 +18,7 @@ const OTHER_OPTIONS: &[&str] = &[
     "--locked",
     "--note",
     "--only",
+    "--options",
     "--out",
     "--path",
     "--points",

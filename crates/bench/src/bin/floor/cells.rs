@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use pointmill_bench::process::prefer_large_pages;
 use pointmill_format::{PointBatch, Positions, ScanInfo, with_column};
 
 /// What can go wrong is told and ends the program.
@@ -162,19 +163,4 @@ fn morton(coordinates: [u32; 3]) -> u64 {
         (v | v << 2) & 0x1249_2492_4924_9249
     });
     x | y << 1 | z << 2
-}
-
-/// Asks for pages of 2 MiB, as pointmill does: with 4 KiB, faults are an eighth of all time.
-fn prefer_large_pages(memory: &mut [u8]) {
-    #[cfg(target_os = "linux")]
-    {
-        let (start, end) = ((memory.as_ptr() as usize).next_multiple_of(4096), memory.as_ptr_range().end as usize);
-        if start < end {
-            // SAFETY: the range lies inside memory that is borrowed mutably; the call changes how it is backed, never
-            // what it holds, and a refusal is harmless.
-            unsafe { libc::madvise(start as *mut libc::c_void, end - start, libc::MADV_HUGEPAGE) };
-        }
-    }
-    #[cfg(not(target_os = "linux"))]
-    let _ = memory;
 }

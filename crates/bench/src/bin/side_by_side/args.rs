@@ -27,10 +27,13 @@ pub(crate) struct Args {
     /// Runs only what has one of these words in its name
     #[arg(long, value_delimiter = ',')]
     pub(crate) only: Vec<String>,
-    /// Memory that is taken from the system and given back before each run, so that no run pays for what the host of a
-    /// virtual machine has taken back from it; 0 for none
-    #[arg(long, default_value = "2GiB", value_parser = parse_size)]
-    pub(crate) lend: u64,
+    /// More options for every conversion by pointmill, separated by blanks
+    #[arg(long, allow_hyphen_values = true, default_value = "")]
+    pub(crate) options: String,
+    /// Memory that the host of a virtual machine has lent before a run starts, so that no run waits for it; 0 for none.
+    /// The default is 4GiB, of large 8GiB
+    #[arg(long, value_parser = parse_size)]
+    pub(crate) lend: Option<u64>,
     /// Where scenes (kept and used again up to 2 GiB) and outputs (removed) go; the default is a folder for
     /// temporary files
     #[arg(long)]
@@ -45,9 +48,9 @@ pub(crate) struct Args {
     /// default is standard output
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,
-    /// Takes so much memory and ends: how the program lends it
-    #[arg(long, hide = true, value_parser = parse_size)]
-    pub(crate) touch: Option<u64>,
+    /// Is the process that holds this memory
+    #[arg(long, hide = true)]
+    pub(crate) ballast: bool,
 }
 
 fn parse_count(text: &str) -> Result<u64, String> {

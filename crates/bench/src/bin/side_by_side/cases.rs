@@ -111,9 +111,9 @@ impl Case {
     }
 }
 
-/// Every case of a job with so many points.
-pub(crate) fn list(job: Job, points: u64) -> Vec<Case> {
-    let mut cases = Cases { scene: job.scene(points), cases: Vec::new() };
+/// Every case of a job with so many points; pointmill has `more` options.
+pub(crate) fn list(job: Job, points: u64, more: &str) -> Vec<Case> {
+    let mut cases = Cases { scene: job.scene(points), more, cases: Vec::new() };
     match job {
         Job::Aerial | Job::Terrestrial | Job::RandomOrder => one_scene(job, &mut cases),
         Job::Large => {
@@ -157,7 +157,7 @@ pub(crate) fn list(job: Job, points: u64) -> Vec<Case> {
     cases.cases
 }
 
-fn one_scene(job: Job, cases: &mut Cases) {
+fn one_scene(job: Job, cases: &mut Cases<'_>) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     cases.add(Program::Pointmill, "", "");
     cases.add(Program::Floor, "", &threads.to_string());
@@ -175,7 +175,7 @@ fn one_scene(job: Job, cases: &mut Cases) {
 }
 
 /// Alone as they come, and every combination with all attributes in each.
-fn outputs(cases: &mut Cases) {
+fn outputs(cases: &mut Cases<'_>) {
     cases.add(Program::Pointmill, "potree2", "");
     for format in ["bintree", "batches"] {
         cases.add(Program::Pointmill, format, &format!("--to {format}"));
@@ -192,15 +192,18 @@ fn outputs(cases: &mut Cases) {
     }
 }
 
-struct Cases {
+struct Cases<'a> {
     scene: SceneFile,
+    /// Options of every conversion by pointmill.
+    more: &'a str,
     cases: Vec<Case>,
 }
 
-impl Cases {
+impl Cases<'_> {
     fn add(&mut self, program: Program, detail: &str, options: &str) {
         let label = if detail.is_empty() { program.name().to_owned() } else { format!("{}, {detail}", program.name()) };
-        let options = options.split_whitespace().map(str::to_owned).collect();
+        let more = if program == Program::Pointmill { self.more } else { "" };
+        let options = options.split_whitespace().chain(more.split_whitespace()).map(str::to_owned).collect();
         self.cases.push(Case { label, program, options, scene: self.scene, is_validated: false });
     }
 
@@ -221,11 +224,18 @@ mod tests {
     #[test]
     fn labels_are_unique_in_a_job() {
         for job in Job::value_variants() {
-            let cases = list(*job, 1000);
+            let cases = list(*job, 1000, "");
             let mut labels: Vec<&str> = cases.iter().map(|case| case.label.as_str()).collect();
             labels.sort();
             labels.dedup();
             assert_eq!(labels.len(), cases.len(), "{job:?}");
         }
+    }
+
+    #[test]
+    fn more_options_are_those_of_pointmill_alone() {
+        let options: Vec<String> =
+            list(Job::Brotli, 1000, "--planes 10").into_iter().map(|case| case.options.join(" ")).collect();
+        assert_eq!(options, ["--encoding brotli --planes 10", "-m poisson --encoding BROTLI"]);
     }
 }

@@ -109,7 +109,7 @@ mod tests {
         let kept = "| BROTLI: potree2 / PotreeConverter, CPU | 0.390 | ≤ 0.4 | reached | `brotli` |";
         let old = format!("# Benchmarks\n\n## {FIGURES_TITLE}\n\n{kept}\n\n## other\n\nwords\n");
         fs::write(file.path(), old).unwrap();
-        let mut outcomes: Vec<Outcome> = cases::list(Job::RandomOrder, 10).into_iter().map(Outcome::new).collect();
+        let mut outcomes: Vec<Outcome> = cases::list(Job::RandomOrder, 10, "").into_iter().map(Outcome::new).collect();
         for (outcome, user_secs) in outcomes.iter_mut().zip([1.0, 0.5, 4.0]) {
             outcome.costs = vec![Cost { wall_secs: 1.0, user_secs, system_secs: 0.0, peak_bytes: 1, exit_code: 0 }];
         }

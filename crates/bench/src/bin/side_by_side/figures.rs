@@ -192,7 +192,7 @@ mod tests {
             peak_bytes: 1 << 20,
             exit_code: 0,
         };
-        let cases = cases::list(job, job.points()).into_iter().enumerate();
+        let cases = cases::list(job, job.points(), "").into_iter().enumerate();
         cases
             .map(|(i, case)| {
                 let validation = case.is_validated.then(|| cost(0));

@@ -67,6 +67,11 @@ impl Job {
         if matches!(self, Self::HalfBillion) { 1 } else { 5 }
     }
 
+    /// Bytes of memory that are made ready before each run, unless others are asked for.
+    pub(crate) const fn lend(self) -> u64 {
+        if matches!(self, Self::Large) { 8 << 30 } else { 4 << 30 }
+    }
+
     /// Its scene, of so many points.
     pub(crate) const fn scene(self, points: u64) -> SceneFile {
         let scene = match self {

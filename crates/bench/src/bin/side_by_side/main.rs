@@ -5,6 +5,7 @@
 //! the quality of what was written (`pointmill validate` reports that).
 
 mod args;
+mod ballast;
 mod cases;
 mod document;
 mod figures;
@@ -20,6 +21,7 @@ use std::{fs, io};
 use clap::Parser as _;
 
 use args::Args;
+use ballast::Ballast;
 use job::Job;
 use outcome::Outcome;
 use programs::Programs;
@@ -27,8 +29,8 @@ use run::Runner;
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    if let Some(bytes) = args.touch {
-        touch(bytes);
+    if args.ballast {
+        ballast::hold();
         return ExitCode::SUCCESS;
     }
     match measure(&args) {
@@ -45,18 +47,20 @@ fn measure(args: &Args) -> io::Result<bool> {
     let dir = args.dir.clone().unwrap_or_else(|| std::env::temp_dir().join("pointmill-bench"));
     fs::create_dir_all(&dir)?;
     let programs = Programs::new(args.pointmill.as_deref())?;
-    let runner = Runner { programs: &programs, dir: &dir, lend: args.lend };
+    let ballast = (args.lend != Some(0)).then(Ballast::start).transpose()?;
+    let mut runner = Runner { programs: &programs, dir: &dir, ballast, lend: 0 };
     let mut all_ran = true;
     for job in &args.jobs {
-        all_ran &= measure_job(args, *job, &runner)?;
+        all_ran &= measure_job(args, *job, &mut runner)?;
     }
     Ok(all_ran)
 }
 
 /// False if a program failed.
-fn measure_job(args: &Args, job: Job, runner: &Runner<'_>) -> io::Result<bool> {
+fn measure_job(args: &Args, job: Job, runner: &mut Runner<'_>) -> io::Result<bool> {
     let points = args.points.unwrap_or(job.points());
-    let mut outcomes: Vec<Outcome> = cases::list(job, points)
+    runner.lend = args.lend.unwrap_or(job.lend());
+    let mut outcomes: Vec<Outcome> = cases::list(job, points, &args.options)
         .into_iter()
         .filter(|case| args.only.is_empty() || args.only.iter().any(|word| case.label.contains(word)))
         .filter(|case| {
@@ -87,11 +91,4 @@ fn measure_job(args: &Args, job: Job, runner: &Runner<'_>) -> io::Result<bool> {
         None => println!("{section}\n{}", document::figures_of(job, &outcomes)),
     }
     Ok(outcomes.iter().all(|o| o.fault.is_none() && o.validation.is_none_or(|cost| cost.exit_code == 0)))
-}
-
-/// Takes memory and writes to every page of it.
-fn touch(bytes: u64) {
-    let mut memory = vec![0u8; usize::try_from(bytes).unwrap_or(0)];
-    memory.iter_mut().step_by(4096).for_each(|byte| *byte = 1);
-    std::hint::black_box(&memory);
 }

@@ -7,6 +7,7 @@ use std::{fs, io};
 use pointmill_bench::{las_file, process};
 use pointmill_format::serde_json;
 
+use crate::ballast::Ballast;
 use crate::cases::{Case, Program};
 use crate::job::SceneFile;
 use crate::outcome::Outcome;
@@ -22,7 +23,9 @@ const KEPT: u64 = 2 << 30;
 pub(crate) struct Runner<'a> {
     pub(crate) programs: &'a Programs,
     pub(crate) dir: &'a Path,
-    /// Bytes of memory that are taken and given back before each run.
+    /// Holds memory that runs take.
+    pub(crate) ballast: Option<Ballast>,
+    /// Bytes that it holds before each run.
     pub(crate) lend: u64,
 }
 
@@ -31,10 +34,9 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// Of the operating system; that the program fails is none.
-    pub(crate) fn once(&self, outcome: &mut Outcome) -> io::Result<()> {
+    pub(crate) fn once(&mut self, outcome: &mut Outcome) -> io::Result<()> {
         let output = self.dir.join(outcome.case.output());
         remove(&output)?;
-        self.lend_memory()?;
         let input = self.scene_path(&outcome.case.scene);
         let mut command = Command::new(self.programs.path(outcome.case.program));
         command.args(outcome.case.arguments(&input, &output));
@@ -54,7 +56,7 @@ impl Runner<'_> {
         remove(&output)
     }
 
-    fn validate(&self, case: &Case, output: &Path, input: &Path) -> io::Result<process::Cost> {
+    fn validate(&mut self, case: &Case, output: &Path, input: &Path) -> io::Result<process::Cost> {
         eprintln!("validating: {}", case.label);
         let mut command = Command::new(self.programs.path(Program::Pointmill));
         let memory = case.options.iter().skip_while(|option| *option != "--memory").take(2);
@@ -67,23 +69,18 @@ impl Runner<'_> {
     }
 
     /// Runs a command to its end; with the last line that it said on standard error.
-    fn cost(&self, command: &mut Command) -> io::Result<(process::Cost, String)> {
+    fn cost(&mut self, command: &mut Command) -> io::Result<(process::Cost, String)> {
         let said = self.dir.join("stderr.txt");
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(fs::File::create(&said)?);
+        process::settle();
+        if let Some(ballast) = &mut self.ballast {
+            ballast.fill(self.lend)?; // last: the host does not wait long
+        }
         let cost = process::run(command)?;
         let text = String::from_utf8_lossy(&fs::read(&said)?).into_owned();
         fs::remove_file(&said)?;
         let last = text.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("no word").to_owned();
         Ok((cost, last))
-    }
-
-    /// By a process of its own, whose memory is not counted with that of this one.
-    fn lend_memory(&self) -> io::Result<()> {
-        if self.lend > 0 {
-            let mut command = Command::new(std::env::current_exe()?);
-            command.args(["--touch", &self.lend.to_string()]).status()?;
-        }
-        Ok(())
     }
 
     /// Makes a scene, unless it is there already, and reads it once so that no run pays the disk for it.

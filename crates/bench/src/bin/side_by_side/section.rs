@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn costs_are_told_beside_those_of_the_floor() {
-        let cases = cases::list(Job::RandomOrder, 1_000_000).into_iter();
+        let cases = cases::list(Job::RandomOrder, 1_000_000, "").into_iter();
         let mut outcomes: Vec<Outcome> = cases.map(Outcome::new).collect();
         let cost = |user_secs| Cost { wall_secs: 2.0, user_secs, system_secs: 0.5, peak_bytes: 3 << 20, exit_code: 0 };
         outcomes[0].costs = vec![cost(2.5), cost(3.5), cost(5.5)];
@@ -155,7 +155,7 @@ mod tests {
     fn generated_lines_fit_into_the_width_of_the_documents() {
         use clap::ValueEnum as _;
         for job in Job::value_variants() {
-            for case in cases::list(*job, job.points()) {
+            for case in cases::list(*job, job.points(), "") {
                 let line = command_line(&case);
                 assert!(line.chars().count() <= 120, "{line}");
             }
