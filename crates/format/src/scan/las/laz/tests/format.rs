@@ -130,7 +130,7 @@ impl Format {
     }
 
     /// The items as the crate `laz` has them.
-    fn laz_items(self) -> Vec<::laz::LazItem> {
+    pub(super) fn laz_items(self) -> Vec<::laz::LazItem> {
         let mut record = vec![0; 34];
         record[0] = if self.is_layered() { 3 } else { 2 };
         let items = self.items();
