@@ -51,7 +51,8 @@ fn compare(format: Format, rounds: u64, seed: u64) -> Outcomes {
     let start = if format.is_layered() { first_layer(&whole, sizes, format) } else { format.record_len() };
     let (mut models, mut outcomes) = (format.models(), Outcomes::default());
     for _ in 0..rounds {
-        let chunk = damage::mutated(&whole, &[start..whole.len()], &mut random);
+        let coded = start..whole.len();
+        let chunk = damage::mutated(&whole, &[coded.clone(), coded], &mut random);
         let (found, result) = format.decode(&mut models, &chunk, POINTS, 64);
         match (result, by_laz(format, &chunk)) {
             (Ok(()), Some(right)) => {
