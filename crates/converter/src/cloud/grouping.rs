@@ -84,11 +84,14 @@ impl Grouping {
         self.order.resize(self.ids.len(), 0);
         self.places.clear();
         self.places.reserve(self.ids.len());
-        for (i, &id) in self.ids.iter().enumerate() {
-            let at = &mut self.starts[id as usize];
-            self.order[*at as usize] = i as u32;
-            self.places.push(*at);
-            *at += 1;
+        let mut i = 0;
+        for run in self.ids.chunk_by(|a, b| a == b) {
+            let start = &mut self.starts[run[0] as usize];
+            let places = *start..*start + run.len() as u32;
+            *start = places.end;
+            self.order[places.start as usize..places.end as usize].iter_mut().zip(i..).for_each(|(to, i)| *to = i);
+            self.places.extend(places);
+            i += run.len() as u32;
         }
     }
 

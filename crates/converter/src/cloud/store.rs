@@ -8,7 +8,7 @@ use crate::error::ConvertError;
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
 
 /// Blocks grow to this size: a few large pages, and one long write when they go to disk.
-pub(crate) const BLOCK_BYTES: usize = (8 << 20) - os_hints::HEADER_BYTES;
+pub(crate) const BLOCK_BYTES: usize = 8 << 20;
 
 /// Blocks of records. A block holds records of one source and never changes; it is dropped once all of it was taken.
 pub(crate) struct Store {

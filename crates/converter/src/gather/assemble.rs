@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::columns::{Part, RowsOf};
 use crate::cloud::{Checksum, JobColumns, StoredOrigin, copy_record};
-use crate::runtime::Vectors;
+use crate::runtime::{Vectors, vectorized};
 use crate::sources::{MARK_BYTES, POSITION_BYTES, Schema};
 
 /// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
@@ -55,25 +55,31 @@ pub(super) struct Assembler {
 }
 
 impl Assembler {
-    /// Appends the records of a slice; `places`: where each goes among them, empty if all stay in order.
-    pub(super) fn append(
-        &mut self,
-        assembly: &Assembly<'_>,
-        places: &[u32],
-        records: &mut Vec<u8>,
-        checksum: &mut Checksum,
-    ) {
-        let (start, stride) = (records.len(), assembly.schema.stride);
-        records.resize(start + assembly.q.len() * stride, 0);
-        let records = &mut records[start..];
-        self.vectors.run(|| match places {
-            [] => assembly.put_in_order(records, checksum),
-            places => assembly.put_to(places, records, &mut self.tile, checksum),
-        });
+    /// Writes the records of a slice; `places`: where each goes among them, empty if all stay in order.
+    pub(super) fn put(&mut self, assembly: &Assembly<'_>, places: &[u32], records: &mut [u8], checksum: &mut Checksum) {
+        put(self.vectors, assembly, places, records, &mut self.tile, checksum);
     }
 }
 
+vectorized! {
+    fn put(
+        assembly: &Assembly<'_>,
+        places: &[u32],
+        records: &mut [u8],
+        tile: &mut Vec<u8>,
+        checksum: &mut Checksum,
+    ) = Assembly::put;
+}
+
 impl Assembly<'_> {
+    #[inline(always)]
+    fn put(&self, places: &[u32], records: &mut [u8], tile: &mut Vec<u8>, checksum: &mut Checksum) {
+        match places {
+            [] => self.put_in_order(records, checksum),
+            places => self.put_to(places, records, tile, checksum),
+        }
+    }
+
     #[inline(always)]
     fn put_in_order(&self, records: &mut [u8], checksum: &mut Checksum) {
         for (i, tile) in records.chunks_mut(TILE_POINTS * self.schema.stride).enumerate() {

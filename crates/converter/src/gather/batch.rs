@@ -14,7 +14,7 @@ use super::visit::Visit;
 use super::{exact, moved, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Group, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
-use crate::runtime::{Consumer, Reservation, Vectors, os_hints};
+use crate::runtime::{Consumer, Reservation, Vectors, os_hints, vectorized};
 use crate::sources::Recast;
 
 /// A batch is taken in slices of this many points, whose columns stay in the second-level cache while they are
@@ -143,7 +143,10 @@ impl<'a> Worker<'a> {
             rows,
             marks: self.pass.intake.mark.map(|at| (at, &self.marks[..])),
         };
-        self.assembler.append(&assembly, &self.grouping.places, &mut self.records, &mut self.stats.checksum);
+        let written = self.records.len();
+        self.records.resize(written + points * assembly.schema.stride, 0);
+        let records = &mut self.records[written..];
+        self.assembler.put(&assembly, &self.grouping.places, records, &mut self.stats.checksum);
         if is_loose {
             let cells = self.grouping.groups.iter().map(|(cell, count)| (morton_of(*cell), *count));
             self.collected.leave(Segment { block, start, count: points as u32 }, cells);
@@ -211,7 +214,7 @@ impl<'a> Worker<'a> {
             q.clear();
             change.clear();
             *moved = quantize_axis(&map, a, &batch.positions, rows, q, change);
-            (bounds.min[a], bounds.max[a]) = Vectors::best().run(|| extent(q));
+            (bounds.min[a], bounds.max[a]) = extent(Vectors::best(), q);
         }
         let points = self.q.len();
         let axes = std::array::from_fn(|a| match moved[a] {
@@ -279,9 +282,13 @@ fn stored_columns<'b>(batch: &'b PointBatch, recast: &'b [(usize, Column)]) -> V
     columns
 }
 
-/// The smallest and the largest coordinate.
+vectorized! {
+    /// The smallest and the largest coordinate.
+    fn extent(q: &[i64]) -> (i64, i64) = extent_anyhow;
+}
+
 #[inline(always)]
-fn extent(q: &[i64]) -> (i64, i64) {
+fn extent_anyhow(q: &[i64]) -> (i64, i64) {
     q.iter().fold((i64::MAX, i64::MIN), |(min, max), v| (min.min(*v), max.max(*v)))
 }
 

@@ -20,7 +20,7 @@ pub(crate) use open_files::most_open_files;
 pub(crate) use pool::{Consumer, Evict, Pool, Reservation};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use vectors::Detected;
-pub(crate) use vectors::Vectors;
+pub(crate) use vectors::{Vectors, vectorized};
 pub(crate) use workers::Workers;
 
 use std::ops::Deref;

@@ -7,16 +7,9 @@
 
 use std::fs::File;
 
-/// Bytes of a large page.
-const LARGE: usize = 2 << 20;
-
-/// What an allocator may put in front of a buffer. Buffers of whole large pages less this are mapped as whole large pages,
-/// which Linux then places at a multiple of their size; one byte more, and a quarter of a buffer of 8 MiB is in small pages.
-pub(crate) const HEADER_BYTES: usize = 64;
-
-/// An empty buffer of that capacity or a little more, in large pages where the system has them.
+/// An empty buffer of that capacity, in large pages where the system has them.
 pub(crate) fn buffer(capacity: usize) -> Vec<u8> {
-    let mut buffer = Vec::with_capacity(in_large_pages(capacity));
+    let mut buffer = Vec::with_capacity(capacity);
     prefer_large_pages(&mut buffer);
     buffer
 }
@@ -24,32 +17,26 @@ pub(crate) fn buffer(capacity: usize) -> Vec<u8> {
 /// Makes room for `additional` more bytes, in large pages where the system has them.
 pub(crate) fn reserve(buffer: &mut Vec<u8>, additional: usize) {
     if buffer.capacity() - buffer.len() < additional {
-        buffer.reserve_exact(in_large_pages(buffer.len() + additional) - buffer.len());
+        buffer.reserve_exact(additional);
         prefer_large_pages(buffer);
-    }
-}
-
-/// A capacity that fills large pages; a smaller one stays as it is.
-fn in_large_pages(capacity: usize) -> usize {
-    match capacity {
-        0..LARGE => capacity,
-        _ => (capacity + HEADER_BYTES).next_multiple_of(LARGE) - HEADER_BYTES,
     }
 }
 
 #[cfg(target_os = "linux")]
 fn prefer_large_pages(buffer: &mut Vec<u8>) {
+    const LARGE: usize = 2 << 20;
     const SMALL: usize = 4096;
-    if buffer.capacity() < LARGE - HEADER_BYTES {
+    if buffer.capacity() < LARGE {
         return;
     }
-    // from the page that the allocator's header is in: a mapping that began behind it could not use its first large page
     let start = buffer.as_mut_ptr() as usize;
-    let (first, end) = (start / SMALL * SMALL, (start + buffer.capacity()).next_multiple_of(SMALL));
-    // SAFETY: the range is the pages of an allocation that `buffer` owns and borrows mutably; they exist. MADV_HUGEPAGE changes
-    // how they are backed, never what they hold, also where others have a part of them; a refusal is harmless. Paid for by the
-    // whole-program benchmark.
-    unsafe { libc::madvise(first as *mut libc::c_void, end - first, libc::MADV_HUGEPAGE) };
+    let first = start.next_multiple_of(SMALL);
+    let end = (start + buffer.capacity()) / SMALL * SMALL;
+    if first < end {
+        // SAFETY: the range lies inside an allocation that `buffer` owns and borrows mutably. MADV_HUGEPAGE changes how
+        // the range is backed, never what it holds; a refusal is harmless. Paid for by the whole-program benchmark.
+        unsafe { libc::madvise(first as *mut libc::c_void, end - first, libc::MADV_HUGEPAGE) };
+    }
 }
 
 #[cfg(not(target_os = "linux"))]
@@ -98,7 +85,5 @@ mod tests {
         reserve(&mut b, 9 << 20);
         assert!(b.capacity() >= 13 << 20 && b.len() == 4 << 20 && b.iter().all(|v| *v == 7));
         assert_eq!(buffer(0).capacity(), 0);
-        assert_eq!(in_large_pages((8 << 20) - HEADER_BYTES), (8 << 20) - HEADER_BYTES);
-        assert_eq!(in_large_pages(8 << 20), (10 << 20) - HEADER_BYTES);
     }
 }

@@ -30,17 +30,6 @@ impl Vectors {
         Self::Portable
     }
 
-    /// Runs `work`, compiled for these instructions as far as it is inlined: it should call what is `#[inline(always)]`.
-    #[inline(always)]
-    pub(crate) fn run<R>(self, work: impl FnOnce() -> R) -> R {
-        match self {
-            Self::Portable => work(),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the processor has these instructions, or there were no `Detected`.
-            Self::Avx2(_) => unsafe { run_avx2(work) },
-        }
-    }
-
     /// All that this processor has.
     #[cfg(test)]
     pub(crate) fn all() -> Vec<Self> {
@@ -56,8 +45,24 @@ impl Default for Vectors {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn run_avx2<R>(work: impl FnOnce() -> R) -> R {
-    work()
+/// `vectorized! { fn name(argument: Type, …) -> Output = work; }` makes a function that takes [`Vectors`] first and then calls
+/// `work`, an `#[inline(always)]` function of the same arguments, compiled for these instructions.
+macro_rules! vectorized {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $out:ty)? = $work:path;) => {
+        $(#[$meta])*
+        $vis fn $name(vectors: $crate::runtime::Vectors, $($arg: $ty),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+            fn with_avx2($($arg: $ty),*) $(-> $out)? {
+                $work($($arg),*)
+            }
+            match vectors {
+                $crate::runtime::Vectors::Portable => $work($($arg),*),
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: the processor has these instructions, or there were no `Detected`.
+                $crate::runtime::Vectors::Avx2(_) => unsafe { with_avx2($($arg),*) },
+            }
+        }
+    };
 }
+pub(crate) use vectorized;

@@ -104,8 +104,15 @@ impl Poisson {
         match self.vectors {
             Vectors::Portable => self.choose_tiles(Portable, part),
             #[cfg(target_arch = "x86_64")]
-            Vectors::Avx2(detected) => self.vectors.run(|| self.choose_tiles(Avx2::new(detected), part)),
+            // SAFETY: the processor has these instructions, or there were no `detected`.
+            Vectors::Avx2(detected) => unsafe { self.choose_avx2(Avx2::new(detected), part) },
         }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    fn choose_avx2(&mut self, compare: Avx2, part: Part<'_>) {
+        self.choose_tiles(compare, part);
     }
 
     #[inline(always)]
