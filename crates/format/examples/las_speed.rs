@@ -16,6 +16,7 @@ fn main() -> Result<(), ReadError> {
         let (mut scratch, mut points, mut sum) = (Scratch::default(), 0, [0i64; 3]);
         let start = Instant::now();
         for piece in 0..scan.pieces().len() {
+            scratch.next_piece = Some(piece + 1);
             let result = scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
                 points += batch.len();
                 if let Positions::Quantized(xyz) = &batch.positions {

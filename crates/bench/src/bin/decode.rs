@@ -36,6 +36,7 @@ fn by_pointmill(path: &Path) -> Result<u64> {
     let scan = las::open(path)?;
     let (wanted, mut scratch, mut points) = (Wanted::all(scan.info()), Scratch::default(), 0);
     for piece in 0..scan.pieces().len() {
+        scratch.next_piece = Some(piece + 1);
         scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
             points += std::hint::black_box(batch).len() as u64;
             ControlFlow::Continue(())

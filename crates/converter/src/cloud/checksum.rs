@@ -50,6 +50,7 @@ fn hash(record: &[u8]) -> u64 {
 
 impl Checksum {
     /// Adds every record of `records` (`stride` bytes each).
+    #[inline]
     pub(crate) fn add_all(&mut self, records: &[u8], stride: usize) {
         for record in records.chunks_exact(stride) {
             self.add(record);

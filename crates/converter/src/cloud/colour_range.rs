@@ -2,6 +2,8 @@
 
 use pointmill_format::Column;
 
+use crate::runtime::{Vectors, vectorized};
+
 /// Least and greatest red, green and blue of 16 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ColourRange {
@@ -16,12 +18,21 @@ impl Default for ColourRange {
     }
 }
 
+vectorized! {
+    fn include(range: &mut ColourRange, column: &Column, selection: Option<&[u32]>) = ColourRange::include_anyhow;
+}
+
 /// Values that are compared at once: whole colours, and vectors of the processor.
 const LANES: usize = 24;
 
 impl ColourRange {
     /// Includes the colours of `column` (three `u16` a point) that `selection` names (`None`: all).
     pub(crate) fn include(&mut self, column: &Column, selection: Option<&[u32]>) {
+        include(Vectors::best(), self, column, selection);
+    }
+
+    #[inline(always)]
+    fn include_anyhow(&mut self, column: &Column, selection: Option<&[u32]>) {
         let Column::UInt16(values) = column else { return };
         let colours = values.as_chunks::<3>().0;
         match selection {

@@ -65,7 +65,7 @@ impl JobColumns {
     }
 
     /// The point of a row.
-    #[inline]
+    #[cfg(test)]
     pub(crate) fn point(&self, row: usize) -> JobPoint {
         JobPoint([self.0[0][row], self.0[1][row], self.0[2][row]])
     }

@@ -30,6 +30,8 @@ impl std::hash::Hasher for CellHasher {
 pub(crate) struct Grouping {
     /// Indices of the points, cell by cell.
     pub(crate) order: Vec<u32>,
+    /// Where each point is in `order`; empty if all are where they were.
+    pub(crate) places: Vec<u32>,
     /// Cell and number of points, in the order of `order`.
     pub(crate) groups: Vec<(u64, u32)>,
     local: HashMap<u64, u32, CellHash>,
@@ -80,22 +82,30 @@ impl Grouping {
         std::mem::swap(&mut self.groups, &mut self.seen);
         self.order.clear();
         self.order.resize(self.ids.len(), 0);
-        for (i, &id) in self.ids.iter().enumerate() {
-            let at = &mut self.starts[id as usize];
-            self.order[*at as usize] = i as u32;
-            *at += 1;
+        self.places.clear();
+        self.places.reserve(self.ids.len());
+        let mut i = 0;
+        for run in self.ids.chunk_by(|a, b| a == b) {
+            let start = &mut self.starts[run[0] as usize];
+            let places = *start..*start + run.len() as u32;
+            *start = places.end;
+            self.order[places.start as usize..places.end as usize].iter_mut().zip(i..).for_each(|(to, i)| *to = i);
+            self.places.extend(places);
+            i += run.len() as u32;
         }
     }
 
     /// Keeps points of no known cell in the order in which they came.
     pub(crate) fn keep(&mut self, points: usize) {
         self.groups.clear();
+        self.places.clear();
         self.order.clear();
         self.order.extend(0..points as u32);
     }
 
     /// Leaves the counted points in the order in which they came.
     pub(crate) fn leave(&mut self) {
+        self.places.clear();
         self.order.clear();
         self.order.extend(0..self.ids.len() as u32);
     }
@@ -110,6 +120,7 @@ mod tests {
         let mut g = Grouping::default();
         g.count(&[7, 7, 3, 7, 1, 3]);
         g.arrange(|cell| cell);
+        assert!(g.order.iter().zip(0..).all(|(i, place)| g.places[*i as usize] == place));
         let mut seen = 0;
         for &(cell, count) in &g.groups {
             let members = &g.order[seen..seen + count as usize];
@@ -121,6 +132,7 @@ mod tests {
         assert_eq!(g.groups, [(1, 1), (3, 2), (7, 3)]);
         g.count(&[4, 4, 2]);
         g.leave();
+        assert!(g.places.is_empty());
         assert_eq!((&g.groups[..], &g.order[..]), (&[(4, 2), (2, 1)][..], &[0, 1, 2][..]));
         g.keep(2);
         assert!(g.groups.is_empty() && g.order == [0, 1]);

@@ -12,7 +12,7 @@ pub(crate) struct MortonSorter {
     index_bits: u32,
 }
 
-const DIGIT_BITS: u32 = 11;
+const DIGIT_BITS: u32 = 10;
 
 impl MortonSorter {
     /// Bits of a code that fit beside the index of one of `count` points.
@@ -83,14 +83,29 @@ fn index_mask(index_bits: u32) -> u64 {
     if index_bits < u64::BITS { (1 << index_bits) - 1 } else { u64::MAX }
 }
 
-/// Least-significant-digit radix sort of the bits `from..to`; what is below `from` is in order already.
+/// Sorts by the bits from `from` to `to`; what is below `from` is in order already, and no two keys are the same.
+///
+/// A radix sort, least significant digit first, of the upper bits: as many as tell the points of a surface from one
+/// another. The few whose upper bits agree lie side by side then, and are sorted in place.
 fn radix_sort(keys: &mut Vec<u64>, swap: &mut Vec<u64>, from: u32, to: u32) {
     if keys.len() < 512 {
         keys.sort_unstable();
         return;
     }
-    let passes = (to - from).div_ceil(DIGIT_BITS);
-    let digit_bits = (to - from).div_ceil(passes.max(1)).max(1);
+    let telling = keys.len().ilog2() * 3 / 2;
+    let passes = telling.min(to - from).div_ceil(DIGIT_BITS).max(1);
+    let start = from.max(to.saturating_sub(passes * DIGIT_BITS));
+    radix_sort_upper(keys, swap, start, to, passes);
+    if start > from {
+        for run in keys.chunk_by_mut(|a, b| a >> start == b >> start).filter(|run| run.len() > 1) {
+            run.sort_unstable();
+        }
+    }
+}
+
+/// Sorts by the bits from `from` to `to`, in so many passes; keys that agree in them stay in order.
+fn radix_sort_upper(keys: &mut Vec<u64>, swap: &mut Vec<u64>, from: u32, to: u32, passes: u32) {
+    let digit_bits = (to - from).div_ceil(passes).max(1);
     let mask = (1u64 << digit_bits) - 1;
     let buckets = 1usize << digit_bits;
     let mut counts = vec![0u32; buckets * passes as usize];
@@ -137,7 +152,9 @@ mod tests {
     fn every_point_once_in_order_of_code_and_ties_by_comparison() {
         let mut next = random();
         let mut sorter = MortonSorter::default();
-        for (count, bits) in [(0, 63), (1, 63), (5, 63), (5000, 63), (5000, 20), (5000, 3), (5000, 0)] {
+        for (count, bits) in
+            [(0, 63), (1, 63), (5, 63), (5000, 63), (5000, 40), (5000, 20), (5000, 3), (5000, 0), (40_000, 48)]
+        {
             let codes: Vec<u64> = (0..count).map(|_| if bits == 0 { 0 } else { next() >> (64 - bits) }).collect();
             let tie = |i: usize| (codes[i], i % 7, i);
             sorter.codes(codes.len()).extend(&codes);

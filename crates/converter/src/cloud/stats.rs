@@ -5,6 +5,7 @@ use pointmill_format::{Aabb, Changes, Column, with_column};
 use super::checksum::Checksum;
 use super::colour_range::ColourRange;
 use super::frames::JobBounds;
+use crate::runtime::{Vectors, vectorized};
 use crate::sources::Schema;
 use crate::warning::Warning;
 
@@ -212,6 +213,11 @@ impl Range {
 
     /// Includes the points of `column` that `selection` names (`None`: all).
     pub(crate) fn include(&mut self, column: &Column, selection: Option<&[u32]>) {
+        include(Vectors::best(), self, column, selection);
+    }
+
+    #[inline(always)]
+    fn include_anyhow(&mut self, column: &Column, selection: Option<&[u32]>) {
         let elements = self.min.len();
         for e in 0..elements {
             let (min, max, odd) = with_column!(column, v => match (selection, elements) {
@@ -224,6 +230,10 @@ impl Range {
             self.has_non_finite |= odd;
         }
     }
+}
+
+vectorized! {
+    fn include(range: &mut Range, column: &Column, selection: Option<&[u32]>) = Range::include_anyhow;
 }
 
 /// Smallest, largest and "something was not finite" of an iterator of numbers, in the numbers' own type first (the

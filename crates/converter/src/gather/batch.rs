@@ -1,10 +1,10 @@
 //! From a batch of columns to a block of records grouped by cell.
 
-use std::ops::Range;
 use std::sync::atomic::Ordering;
 
 use pointmill_format::{Column, PointBatch, Positions};
 
+use super::assemble::{Assembler, Assembly, Rows};
 use super::axis::{Moved, SourceMap};
 use super::columns::Part;
 use super::context::{Collected, Context};
@@ -14,11 +14,8 @@ use super::visit::Visit;
 use super::{exact, moved, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Group, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
-use crate::runtime::{Consumer, Reservation, os_hints};
-use crate::sources::{MARK_BYTES, POSITION_BYTES, Recast};
-
-/// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
-const TILE_POINTS: usize = 512;
+use crate::runtime::{Consumer, Reservation, Vectors, os_hints, vectorized};
+use crate::sources::Recast;
 
 /// A batch is taken in slices of this many points, whose columns stay in the second-level cache while they are
 /// gathered cell by cell.
@@ -41,6 +38,7 @@ pub(super) struct Worker<'a> {
     selection: Vec<u32>,
     cells: Vec<u64>,
     grouping: Grouping,
+    assembler: Assembler,
     /// The block that is being filled, and its records so far.
     open: Option<OpenBlock>,
     records: Vec<u8>,
@@ -64,6 +62,7 @@ impl<'a> Worker<'a> {
             selection: Vec::new(),
             cells: Vec::new(),
             grouping: Grouping::default(),
+            assembler: Assembler::default(),
             open: None,
             records: Vec::new(),
         }
@@ -136,7 +135,18 @@ impl<'a> Worker<'a> {
         visit.seen.kept += points as u64;
         let is_loose = self.group(is_scattered);
         let (block, start) = self.room_for(visit.group, points)?;
-        self.assemble(&visit.intake.columns, columns, rows);
+        let assembly = Assembly {
+            schema: &self.pass.intake.schema,
+            origin: self.pass.partition.origin(),
+            q: &self.q,
+            parts: Part::of(columns, &visit.intake.columns, &self.pass.intake.schema),
+            rows,
+            marks: self.pass.intake.mark.map(|at| (at, &self.marks[..])),
+        };
+        let written = self.records.len();
+        self.records.resize(written + points * assembly.schema.stride, 0);
+        let records = &mut self.records[written..];
+        self.assembler.put(&assembly, &self.grouping.places, records, &mut self.stats.checksum);
         if is_loose {
             let cells = self.grouping.groups.iter().map(|(cell, count)| (morton_of(*cell), *count));
             self.collected.leave(Segment { block, start, count: points as u32 }, cells);
@@ -194,46 +204,6 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Builds the records in the order of their cells; `places`: where each column goes in the schema.
-    fn assemble(&mut self, places: &[Option<usize>], columns: &[&Column], slice: &Rows<'_>) {
-        let schema = &self.pass.intake.schema;
-        let stride = schema.stride;
-        let order = &self.grouping.order;
-        let origin = self.pass.partition.origin();
-        let start = self.records.len();
-        self.records.resize(start + order.len() * stride, 0);
-        let parts = Part::of(columns, places, schema);
-        let mut rows = [0u32; TILE_POINTS];
-        for (tile, order) in self.records[start..].chunks_mut(TILE_POINTS * stride).zip(order.chunks(TILE_POINTS)) {
-            for (record, &i) in tile.chunks_exact_mut(stride).zip(order) {
-                let [x, y, z] = origin.stored(self.q.point(i as usize)).0;
-                if let Some(position) = record.first_chunk_mut::<POSITION_BYTES>() {
-                    position[..4].copy_from_slice(&x.to_le_bytes());
-                    position[4..8].copy_from_slice(&y.to_le_bytes());
-                    position[8..].copy_from_slice(&z.to_le_bytes());
-                }
-            }
-            let rows = &mut rows[..order.len()];
-            match slice {
-                Rows::Consecutive(range) => {
-                    rows.iter_mut().zip(order).for_each(|(row, i)| *row = range.start as u32 + i);
-                }
-                Rows::Selected(chosen) => {
-                    rows.iter_mut().zip(order).for_each(|(row, i)| *row = chosen[*i as usize]);
-                }
-            }
-            for part in &parts {
-                part.put(tile, stride, rows);
-            }
-            if let Some(at) = self.pass.intake.mark {
-                for (record, i) in tile.chunks_exact_mut(stride).zip(order) {
-                    record[at..at + MARK_BYTES].copy_from_slice(&self.marks[*i as usize].to_le_bytes());
-                }
-            }
-            self.stats.checksum.add_all(tile, stride);
-        }
-    }
-
     /// Puts the positions of some rows on the job lattice, measures how far they move, and returns their bounds there.
     fn quantize(&mut self, visit: &mut Visit<'_>, batch: &PointBatch, rows: &Rows<'_>) -> JobBounds {
         let map = visit.map;
@@ -244,8 +214,7 @@ impl<'a> Worker<'a> {
             q.clear();
             change.clear();
             *moved = quantize_axis(&map, a, &batch.positions, rows, q, change);
-            bounds.min[a] = q.iter().copied().min().unwrap_or(i64::MAX);
-            bounds.max[a] = q.iter().copied().max().unwrap_or(i64::MIN);
+            (bounds.min[a], bounds.max[a]) = extent(Vectors::best(), q);
         }
         let points = self.q.len();
         let axes = std::array::from_fn(|a| match moved[a] {
@@ -313,20 +282,14 @@ fn stored_columns<'b>(batch: &'b PointBatch, recast: &'b [(usize, Column)]) -> V
     columns
 }
 
-/// Rows of a batch that are taken together.
-enum Rows<'a> {
-    Consecutive(Range<usize>),
-    Selected(&'a [u32]),
+vectorized! {
+    /// The smallest and the largest coordinate.
+    fn extent(q: &[i64]) -> (i64, i64) = extent_anyhow;
 }
 
-impl Rows<'_> {
-    /// The row of the batch that is the `i`th of these.
-    fn row(&self, i: usize) -> usize {
-        match self {
-            Self::Consecutive(range) => range.start + i,
-            Self::Selected(rows) => rows[i] as usize,
-        }
-    }
+#[inline(always)]
+fn extent_anyhow(q: &[i64]) -> (i64, i64) {
+    q.iter().fold((i64::MAX, i64::MIN), |(min, max), v| (min.min(*v), max.max(*v)))
 }
 
 fn quantize_axis(

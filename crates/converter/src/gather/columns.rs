@@ -41,8 +41,9 @@ impl<'a> Part<'a> {
         parts
     }
 
-    /// Writes the rows into the records of a tile.
-    pub(crate) fn put(&self, tile: &mut [u8], stride: usize, rows: &[u32]) {
+    /// Writes rows into the records of a tile, one each.
+    #[inline(always)]
+    pub(crate) fn put(&self, tile: &mut [u8], stride: usize, rows: RowsOf<'_>) {
         match self {
             Self::Bytes { columns, offset } => match columns[..] {
                 [a] => put_bytes([a], tile, stride, *offset, rows),
@@ -60,43 +61,97 @@ impl<'a> Part<'a> {
     }
 }
 
-fn put_bytes<const N: usize>(columns: [&[u8]; N], tile: &mut [u8], stride: usize, offset: usize, rows: &[u32]) {
-    // One length for all, so that one comparison a point will do.
-    let len = columns.iter().map(|c| c.len()).min().unwrap_or(0);
-    let columns = columns.map(|c| &c[..len]);
-    for (record, &i) in tile.chunks_exact_mut(stride).zip(rows) {
-        let bytes: [u8; N] = std::array::from_fn(|k| columns[k][i as usize]);
-        record[offset..offset + N].copy_from_slice(&bytes);
+/// Rows of columns: a run, or those that are named.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum RowsOf<'a> {
+    From(usize),
+    Named(&'a [u32]),
+}
+
+#[inline(always)]
+fn put_bytes<const N: usize>(columns: [&[u8]; N], tile: &mut [u8], stride: usize, offset: usize, rows: RowsOf<'_>) {
+    let records = tile.chunks_exact_mut(stride);
+    match rows {
+        RowsOf::From(first) => {
+            let columns = columns.map(|c| &c[first..first + records.len()]);
+            for (i, record) in records.enumerate() {
+                let bytes: [u8; N] = std::array::from_fn(|k| columns[k][i]);
+                record[offset..offset + N].copy_from_slice(&bytes);
+            }
+        }
+        RowsOf::Named(rows) => {
+            // One length for all, so that one comparison a point will do.
+            let len = columns.iter().map(|c| c.len()).min().unwrap_or(0);
+            let columns = columns.map(|c| &c[..len]);
+            for (record, &i) in records.zip(rows) {
+                let bytes: [u8; N] = std::array::from_fn(|k| columns[k][i as usize]);
+                record[offset..offset + N].copy_from_slice(&bytes);
+            }
+        }
     }
 }
 
-fn put_column(column: &Column, elements: usize, tile: &mut [u8], stride: usize, offset: usize, rows: &[u32]) {
-    let records = tile.chunks_exact_mut(stride).zip(rows);
+#[inline(always)]
+fn put_column(column: &Column, elements: usize, tile: &mut [u8], stride: usize, offset: usize, rows: RowsOf<'_>) {
     with_column!(column, v => match elements {
-        1 => for (record, &i) in records {
-            let bytes = v[i as usize].to_le_bytes();
-            record[offset..offset + bytes.len()].copy_from_slice(&bytes);
-        },
-        3 => {
-            let v = v.as_chunks::<3>().0;
-            for (record, &i) in records {
-                let [a, b, c] = v[i as usize].map(|e| e.to_le_bytes());
-                let n = a.len();
-                let to = &mut record[offset..offset + 3 * n];
-                to[..n].copy_from_slice(&a);
-                to[n..2 * n].copy_from_slice(&b);
-                to[2 * n..].copy_from_slice(&c);
+        1 => put_values(v.as_chunks::<1>().0, tile, stride, offset, rows),
+        3 => put_values(v.as_chunks::<3>().0, tile, stride, offset, rows),
+        _ => {
+            let records = tile.chunks_exact_mut(stride);
+            let put = |record: &mut [u8], row: usize| {
+                let mut at = offset;
+                for value in &v[row * elements..(row + 1) * elements] {
+                    let bytes = value.to_le_bytes();
+                    record[at..at + bytes.len()].copy_from_slice(&bytes);
+                    at += bytes.len();
+                }
+            };
+            match rows {
+                RowsOf::From(first) => records.zip(first..).for_each(|(record, row)| put(record, row)),
+                RowsOf::Named(rows) => records.zip(rows).for_each(|(record, row)| put(record, *row as usize)),
             }
         }
-        _ => for (record, &i) in records {
-            let mut at = offset;
-            for value in &v[i as usize * elements..(i as usize + 1) * elements] {
-                let bytes = value.to_le_bytes();
-                record[at..at + bytes.len()].copy_from_slice(&bytes);
-                at += bytes.len();
-            }
-        },
     });
+}
+
+/// A value of a column.
+trait Value: Copy {
+    fn put(self, to: &mut [u8]);
+}
+
+macro_rules! values {
+    ($($ty:ty),*) => {$(
+        impl Value for $ty {
+            #[inline(always)]
+            fn put(self, to: &mut [u8]) {
+                to.copy_from_slice(&self.to_le_bytes());
+            }
+        }
+    )*};
+}
+
+values!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
+
+#[inline(always)]
+fn put_values<const N: usize, T: Value>(
+    values: &[[T; N]],
+    tile: &mut [u8],
+    stride: usize,
+    offset: usize,
+    rows: RowsOf<'_>,
+) {
+    let bytes = N * size_of::<T>();
+    let put = |record: &mut [u8], values: &[T; N]| {
+        let to = record[offset..offset + bytes].chunks_exact_mut(size_of::<T>());
+        to.zip(values).for_each(|(to, value)| value.put(to));
+    };
+    let records = tile.chunks_exact_mut(stride);
+    match rows {
+        RowsOf::From(first) => records.zip(&values[first..]).for_each(|(record, values)| put(record, values)),
+        RowsOf::Named(rows) => {
+            records.zip(rows).for_each(|(record, row)| put(record, &values[*row as usize]));
+        }
+    }
 }
 
 #[cfg(test)]
@@ -127,8 +182,14 @@ mod tests {
         let mut tile = vec![0; 2 * schema.stride];
         let columns: Vec<&Column> = columns.iter().collect();
         for part in Part::of(&columns, &[0, 1, 2, 3, 4, 5].map(Some), &schema) {
-            part.put(&mut tile, schema.stride, &[1, 0]);
+            part.put(&mut tile, schema.stride, RowsOf::Named(&[1, 0]));
         }
+        let mut run = vec![0; 2 * schema.stride];
+        for part in Part::of(&columns, &[0, 1, 2, 3, 4, 5].map(Some), &schema) {
+            part.put(&mut run, schema.stride, RowsOf::From(0));
+        }
+        run.rotate_left(schema.stride);
+        assert_eq!(run, tile, "the same rows in the other order");
         let mut expected = vec![0; 12];
         expected.extend([4u16, 5, 6].iter().flat_map(|v| v.to_le_bytes()));
         expected.extend([8, 10, 254]);

@@ -6,6 +6,7 @@
 //! not fit the integers of records, the pass is repeated; each pass makes its own store, and the one that succeeds makes
 //! the cloud.
 
+mod assemble;
 mod axis;
 mod batch;
 mod census;

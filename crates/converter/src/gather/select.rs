@@ -7,6 +7,7 @@ use super::visit::Visit;
 use crate::cloud::Stats;
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{OnFault, OriginPoints};
+use crate::runtime::{Vectors, vectorized};
 
 /// Fills `selection` with the points that pass the filter; false if all do.
 pub(super) fn select(
@@ -74,14 +75,25 @@ fn whole_numbers(column: &Column) -> Vec<Option<i64>> {
     with_column!(column, v => v.iter().map(|v| Some(*v as i64).filter(|class| *class as f64 == *v as f64)).collect())
 }
 
+vectorized! {
+    /// The smallest and the largest.
+    fn extremes(values: &[i32]) -> Option<(i32, i32)> = extremes_anyhow;
+}
+
+#[inline(always)]
+fn extremes_anyhow(values: &[i32]) -> Option<(i32, i32)> {
+    let first = *values.first()?;
+    Some(values.iter().fold((first, first), |(min, max), v| (min.min(*v), max.max(*v))))
+}
+
 fn world_bounds(lattice: Option<&Lattice>, positions: &Positions) -> Aabb {
     let mut bounds = Aabb::EMPTY;
     for a in 0..3 {
         let (min, max) = match positions {
             Positions::Quantized(p) => {
                 let (scale, offset) = lattice.map_or((1.0, 0.0), |l| (l.scale[a], l.offset[a]));
-                let (Some(min), Some(max)) = (p[a].iter().min(), p[a].iter().max()) else { continue };
-                (f64::from(*min) * scale + offset, f64::from(*max) * scale + offset)
+                let Some((min, max)) = extremes(Vectors::best(), &p[a]) else { continue };
+                (f64::from(min) * scale + offset, f64::from(max) * scale + offset)
             }
             Positions::World(p) => p[a]
                 .iter()

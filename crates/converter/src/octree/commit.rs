@@ -35,9 +35,6 @@ pub(super) struct Committer<'a, S: NodeSink> {
     changed: Condvar,
 }
 
-/// Buffers below this size are not passed on.
-const SPARE_BYTES: usize = 4 << 20;
-
 struct State {
     /// The next unit to put behind the others.
     next: usize,
@@ -51,6 +48,7 @@ struct State {
     bytes: u64,
     ledger: Ledger,
     overfull_leaves: u64,
+    /// Buffers of units that were written, for those to come: their memory was touched already.
     spare: Vec<Vec<u8>>,
     /// Units above this one are not built any more.
     last: usize,
@@ -79,7 +77,7 @@ impl<'a, S: NodeSink> Committer<'a, S> {
         Self { sink, lists, window, units, state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Waits until unit `index` may be begun and returns a buffer for its bytes; `None` if it is not needed any more,
+    /// Waits until unit `index` may be begun and returns a buffer for its bytes, empty; `None` if it is not needed any more,
     /// because one below it failed.
     pub(super) fn admit(&self, index: usize) -> Option<Vec<u8>> {
         let mut state = self.wait(index, (index + 1).saturating_sub(self.window))?;
@@ -135,11 +133,11 @@ impl<'a, S: NodeSink> Committer<'a, S> {
         self.changed.notify_all();
         for placed in ready {
             match placed {
-                Placed::Nodes { nodes, bytes, offset } => {
+                Placed::Nodes { nodes, mut bytes, offset } => {
                     self.sink.write(&nodes, &bytes, offset)?;
+                    bytes.clear();
                     let mut state = self.lock();
-                    // The small buffers of the nodes above are not worth keeping.
-                    if state.spare.len() < self.window && bytes.capacity() > SPARE_BYTES {
+                    if state.spare.len() < self.window {
                         state.spare.push(bytes);
                     }
                 }

@@ -42,6 +42,25 @@ impl List {
         Self { count, place: Place::Disk(Arc::new(file), 0), is_one_place: true }
     }
 
+    /// The records, if they are in memory.
+    pub(super) fn in_memory(&self) -> Option<&[u8]> {
+        match &self.place {
+            Place::Memory(records, _) => Some(records),
+            Place::Disk(..) => None,
+        }
+    }
+
+    /// Looks at the records in memory, all of which are there, and keeps some: `thin` puts those that stay to the front and
+    /// returns their bytes. The memory of the others stays with the list, which is written soon.
+    pub(super) fn thin<E>(&mut self, stride: usize, thin: impl FnOnce(&mut [u8]) -> Result<usize, E>) -> Result<(), E> {
+        if let Place::Memory(records, _) = &mut self.place {
+            let kept = thin(records)?;
+            records.truncate(kept);
+            self.count = (kept / stride) as u64;
+        }
+        Ok(())
+    }
+
     /// Of nothing.
     pub(super) fn empty() -> Self {
         Self { count: 0, place: Place::Memory(Vec::new(), None), is_one_place: false }

@@ -10,7 +10,7 @@ use super::list::{List, Lists, Writer};
 use super::raise::{Nodes, Pairs, Pending, Points};
 use super::sample::Sampler;
 use super::sink::NodeEncoder;
-use crate::cloud::{RecordFrame, TreePoint};
+use crate::cloud::{RecordFrame, TreePoint, copy_record};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Pool, Reservation};
 
@@ -75,6 +75,10 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
             }
             return Ok(list);
         }
+        if list.in_memory().is_some() {
+            list.thin(self.lists.stride, |records| self.sample_in_place(level, records, taken, reserved))?;
+            return Ok(list);
+        }
         let mut rest = Writer::new(list.count());
         let mut part = std::mem::take(&mut self.memory.part);
         let (mut at, mut buffer) = (0, Vec::new());
@@ -93,6 +97,48 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
         self.account(reserved)?;
         self.memory.part = part;
         rest.finish(self.lists)
+    }
+
+    /// Samples records in memory: those that stay move to the front. Returns their bytes.
+    fn sample_in_place(
+        &mut self,
+        level: u8,
+        records: &mut [u8],
+        taken: &mut Writer,
+        reserved: u64,
+    ) -> Result<usize, ConvertError> {
+        let stride = self.lists.stride;
+        let mut trees = std::mem::take(&mut self.memory.part.trees);
+        let (mut at, mut kept) = (0, 0);
+        while at < records.len() {
+            trees.clear();
+            for part in records[at..].chunks((PART_BYTES / stride).max(1) * stride) {
+                trees.extend(part.chunks_exact(stride).map(|record| self.frame.tree(record)));
+                if at + trees.len() * stride < records.len() {
+                    let cut = trees.windows(2).rposition(|w| self.sampler.may_be_cut(level, w[0], w[1]));
+                    let Some(last) = cut else { continue };
+                    trees.truncate(last + 1);
+                }
+                break;
+            }
+            self.sampler.offer(trees.iter().copied());
+            for is_taken in self.sampler.choose() {
+                if *is_taken {
+                    taken.push(&records[at..at + stride], self.lists)?;
+                } else {
+                    if kept < at {
+                        let (before, from) = records.split_at_mut(at);
+                        copy_record(&from[..stride], &mut before[kept..kept + stride]);
+                    }
+                    kept += stride;
+                }
+                at += stride;
+            }
+            self.account(reserved)?;
+        }
+        self.memory.part.trees = trees;
+        self.memory.part.trees.clear();
+        Ok(kept)
     }
 
     /// Accounts for what the sampler has beyond `reserved`.
@@ -187,6 +233,9 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
             return Ok(());
         }
         let mut room = Reservation::new(self.pool, Consumer::Work);
+        if let Some(records) = points.in_memory().filter(|_| !is_large) {
+            return self.finished.encode(self.encoder, key, records.chunks_exact(stride));
+        }
         if is_large {
             room.resize(count * (stride as u64 + self.encoder.bytes_per_point()))?;
         }

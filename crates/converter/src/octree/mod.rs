@@ -86,7 +86,7 @@ pub(crate) fn build<S: NodeSink>(
             let built = match &unit.work {
                 Work::Subtree(chunks) => builder.subtree(unit.key, chunks, buffer, wait)?,
                 Work::Above(children) => match wait() {
-                    true => Some(builder.above(unit.key, committer.take(children)?)?),
+                    true => Some(builder.above(unit.key, committer.take(children)?, buffer)?),
                     false => None,
                 },
             };

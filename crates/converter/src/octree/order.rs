@@ -1,6 +1,7 @@
 //! The points of a chunk in Morton order.
 
 use crate::cloud::{MortonSorter, RecordFrame, TREE_BITS, TreePoint, morton};
+use crate::runtime::{Vectors, vectorized};
 
 /// A point of a chunk: where it is, and which record it has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,6 +14,7 @@ pub(crate) struct Point {
 /// Memory that is reused from chunk to chunk.
 #[derive(Debug, Default)]
 pub(crate) struct OrderScratch {
+    vectors: Vectors,
     trees: Vec<TreePoint>,
     sorter: MortonSorter,
 }
@@ -21,18 +23,37 @@ pub(crate) struct OrderScratch {
 /// their bytes, so that the order depends on the points alone.
 pub(crate) fn order(records: &[u8], frame: &RecordFrame, level: u8, scratch: &mut OrderScratch, out: &mut Vec<Point>) {
     let stride = frame.stride;
-    let OrderScratch { trees, sorter } = scratch;
-    trees.clear();
-    trees.extend(records.chunks_exact(stride).map(|r| frame.tree(r)));
+    let OrderScratch { vectors, trees, sorter } = scratch;
+    put_trees(*vectors, records, frame, trees);
     let level = u32::from(level);
     let room = MortonSorter::room(trees.len());
     let levels = (room / 3).min(frame.cube.resolved_level().saturating_sub(level)).min(21);
     let shift = TREE_BITS - level - levels;
-    sorter.codes(trees.len()).extend(trees.iter().map(|t| morton::path(*t, shift, levels)));
+    put_codes(*vectors, trees, shift, levels, sorter.codes(trees.len()));
     let bytes = |i: usize| &records[i * stride..][..stride];
     sorter.sort(3 * levels, 0, |a, b| morton::compare(trees[a].0, trees[b].0).then_with(|| bytes(a).cmp(bytes(b))));
     out.clear();
     out.extend(sorter.indices(0..sorter.len()).map(|i| Point { t: trees[i], record: i as u32 }));
+}
+
+vectorized! {
+    fn put_trees(records: &[u8], frame: &RecordFrame, trees: &mut Vec<TreePoint>) = put_trees_anyhow;
+}
+
+#[inline(always)]
+fn put_trees_anyhow(records: &[u8], frame: &RecordFrame, trees: &mut Vec<TreePoint>) {
+    trees.resize(records.len() / frame.stride, TreePoint([0; 3]));
+    trees.iter_mut().zip(records.chunks_exact(frame.stride)).for_each(|(tree, record)| *tree = frame.tree(record));
+}
+
+vectorized! {
+    fn put_codes(trees: &[TreePoint], shift: u32, levels: u32, codes: &mut Vec<u64>) = put_codes_anyhow;
+}
+
+#[inline(always)]
+fn put_codes_anyhow(trees: &[TreePoint], shift: u32, levels: u32, codes: &mut Vec<u64>) {
+    codes.resize(trees.len(), 0);
+    codes.iter_mut().zip(trees).for_each(|(code, tree)| *code = morton::path(*tree, shift, levels));
 }
 
 #[cfg(test)]
@@ -57,7 +78,11 @@ mod tests {
             records.extend((i as u16 % 50).to_le_bytes());
         }
         let mut out = Vec::new();
-        order(&records, &frame, 0, &mut OrderScratch::default(), &mut out);
+        for vectors in Vectors::all() {
+            let others = std::mem::take(&mut out);
+            order(&records, &frame, 0, &mut OrderScratch { vectors, ..OrderScratch::default() }, &mut out);
+            assert!(others.is_empty() || others == out, "{vectors:?}");
+        }
         let mut seen: Vec<u32> = out.iter().map(|p| p.record).collect();
         seen.sort_unstable();
         assert_eq!(seen, (0..5000).collect::<Vec<u32>>());

@@ -64,9 +64,7 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
         wait: impl FnOnce() -> bool,
     ) -> Result<Option<BuiltUnit>, ConvertError> {
         let mut borders = UnitBorders::new(&self.shared.borders, key);
-        let (mut finished, mut ledger, mut overfull_leaves) = (Finished::new(buffer), Ledger::default(), 0);
-        let points = chunks.iter().map(|c| c.points).sum::<u64>().min(self.shared.plan.unit_points);
-        os_hints::reserve(finished.bytes(), points as usize * self.shared.plan.cloud.frame.stride);
+        let (mut finished, mut ledger, mut overfull_leaves) = (self.finished(buffer), Ledger::default(), 0);
         let mut stack = Vec::new();
         let mut wait = Some(wait);
         for (i, chunk) in chunks.iter().enumerate() {
@@ -103,13 +101,27 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
         }
     }
 
-    /// Builds a node from its children.
-    pub(super) fn above(&mut self, key: NodeKey, children: Vec<Pending<List>>) -> Result<BuiltUnit, ConvertError> {
+    /// Builds a node from its children, in `buffer` as [`Self::subtree`].
+    pub(super) fn above(
+        &mut self,
+        key: NodeKey,
+        children: Vec<Pending<List>>,
+        buffer: Vec<u8>,
+    ) -> Result<BuiltUnit, ConvertError> {
         let mut borders = UnitBorders::new(&self.shared.borders, key);
-        let mut finished = Finished::default();
+        let mut finished = self.finished(buffer);
         let capacity = self.shared.plan.leaf_capacity;
         let root = Pending::above_or_leaf(key, children, capacity, &mut self.nodes(&mut borders, &mut finished))?;
         self.finish(root, borders, finished, Ledger::default(), 0)
+    }
+
+    /// For the nodes of a unit. Every buffer is made for the largest unit, so that any of them serves the next one: what is
+    /// not touched costs nothing.
+    fn finished(&self, buffer: Vec<u8>) -> Finished {
+        let mut finished = Finished::new(buffer);
+        let plan = &self.shared.plan;
+        os_hints::reserve(finished.bytes(), plan.unit_points as usize * plan.cloud.frame.stride);
+        finished
     }
 
     fn finish(

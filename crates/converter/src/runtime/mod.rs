@@ -8,6 +8,7 @@ mod open_files;
 pub(crate) mod os_files;
 pub(crate) mod os_hints;
 mod pool;
+mod vectors;
 mod workers;
 
 pub(crate) use budget::{Budget, Least};
@@ -17,6 +18,9 @@ pub(crate) use disk::{DiskFile, Sequential, TempFiles};
 pub use events::{Events, Phase, Silent};
 pub(crate) use open_files::most_open_files;
 pub(crate) use pool::{Consumer, Evict, Pool, Reservation};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use vectors::Detected;
+pub(crate) use vectors::{Vectors, vectorized};
 pub(crate) use workers::Workers;
 
 use std::ops::Deref;

@@ -53,6 +53,7 @@ impl Iterator for Batches<'_> {
     fn next(&mut self) -> Option<Self::Item> {
         while self.decoded.is_empty() && self.piece < self.scan.pieces().len() {
             let Self { scan, wanted, scratch, piece, decoded } = self;
+            scratch.next_piece = Some(*piece + 1);
             let result = scan.decode(*piece, wanted, scratch, &mut |batch| {
                 decoded.push_back(Ok(batch.clone()));
                 ControlFlow::Continue(())

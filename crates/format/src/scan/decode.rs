@@ -38,6 +38,9 @@ pub struct Scratch {
     pub decoded: Vec<u8>,
     /// The batch that is handed to the sink; its columns fit the scan that was decoded last.
     pub batch: Option<PointBatch>,
+    /// The piece that will be decoded with this scratch memory after the next one, if the caller knows it: some readers
+    /// take less time for two consecutive pieces that they decode in turn. Forgotten by each decode.
+    pub next_piece: Option<usize>,
     /// What else the reader that decoded last wants to find again.
     #[cfg_attr(not(feature = "las"), allow(dead_code))]
     pub(super) kept: Option<Box<dyn Any + Send + Sync>>,

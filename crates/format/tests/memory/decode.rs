@@ -7,11 +7,12 @@ use pointmill_format::{Scan, Scratch, Wanted};
 use crate::counting::peak_of;
 use crate::scenes::{self, Scene};
 
-/// The most that decoding one of the first pieces takes, each with memory of its own.
+/// The most that decoding one of the first pieces takes, each with memory of its own, when the next one will follow.
 fn taken(scan: &dyn Scan, wanted: &Wanted) -> u64 {
     let decode = |piece: usize| {
         let decoded = || {
             let scratch = &mut Scratch::default();
+            scratch.next_piece = Some(piece + 1);
             scan.decode(piece, wanted, scratch, &mut |_| ControlFlow::Continue(())).unwrap();
         };
         peak_of(decoded).1

@@ -84,6 +84,7 @@ pub fn read(scan: &dyn Scan, wanted: &Wanted) -> Cloud {
     let mut cloud = Cloud { info, promised, xyz: Default::default(), columns, errors: Vec::new(), decoded_bytes: 0 };
     let mut scratch = Scratch::default();
     for i in 0..scan.pieces().len() {
+        scratch.next_piece = Some(i + 1);
         let result = decode(scan, i, wanted, &mut scratch, &mut |batch| {
             match &batch.positions {
                 Positions::Quantized(xyz) => {

@@ -10,7 +10,8 @@ use super::decode::{check_description, decode};
 
 /// Checks everything that a [`Scan`] promises of the columns in `wanted`: what [`read`] checks, and that
 ///
-/// * a second decode gives the same, in another order of the pieces and with memory that other pieces have used,
+/// * a second decode gives the same, in another order of the pieces, which is not told before, and with memory that
+///   other pieces have used,
 /// * positions do not depend on the columns that come with them,
 /// * a sink that stops ends the decode at once and without an error,
 /// * a piece that does not exist is an error.
@@ -24,7 +25,11 @@ pub fn keeps_promises(scan: &dyn Scan, wanted: &Wanted, max_points: u64) {
     let pieces = scan.pieces();
     let count = pieces.iter().take_while(|p| p.first_point <= max_points).count();
     let scratch = &mut Scratch::default();
-    let forth: Vec<Outcome> = (0..count).map(|i| outcome(scan, i, wanted, scratch)).collect();
+    let in_order = |i| {
+        scratch.next_piece = Some(i + 1);
+        outcome(scan, i, wanted, scratch)
+    };
+    let forth: Vec<Outcome> = (0..count).map(in_order).collect();
     let alone = Wanted::positions(scan.info());
     for (i, forth) in forth.iter().enumerate().rev() {
         let back = outcome(scan, i, wanted, scratch);

@@ -53,16 +53,20 @@ fn read(scan: &dyn Scan, grid: &Grid, threads: usize) -> Result<Vec<Store>> {
     on_threads(threads, || {
         let (mut store, mut scratch) = (Store::new(grid), Scratch::default());
         loop {
-            let piece = next.fetch_add(1, Ordering::Relaxed);
-            if piece >= scan.pieces().len() {
+            // two at once, as the converter reads
+            let first = next.fetch_add(2, Ordering::Relaxed);
+            if first >= scan.pieces().len() {
                 return Ok(store);
             }
-            let mut added = Ok(());
-            scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
-                added = store.add(grid, batch);
-                if added.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-            })?;
-            added?;
+            for piece in first..scan.pieces().len().min(first + 2) {
+                scratch.next_piece = (piece == first).then_some(piece + 1);
+                let mut added = Ok(());
+                scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
+                    added = store.add(grid, batch);
+                    if added.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+                })?;
+                added?;
+            }
         }
     })
 }

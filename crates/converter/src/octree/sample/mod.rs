@@ -4,9 +4,12 @@
 //! sampled before have taken near the border; they depend on nothing else.
 
 mod cells;
+mod lanes;
 mod neighbours;
 mod poisson;
 mod spacing;
+mod taken;
+mod tile;
 
 use pointmill_format::NodeKey;
 
@@ -14,6 +17,7 @@ pub use spacing::Sampling;
 pub(crate) use spacing::Spacing;
 
 use crate::cloud::{TREE_BITS, TreePoint};
+use crate::runtime::Vectors;
 use cells::Candidates;
 use neighbours::{OverBorder, TILE_BITS, tile_code};
 use spacing::squared_distance;
@@ -40,7 +44,7 @@ enum Method {
 impl Sampler {
     pub(crate) fn new(sampling: Sampling, spacing: Spacing) -> Self {
         let method = match sampling {
-            Sampling::Poisson => Method::Poisson(Box::new(poisson::Poisson::new(spacing))),
+            Sampling::Poisson => Method::Poisson(Box::new(poisson::Poisson::new(spacing, Vectors::best()))),
             other => Method::Cells { sampling: other, are_free: Vec::new() },
         };
         Self {

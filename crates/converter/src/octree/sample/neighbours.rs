@@ -44,6 +44,12 @@ impl OverBorder {
         size_of_val(self.points.as_slice()) as u64
     }
 
+    /// True if no tile that is asked for from now on has any.
+    #[inline(always)]
+    pub(super) fn is_done(&self) -> bool {
+        self.at == self.points.len()
+    }
+
     /// Those that concern a tile; tiles are asked for in ascending order.
     #[inline]
     pub(super) fn of_tile(&mut self, tile: u32) -> &[(u32, TreePoint)] {

@@ -67,26 +67,30 @@ impl OutputLayout {
         Self { attributes, stride, stored_stride: schema.stride, runs, doubled, shift }
     }
 
-    /// Appends the output form of stored records that lie back to back.
-    pub(crate) fn write_all(&self, records: &[u8], out: &mut Vec<u8>) {
-        let start = out.len();
-        if self.stride == self.stored_stride && self.runs.len() <= 1 {
-            out.extend_from_slice(records);
-        } else {
-            for record in records.chunks_exact(self.stored_stride) {
-                out.extend_from_slice(&record[..POSITION_BYTES]);
-                for &(from, to) in &self.runs {
-                    out.extend_from_slice(&record[from..to]);
-                }
+    /// True if an output record has the bytes of a stored one, in the same places, before [`Self::finish`].
+    pub(crate) fn keeps_records(&self) -> bool {
+        self.stride == self.stored_stride && self.runs.len() <= 1
+    }
+
+    /// Appends what is kept of stored records that lie back to back.
+    pub(crate) fn select(&self, records: &[u8], out: &mut Vec<u8>) {
+        for record in records.chunks_exact(self.stored_stride) {
+            out.extend_from_slice(&record[..POSITION_BYTES]);
+            for &(from, to) in &self.runs {
+                out.extend_from_slice(&record[from..to]);
             }
         }
-        for record in out[start..].chunks_exact_mut(self.stride) {
+    }
+
+    /// Turns what was kept of stored records into the records of the dataset.
+    pub(crate) fn finish(&self, records: &mut [u8]) {
+        for record in records.chunks_exact_mut(self.stride) {
             for (axis, shift) in record[..POSITION_BYTES].as_chunks_mut::<4>().0.iter_mut().zip(self.shift) {
                 *axis = u32::from_le_bytes(*axis).wrapping_add(shift).to_le_bytes();
             }
         }
         for Doubled { from, to, is_signed } in &self.doubled {
-            for record in out[start..].chunks_exact_mut(self.stride) {
+            for record in records.chunks_exact_mut(self.stride) {
                 for bytes in record[*from..*to].as_chunks_mut::<8>().0 {
                     let double =
                         if *is_signed { i64::from_le_bytes(*bytes) as f64 } else { u64::from_le_bytes(*bytes) as f64 };
@@ -120,7 +124,8 @@ mod tests {
         record.extend([-5i64, 1 << 40].iter().flat_map(|v| v.to_le_bytes()));
         let layout = OutputLayout::new(&schema, &[2, 1], &frame);
         let mut out = Vec::new();
-        layout.write_all(&record, &mut out);
+        layout.select(&record, &mut out);
+        layout.finish(&mut out);
         let doubles: Vec<f64> = out[12..].as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
         assert_eq!(doubles, [-5.0, (1u64 << 40) as f64, u64::MAX as f64]);
         assert!(layout.attributes.iter().all(|a| a.ty == AttributeType::Float64));

@@ -65,23 +65,27 @@ impl<'a> PayloadEncoder<'a> {
         checksum: &mut Checksum,
     ) {
         let stride = self.layout.stored_stride;
-        out.reserve(records.len() * self.layout.stride);
-        self.tile.resize(TILE_RECORDS * stride, 0);
+        out.reserve(records.len() * self.layout.stride + TILE_RECORDS * stride);
         let mut seen = Seen::default();
         loop {
-            let mut count = 0;
-            for (slot, record) in self.tile.chunks_exact_mut(stride).zip(&mut records) {
-                copy_record(record, slot);
-                count += 1;
-            }
-            let tile = &self.tile[..count * stride];
-            checksum.add_all(tile, stride);
             let start = out.len();
-            self.layout.write_all(tile, out);
+            if self.layout.keeps_records() {
+                // put together where they stay
+                out.resize(start + TILE_RECORDS * stride, 0);
+                let bytes = stride * gather(&mut records, &mut out[start..], stride);
+                out.truncate(start + bytes);
+                checksum.add_all(&out[start..], stride);
+            } else {
+                self.tile.resize(TILE_RECORDS * stride, 0);
+                let bytes = stride * gather(&mut records, &mut self.tile, stride);
+                checksum.add_all(&self.tile[..bytes], stride);
+                self.layout.select(&self.tile[..bytes], out);
+            }
+            self.layout.finish(&mut out[start..]);
             if let Some((watch, _)) = &self.watch {
                 watch.look(&mut out[start..], self.layout.stride, &mut seen);
             }
-            if count < TILE_RECORDS {
+            if out.len() - start < TILE_RECORDS * self.layout.stride {
                 break;
             }
         }
@@ -89,6 +93,17 @@ impl<'a> PayloadEncoder<'a> {
             all.add(&seen);
         }
     }
+}
+
+/// Copies the next records, as many as there is room for; returns how many.
+#[inline(always)]
+fn gather<'r>(records: &mut impl Iterator<Item = &'r [u8]>, out: &mut [u8], stride: usize) -> usize {
+    let mut count = 0;
+    for (slot, record) in out.chunks_exact_mut(stride).zip(records) {
+        copy_record(record, slot);
+        count += 1;
+    }
+    count
 }
 
 impl PayloadEncoder<'_> {

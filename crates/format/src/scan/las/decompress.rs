@@ -2,6 +2,7 @@
 
 use std::any::Any;
 
+use super::ahead::{Ahead, Reader, Two};
 use super::chunk_table::{Chunk, Layout};
 use super::laz::{Input, Item, Layered, LayeredModels, Part, Parts, Pointwise, PointwiseModels, Stop, record_len};
 use super::schema::{Layer, Schema};
@@ -13,6 +14,10 @@ use crate::scan::source::Source;
 pub(super) struct LazModels {
     pointwise: Option<PointwiseModels>,
     layered: Option<LayeredModels>,
+    /// The chunk behind the last one.
+    pub(super) ahead: Option<Ahead>,
+    /// Memory for the records of such a chunk.
+    pub(super) spare: Vec<u8>,
 }
 
 impl LazModels {
@@ -41,44 +46,38 @@ impl LazModels {
 pub(super) enum Decompressor<'m, 'a> {
     Pointwise(Pointwise<'m, 'a>),
     Layered(Layered<'m, 'a>),
+    Two(Two<'m, 'a>),
+    Ahead(Reader<'m>),
 }
 
-impl<'m, 'a> Decompressor<'m, 'a> {
-    /// For a layered chunk of at least `points` points; decodes only `parts`.
-    pub(super) fn layered(
-        models: &'m mut LayeredModels,
-        layout: Layout,
-        parts: Parts,
-        chunk: &'a [u8],
-        points: u64,
-    ) -> Result<Self, Stop> {
-        let corrupt = |at: usize, why: String| Err(Stop::Corrupt { at: at as u64, why });
-        match layout.layered_head(chunk) {
-            Some(head) if head.bytes <= chunk.len() as u64 && head.points >= points => {
-                Ok(Self::Layered(Layered::new(models, chunk, parts)?))
-            }
-            Some(Chunk { points, bytes }) => {
-                corrupt(layout.record_len, format!("it says of itself that it has {points} points in {bytes} bytes"))
-            }
-            None => corrupt(layout.record_len, "its head is not that of a chunk".to_owned()),
-        }
-    }
-
+impl Decompressor<'_, '_> {
     /// Fills `out` with whole records. Returns how many are good, and why it stopped if that is not all.
     pub(super) fn fill(&mut self, out: &mut [u8]) -> (usize, Result<(), Stop>) {
         match self {
             Self::Pointwise(decoder) => decoder.fill(out),
             Self::Layered(decoder) => decoder.fill(out),
+            Self::Two(decoder) => decoder.fill(out),
+            Self::Ahead(reader) => reader.fill(out),
         }
     }
-}
 
-impl Decompressor<'_, '_> {
     /// The next record begins another chunk.
     pub(super) fn next_chunk(&mut self) {
         if let Self::Pointwise(decoder) = self {
             decoder.next_chunk();
         }
+    }
+}
+
+/// An error if the head of a layered chunk is not that of one with at least `points` points in so many bytes.
+pub(super) fn check_layered(layout: Layout, chunk: &[u8], points: u64) -> Result<(), Stop> {
+    let corrupt = |why: String| Err(Stop::Corrupt { at: layout.record_len as u64, why });
+    match layout.layered_head(chunk) {
+        Some(head) if head.bytes <= chunk.len() as u64 && head.points >= points => Ok(()),
+        Some(Chunk { points, bytes }) => {
+            corrupt(format!("it says of itself that it has {points} points in {bytes} bytes"))
+        }
+        None => corrupt("its head is not that of a chunk".to_owned()),
     }
 }
 

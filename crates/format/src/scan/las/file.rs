@@ -8,6 +8,8 @@ use crate::scan::source::Source;
 
 /// An open file.
 pub(super) struct LasScan {
+    /// No other scan of this process has it.
+    pub(super) id: u64,
     pub(super) source: Source,
     pub(super) info: ScanInfo,
     pub(super) schema: Schema,

@@ -32,12 +32,15 @@
 //! Sources: ASPRS LAS Specification 1.4 R15 and 1.5; LASzip by M. Isenburg ("LASzip: lossless compression of LiDAR
 //! data", 2013).
 
+mod ahead;
 mod bytes;
 mod chunk_table;
 mod compatible;
+mod compressed;
 mod crs;
 mod decode;
 mod decompress;
+mod emitter;
 mod extra_bytes;
 mod file;
 mod geotiff;
@@ -52,6 +55,7 @@ mod records;
 mod schema;
 
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::scan::source::Source;
 use crate::{Advice, Fault, Piece, ReadError, Scan, ScanInfo, ScanWarning, Scratch, Sink, Wanted};
@@ -64,6 +68,9 @@ use records::Records;
 use schema::Schema;
 
 pub use header::is_las;
+
+/// Scans opened so far: each has a number of its own.
+static SCANS: AtomicU64 = AtomicU64::new(0);
 
 /// Opens a LAS or LAZ file: reads its header, records and (LAZ) chunk table, decodes no point.
 ///
@@ -108,7 +115,8 @@ impl LasScan {
             file_bytes: source.len(),
             warnings,
         };
-        Ok(Self { source, info, schema, record_len: header.record_len, laszip, plan })
+        let id = SCANS.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { id, source, info, schema, record_len: header.record_len, laszip, plan })
     }
 
     /// How the chunks of this file are laid out.

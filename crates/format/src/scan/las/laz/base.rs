@@ -1,10 +1,12 @@
 //! The layer of formats 6–10 that all others depend on: scanner channel, returns, x and y.
 
 use super::channels::{Channels, Meta, State};
-use super::coder::Coder;
+use super::coder::{Coder, by_copy};
+use super::family::TinyFamily;
+use super::in_turn::in_turn;
 use super::integer::Integer;
 use super::median::Median;
-use super::model::{Changes, Family, Tiny};
+use super::model::{Changes, Tiny};
 use super::returns::{context_16, level};
 
 /// Bits of the symbol that says what differs from the last point of the channel.
@@ -37,8 +39,8 @@ struct Channel {
     changes: [Changes; 8],
     channels: Tiny,
     /// Numbers of returns, and of the return, by the last one.
-    returns: Family<16, 0>,
-    numbers: Family<16, 0>,
+    returns: TinyFamily,
+    numbers: TinyFamily,
     numbers_of_pulse: Tiny,
     dx: Integer,
     dy: Integer,
@@ -53,8 +55,8 @@ impl State for Channel {
             last: Values::default(),
             changes: std::array::from_fn(|_| Changes::new(128)),
             channels: Tiny::new(3),
-            returns: Family::new(),
-            numbers: Family::new(),
+            returns: TinyFamily::new(16),
+            numbers: TinyFamily::new(16),
             numbers_of_pulse: Tiny::new(13),
             dx: Integer::new(32, 2),
             dy: Integer::new(32, 22),
@@ -81,46 +83,62 @@ impl State for Channel {
 
 impl Channel {
     /// What differs from the last point of the channel.
-    #[inline]
+    #[inline(always)]
     fn changes(&mut self, coder: &mut Coder<'_>) -> usize {
         let Values { returns, number, new_time, .. } = self.last;
         let context = usize::from(number == 1) | usize::from(number >= returns) << 1 | usize::from(new_time) << 2;
         coder.symbol(&mut self.changes[context])
     }
 
-    #[inline]
+    #[inline(always)]
     fn returns(&mut self, coder: &mut Coder<'_>, changes: usize) {
         let Values { returns, number, new_time, .. } = &mut self.last;
         *new_time = changes & TIME != 0;
         if changes & RETURNS != 0 {
-            *returns = coder.symbol(self.returns.of(*returns)) as u8;
+            *returns = by_copy(coder, |coder| coder.symbol(self.returns.of(*returns))) as u8;
         }
         *number = match changes & NUMBER {
             0 => *number,
             1 => (*number + 1) & 15,
             2 => (*number + 15) & 15,
-            _ if *new_time => coder.symbol(self.numbers.of(*number)) as u8,
-            _ => (*number + 2 + coder.symbol(&mut self.numbers_of_pulse) as u8) & 15,
+            _ if *new_time => by_copy(coder, |coder| coder.symbol(self.numbers.of(*number))) as u8,
+            _ => (*number + 2 + by_copy(coder, |coder| coder.symbol(&mut self.numbers_of_pulse)) as u8) & 15,
         };
     }
 
-    /// Returns the context of the height.
-    #[inline]
-    fn position(&mut self, coder: &mut Coder<'_>) -> usize {
-        let Values { x, y, returns, number, new_time } = &mut self.last;
-        let single = usize::from(*returns == 1);
-        let [x_median, y_median] = &mut self.medians[context_16(*returns, *number) << 1 | usize::from(*new_time)];
+    /// Whether the pulse has one return, and which medians predict x and y.
+    #[inline(always)]
+    fn contexts(&self) -> (usize, usize) {
+        let Values { returns, number, new_time, .. } = self.last;
+        (usize::from(returns == 1), context_16(returns, number) << 1 | usize::from(new_time))
+    }
 
-        let dx = self.dx.next(coder, x_median.get(), single);
-        *x = x.wrapping_add(dx);
-        x_median.add(dx);
+    /// Decodes x and y of several points, in turn; returns the contexts of the heights.
+    #[inline(always)]
+    fn positions<const L: usize>(states: [&mut Self; L], coders: &mut [Coder<'_>; L]) -> [usize; L] {
+        let (mut singles, mut medians, mut predicted) = ([0; L], [0; L], [0; L]);
+        in_turn!(|l| (singles[l], medians[l]) = states[l].contexts());
+        in_turn!(|l| predicted[l] = states[l].medians[medians[l]][0].get());
+        let mut states = states;
+        let by = Integer::next_of(states.each_mut().map(|state| &mut state.dx), coders, predicted, singles);
+        in_turn!(|l| {
+            states[l].last.x = states[l].last.x.wrapping_add(by[l]);
+            states[l].medians[medians[l]][0].add(by[l]);
+        });
 
-        let dy = self.dy.next(coder, y_median.get(), single + (self.dx.last_bits() & !1).min(20));
-        *y = y.wrapping_add(dy);
-        y_median.add(dy);
-
-        let bits = (self.dx.last_bits() + self.dy.last_bits()) / 2;
-        single + (bits & !1).min(18)
+        let mut contexts = [0; L];
+        in_turn!(|l| predicted[l] = states[l].medians[medians[l]][1].get());
+        in_turn!(|l| contexts[l] = singles[l] + (states[l].dx.last_bits() & !1).min(20));
+        let by = Integer::next_of(states.each_mut().map(|state| &mut state.dy), coders, predicted, contexts);
+        in_turn!(|l| {
+            states[l].last.y = states[l].last.y.wrapping_add(by[l]);
+            states[l].medians[medians[l]][1].add(by[l]);
+        });
+        in_turn!(|l| {
+            let bits = (states[l].dx.last_bits() + states[l].dy.last_bits()) / 2;
+            contexts[l] = singles[l] + (bits & !1).min(18);
+        });
+        contexts
     }
 }
 
@@ -162,68 +180,86 @@ impl Base {
         channel
     }
 
-    /// Decodes points, and writes what this layer knows to records that begin as the first one of the chunk.
-    pub(super) fn run(
-        &mut self,
-        paused: &mut Coder<'_>,
-        points: &mut [Meta],
-        records: &mut [u8],
+    /// Decodes points of chunks that are decoded in turn, and writes what this layer knows to records that begin as the
+    /// first one of the chunk. Each chunk has as many points and records.
+    pub(super) fn run<const L: usize>(
+        layers: [&mut Self; L],
+        paused: [&mut Coder<'_>; L],
+        points: [&mut [Meta]; L],
+        records: [&mut [u8]; L],
         record_len: usize,
-    ) -> usize {
-        let mut coder = *paused;
-        let mut good = 0;
-        for (meta, record) in points.iter_mut().zip(records.chunks_exact_mut(record_len)) {
-            *meta = self.next(&mut coder, record);
-            if coder.is_off() {
+    ) -> [usize; L] {
+        let mut coders = paused.each_ref().map(|coder| **coder);
+        let count = points.iter().map(|points| points.len()).min().unwrap_or(0);
+        let (mut layers, mut records, mut good) = (layers, records, [count; L]);
+        for point in 0..count {
+            let place = point * record_len..(point + 1) * record_len;
+            let records = records.each_mut().map(|records| &mut records[place.clone()]);
+            let metas = Self::next_of(&mut layers, &mut coders, records);
+            in_turn!(|l| points[l][point] = metas[l]);
+            if coders.iter().any(Coder::is_off) {
+                in_turn!(|l| good[l] = point + usize::from(!coders[l].is_off()));
                 break;
             }
-            good += 1;
         }
-        *paused = coder;
+        in_turn!(|l| *paused[l] = coders[l]);
         good
     }
 
-    #[inline]
-    fn next(&mut self, coder: &mut Coder<'_>, record: &mut [u8]) -> Meta {
-        let from = self.channel;
-        let state = self.channels.of(from);
-        let changes = state.changes(coder);
-        let mut is_new = false;
-        if changes & CHANNEL != 0 {
-            self.channel = (from + 1 + coder.symbol(&mut state.channels) as u8) & 3;
-            is_new = !std::mem::replace(&mut self.is_used[usize::from(self.channel)], true);
-            if is_new {
-                self.channels.open(self.channel, from);
+    /// Points of chunks that are decoded in turn.
+    #[inline(always)]
+    fn next_of<const L: usize>(
+        layers: &mut [&mut Self; L],
+        coders: &mut [Coder<'_>; L],
+        records: [&mut [u8]; L],
+    ) -> [Meta; L] {
+        let (mut changes, mut metas) = ([0; L], [Meta::default(); L]);
+        in_turn!(|l| changes[l] = layers[l].channels.of(layers[l].channel).changes(&mut coders[l]));
+        in_turn!(|l| metas[l] = layers[l].channel(&mut coders[l], changes[l]));
+        in_turn!(|l| layers[l].channels.of(layers[l].channel).returns(&mut coders[l], changes[l]));
+        let states = layers.each_mut().map(|layer| layer.channels.of(layer.channel));
+        let contexts = Channel::positions(states, coders);
+        in_turn!(|l| {
+            let Values { x, y, returns, number, new_time } = layers[l].channels.of(layers[l].channel).last;
+            if let Some(bytes) = records[l].first_chunk_mut::<16>() {
+                bytes[..4].copy_from_slice(&x.to_le_bytes());
+                bytes[4..8].copy_from_slice(&y.to_le_bytes());
+                bytes[RETURNS_AT] = number | returns << 4;
+                bytes[FLAGS_AT] = bytes[FLAGS_AT] & !CHANNEL_BITS | metas[l].channel << 4;
             }
-        }
-        let item_from = self.item_channel;
-        self.item_channel = if self.tells_channel || changes & CHANNEL != 0 { self.channel } else { 0 };
-        let item_is_new = !std::mem::replace(&mut self.item_is_used[usize::from(self.item_channel)], true);
+            metas[l] = Meta {
+                new_time,
+                new_angle: changes[l] & ANGLE != 0,
+                new_source: changes[l] & SOURCE != 0,
+                place: u8::from(number == 1) << 1 | u8::from(number >= returns),
+                level: level(returns, number) as u8,
+                z_context: contexts[l] as u8,
+                ..metas[l]
+            };
+        });
+        metas
+    }
 
-        let channel = self.channel;
-        let state = self.channels.of(channel);
-        state.returns(coder, changes);
-        let z_context = state.position(coder) as u8;
-        let Values { x, y, returns, number, new_time } = state.last;
-        if let Some(bytes) = record.first_chunk_mut::<16>() {
-            bytes[..4].copy_from_slice(&x.to_le_bytes());
-            bytes[4..8].copy_from_slice(&y.to_le_bytes());
-            bytes[RETURNS_AT] = number | returns << 4;
-            bytes[FLAGS_AT] = bytes[FLAGS_AT] & !CHANNEL_BITS | channel << 4;
+    /// The channel of the next point, and what follows from it.
+    #[inline(always)]
+    fn channel(&mut self, coder: &mut Coder<'_>, changes: usize) -> Meta {
+        let (from, item_from) = (self.channel, self.item_channel);
+        let is_new = changes & CHANNEL != 0 && by_copy(coder, |coder| self.change_channel(coder));
+        self.item_channel = if self.tells_channel || changes & CHANNEL != 0 { self.channel } else { 0 };
+        let item_is_new = !std::mem::replace(&mut self.item_is_used[usize::from(self.item_channel & 3)], true);
+        let (channel, item_channel) = (self.channel, self.item_channel);
+        Meta { channel, from, is_new, item_channel, item_from, item_is_new, ..Meta::default() }
+    }
+
+    /// Whether the channel was not there before.
+    #[cold]
+    fn change_channel(&mut self, coder: &mut Coder<'_>) -> bool {
+        let from = self.channel;
+        self.channel = (from + 1 + coder.symbol(&mut self.channels.of(from).channels) as u8) & 3;
+        let is_new = !std::mem::replace(&mut self.is_used[usize::from(self.channel)], true);
+        if is_new {
+            self.channels.open(self.channel, from);
         }
-        Meta {
-            channel,
-            from,
-            is_new,
-            item_channel: self.item_channel,
-            item_from,
-            item_is_new,
-            new_time,
-            new_angle: changes & ANGLE != 0,
-            new_source: changes & SOURCE != 0,
-            place: u8::from(number == 1) << 1 | u8::from(number >= returns),
-            level: level(returns, number) as u8,
-            z_context,
-        }
+        is_new
     }
 }

@@ -1,6 +1,7 @@
 //! Points of up to four scanner channels side by side, each channel predicted from its own.
 
 use super::coder::Coder;
+use super::in_turn::in_turn;
 
 /// What the layers need to know of a point: how it follows from those before.
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,7 +54,15 @@ impl<S: State> Channels<S> {
 
     #[inline(always)]
     pub(super) fn of(&mut self, channel: u8) -> &mut S {
-        self.states[usize::from(channel & 3)].get_or_insert_with(|| Box::new(S::new()))
+        match &mut self.states[usize::from(channel & 3)] {
+            Some(state) => state,
+            empty => Self::fill(empty),
+        }
+    }
+
+    #[cold]
+    fn fill(empty: &mut Option<Box<S>>) -> &mut S {
+        empty.get_or_insert_with(|| Box::new(S::new()))
     }
 
     /// Begins a channel behind a point of the channel `from`.
@@ -73,23 +82,26 @@ pub(super) trait Layer {
     fn next(&mut self, coder: &mut Coder<'_>, meta: &Meta, record: &mut [u8]);
 }
 
-/// Decodes the field of many points; returns how many are good.
-pub(super) fn run(
-    layer: &mut impl Layer,
-    paused: &mut Coder<'_>,
-    points: &[Meta],
-    records: &mut [u8],
+/// Decodes the field of many points of chunks that are decoded in turn; returns how many are good. Each chunk has as
+/// many points and records.
+pub(super) fn run<T: Layer, const L: usize>(
+    layers: [&mut T; L],
+    paused: [&mut Coder<'_>; L],
+    points: [&[Meta]; L],
+    records: [&mut [u8]; L],
     record_len: usize,
-) -> usize {
-    let mut coder = *paused;
-    let mut good = 0;
-    for (meta, record) in points.iter().zip(records.chunks_exact_mut(record_len)) {
-        layer.next(&mut coder, meta, record);
-        if coder.is_off() {
+) -> [usize; L] {
+    let mut coders = paused.each_ref().map(|coder| **coder);
+    let count = points.iter().map(|points| points.len()).min().unwrap_or(0);
+    let mut good = [count; L];
+    for point in 0..count {
+        let place = point * record_len..(point + 1) * record_len;
+        in_turn!(|l| layers[l].next(&mut coders[l], &points[l][point], &mut records[l][place.clone()]));
+        if coders.iter().any(Coder::is_off) {
+            in_turn!(|l| good[l] = point + usize::from(!coders[l].is_off()));
             break;
         }
-        good += 1;
     }
-    *paused = coder;
+    in_turn!(|l| *paused[l] = coders[l]);
     good
 }

@@ -6,8 +6,8 @@
 
 use super::model::{BitModel, END, Model, SHARE_BITS};
 
-/// The interval is stretched by whole bytes when it becomes shorter.
-const MIN_LENGTH: u32 = 1 << 24;
+/// Numbers of more bits are in two parts.
+const FEW_BITS: u32 = 19;
 
 /// Added to the place of a decoder that has met what no encoder writes.
 const BROKEN: usize = usize::MAX / 2;
@@ -38,6 +38,15 @@ impl Paused {
     }
 }
 
+/// What is not worth the space in a loop gets a copy of the decoder, which itself may be in registers then.
+#[inline(always)]
+pub(super) fn by_copy<'a, T>(coder: &mut Coder<'a>, next: impl FnOnce(&mut Coder<'a>) -> T) -> T {
+    let mut copy = *coder;
+    let value = next(&mut copy);
+    *coder = copy;
+    value
+}
+
 impl<'a> Coder<'a> {
     /// Bytes that a decoder reads before its first symbol.
     pub(super) const START: usize = 4;
@@ -45,9 +54,8 @@ impl<'a> Coder<'a> {
     /// Starts at byte `at`.
     pub(super) fn start(bytes: &'a [u8], at: usize) -> Self {
         let mut coder = Self { bytes, at, value: 0, length: u32::MAX };
-        for _ in 0..Self::START {
-            coder.value = coder.value << 8 | u32::from(coder.byte());
-        }
+        coder.value = coder.ahead();
+        coder.at += Self::START;
         if coder.value == u32::MAX {
             coder.fail();
         }
@@ -78,7 +86,7 @@ impl<'a> Coder<'a> {
     }
 
     /// Met what no encoder writes; if bytes were missing before, that is the reason.
-    #[cold]
+    #[inline(always)]
     pub(super) fn fail(&mut self) {
         if !self.is_off() {
             self.at += BROKEN;
@@ -86,19 +94,34 @@ impl<'a> Coder<'a> {
         self.value = 0;
     }
 
+    /// The next four bytes, the first the highest.
     #[inline(always)]
-    fn byte(&mut self) -> u8 {
-        let byte = self.bytes.get(self.at).copied().unwrap_or(0);
-        self.at += 1;
-        byte
+    fn ahead(&self) -> u32 {
+        match self.bytes.get(self.at..).and_then(|rest| rest.first_chunk()) {
+            Some(bytes) => u32::from_be_bytes(*bytes),
+            None => self.ahead_at_end(),
+        }
     }
 
+    #[cold]
+    fn ahead_at_end(&self) -> u32 {
+        let mut bytes = [0; 4];
+        for (byte, there) in bytes.iter_mut().zip(self.bytes.get(self.at..).unwrap_or_default()) {
+            *byte = *there;
+        }
+        u32::from_be_bytes(bytes)
+    }
+
+    /// Without a branch: how many bytes are due follows from the symbol, which nobody can predict.
     #[inline(always)]
     fn stretch(&mut self) {
-        while self.length < MIN_LENGTH {
-            self.value = self.value << 8 | u32::from(self.byte());
-            self.length <<= 8;
-        }
+        let is_below = |bits: u32| u32::from(self.length < 1 << bits);
+        // an interval has at least a number, so that three bytes suffice
+        let by = (is_below(24) + is_below(16) + is_below(8)) * 8;
+        let wide = u64::from(self.value) << 32 | u64::from(self.ahead());
+        self.value = (wide << by >> 32) as u32;
+        self.length <<= by;
+        self.at += (by >> 3) as usize;
     }
 
     /// A symbol of a model; less than its number of symbols.
@@ -106,11 +129,11 @@ impl<'a> Coder<'a> {
     pub(super) fn symbol<const N: usize, const T: usize>(&mut self, model: &mut Model<N, T>) -> usize {
         model.prepare();
         let unit = self.length >> SHARE_BITS;
+        let share = self.value.checked_div(unit).unwrap_or(0);
+        let (symbol, low, high) = model.take(share);
+        let start = low * unit;
         // what the division cuts off belongs to the last symbol
-        let share = self.value.checked_div(unit).unwrap_or(0).min((1 << SHARE_BITS) - 1);
-        let (symbol, low, high) = model.take(share as u16);
-        let start = u32::from(low) * unit;
-        let end = if high == END { self.length } else { u32::from(high) * unit };
+        let end = if high == u32::from(END) { self.length } else { high * unit };
         self.value -= start;
         self.length = end - start;
         self.stretch();
@@ -136,11 +159,17 @@ impl<'a> Coder<'a> {
     /// A number of `bits` (1 to 32) bits, all of its values equally likely.
     #[inline(always)]
     pub(super) fn bits(&mut self, bits: u32) -> u32 {
-        if bits > 19 {
-            let low = self.few_bits(16);
-            return self.few_bits(bits - 16) << 16 | low;
+        if bits > FEW_BITS {
+            return by_copy(self, |coder| coder.many_bits(bits));
         }
         self.few_bits(bits)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn many_bits(&mut self, bits: u32) -> u32 {
+        let low = self.few_bits(16);
+        self.few_bits(bits - 16) << 16 | low
     }
 
     #[inline(always)]
@@ -157,6 +186,7 @@ impl<'a> Coder<'a> {
     }
 
     /// A number of 64 bits.
+    #[inline(always)]
     pub(super) fn bits_64(&mut self) -> u64 {
         let low = u64::from(self.bits(32));
         u64::from(self.bits(32)) << 32 | low
@@ -182,7 +212,7 @@ mod tests {
                 }
                 assert!(coder.symbol(&mut model) < 256);
                 coder.bit(&mut bit);
-                assert!(coder.value < coder.length && coder.length >= MIN_LENGTH);
+                assert!(coder.value < coder.length && coder.length >= 1 << 24);
                 if round % 50 == 0 {
                     coder.bits(1 + round as u32 % 31);
                 }

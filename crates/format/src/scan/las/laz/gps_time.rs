@@ -3,7 +3,10 @@
 //! Up to four sequences of times go on side by side, each with its last step. A time is a multiple of that step and a
 //! correction, or a jump that begins a sequence, or a change to another sequence, which then gives the time.
 
-use super::coder::Coder;
+use std::array::from_mut;
+
+use super::coder::{Coder, by_copy};
+use super::in_turn::in_turn;
 use super::integer::Integer;
 use super::model::{Multiples, Tiny};
 
@@ -84,21 +87,81 @@ impl GpsTime {
     }
 
     /// The next time.
-    #[inline]
+    #[inline(always)]
     pub(super) fn next(&mut self, coder: &mut Coder<'_>) -> i64 {
-        for _ in 0..=MOST_CHANGES {
-            let change = if self.sequences[self.current].step == 0 { self.step_first(coder) } else { self.step(coder) };
-            match change {
-                0 => return self.time(),
-                by => self.current = (self.current + by) & 3,
-            }
-        }
-        coder.fail();
-        0
+        let [time] = Self::next_of(from_mut(self), from_mut(coder));
+        time
     }
 
-    /// How many sequences further the time is to be found; 0: it is here.
-    #[inline]
+    /// The next times of several decoders, in turn.
+    #[inline(always)]
+    pub(super) fn next_of<const L: usize>(all: &mut [Self; L], coders: &mut [Coder<'_>; L]) -> [i64; L] {
+        let (mut symbols, mut times) = ([JUMP; L], [0; L]);
+        in_turn!(|l| {
+            if all[l].has_step() {
+                symbols[l] = all[l].multiple(&mut coders[l]);
+            }
+        });
+        in_turn!(|l| {
+            if symbols[l] < SAME {
+                all[l].step(&mut coders[l], symbols[l]);
+            } else if symbols[l] > SAME {
+                by_copy(&mut coders[l], |coder| all[l].seldom(coder, symbols[l]));
+            }
+            times[l] = all[l].time();
+        });
+        times
+    }
+
+    #[inline(always)]
+    fn has_step(&self) -> bool {
+        self.sequences[self.current].step != 0
+    }
+
+    /// The symbol of the model of multiples, numbered as in the item.
+    #[inline(always)]
+    fn multiple(&mut self, coder: &mut Coder<'_>) -> usize {
+        let symbol = coder.symbol(&mut self.multiples);
+        symbol + usize::from(!self.has_same && symbol >= SAME)
+    }
+
+    /// A jump, a change of the sequence, or a sequence that has no step yet; `symbol` is worth nothing there.
+    #[inline(never)]
+    fn seldom(&mut self, coder: &mut Coder<'_>, symbol: usize) {
+        let mut change = match self.has_step() {
+            true => self.beyond(coder, symbol),
+            false => self.step_first(coder),
+        };
+        for _ in 0..MOST_CHANGES {
+            if change == 0 {
+                return;
+            }
+            self.current = (self.current + change) & 3;
+            change = match self.has_step() {
+                false => self.step_first(coder),
+                true => match self.multiple(coder) {
+                    symbol @ 0..SAME => {
+                        self.step(coder, symbol);
+                        0
+                    }
+                    symbol => self.beyond(coder, symbol),
+                },
+            };
+        }
+        if change != 0 {
+            coder.fail();
+        }
+    }
+
+    /// What the symbols from [`SAME`] on say: how many sequences further the time is to be found; 0: it is here.
+    fn beyond(&mut self, coder: &mut Coder<'_>, symbol: usize) -> usize {
+        match symbol {
+            JUMP => self.jump(coder),
+            further => further.saturating_sub(JUMP),
+        }
+    }
+
+    /// As [`Self::beyond`], for a sequence that has no step.
     fn step_first(&mut self, coder: &mut Coder<'_>) -> usize {
         let symbol = coder.symbol(&mut self.without_step) + usize::from(!self.has_same);
         let sequence = &mut self.sequences[self.current];
@@ -115,19 +178,9 @@ impl GpsTime {
         }
     }
 
-    /// As [`Self::step_first`], for a sequence that has a step.
-    #[inline]
-    fn step(&mut self, coder: &mut Coder<'_>) -> usize {
-        let symbol = coder.symbol(&mut self.multiples);
-        let symbol = symbol + usize::from(!self.has_same && symbol >= SAME);
-        if symbol >= SAME {
-            return match symbol {
-                SAME => 0,
-                JUMP => self.jump(coder),
-                further => further - JUMP,
-            };
-        }
-        let sequence = &mut self.sequences[self.current];
+    /// Goes on by a multiple of the step, and a correction.
+    #[inline(always)]
+    fn step(&mut self, coder: &mut Coder<'_>, symbol: usize) {
         let (multiple, context) = match symbol {
             0 => (0, NO_STEP),
             1 => (1, ONE_STEP),
@@ -139,6 +192,7 @@ impl GpsTime {
                 multiple => (multiple, BACK),
             },
         };
+        let sequence = &mut self.sequences[self.current];
         let by = self.corrections.next(coder, sequence.step.wrapping_mul(multiple), context);
         sequence.time = sequence.time.wrapping_add(i64::from(by));
         match context {
@@ -147,7 +201,6 @@ impl GpsTime {
             NO_STEP | MOST_STEPS | MOST_BACK => (sequence.step, sequence.extremes) = (by, 0),
             _ => {}
         }
-        0
     }
 
     /// Begins a sequence.

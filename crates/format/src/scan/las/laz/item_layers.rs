@@ -35,8 +35,17 @@ impl<I: Item> ItemLayer<I> {
         Self { at, is_of_channel: version >= 4, last, models }
     }
 
+    #[inline(always)]
     fn models(&mut self, channel: u8) -> &mut I {
-        self.models[usize::from(channel & 3)].get_or_insert_with(|| Box::new(I::new()))
+        match &mut self.models[usize::from(channel & 3)] {
+            Some(models) => models,
+            empty => Self::fill(empty),
+        }
+    }
+
+    #[cold]
+    fn fill(empty: &mut Option<Box<I>>) -> &mut I {
+        empty.get_or_insert_with(|| Box::new(I::new()))
     }
 }
 

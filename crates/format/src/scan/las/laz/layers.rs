@@ -3,9 +3,9 @@
 use super::base::{CHANNEL_BITS, FLAGS_AT};
 use super::channels::{Channels, Layer, Meta, State};
 use super::coder::Coder;
+use super::family::{BytesFamily, FlagsFamily};
 use super::gps_time::GpsTime;
 use super::integer::Integer;
-use super::model::Family;
 
 /// Where the fields are in a record.
 const Z_AT: usize = 8;
@@ -195,19 +195,19 @@ seldom!(
 
 /// A field of up to eight bits with a model for each context that follows from the last value.
 macro_rules! symbols {
-    ($(#[$doc:meta])* $name:ident, $n:literal, $t:literal) => {
+    ($(#[$doc:meta])* $name:ident, $family:ident, $symbols:literal) => {
         $(#[$doc])*
         #[derive(Debug)]
         pub(super) struct $name {
             last: u8,
-            models: Family<$n, $t>,
+            models: $family,
         }
 
         impl State for $name {
             type Value = u8;
 
             fn new() -> Self {
-                Self { last: 0, models: Family::new() }
+                Self { last: 0, models: $family::new($symbols) }
             }
 
             fn start(&mut self, last: u8) {
@@ -224,15 +224,15 @@ macro_rules! symbols {
 
 symbols!(
     /// Class.
-    Class, 256, 128
+    Class, BytesFamily, 256
 );
 symbols!(
     /// User data.
-    User, 256, 128
+    User, BytesFamily, 256
 );
 symbols!(
     /// Classification flags (four bits), scan direction, edge of the flight line.
-    PointFlags, 64, 32
+    PointFlags, FlagsFamily, 64
 );
 
 impl Field for Class {

@@ -6,9 +6,11 @@ pub(super) const SHARE_BITS: u32 = 15;
 /// The bound behind the last symbol: above every share.
 pub(super) const END: u16 = u16::MAX;
 
-/// A model of at most `N` symbols, as LASzip's: counts of the symbols so far, and bounds that are worked out anew now
-/// and then. `T`: entries of the table that shortens the search for a symbol, a power of two; 0 where `N` bounds are
-/// compared at once.
+/// Bounds that are looked at beside the first one, before the search becomes a loop.
+const AHEAD: usize = 3;
+
+/// A model of at most `N` − 3 symbols, a power of two,, as LASzip's: counts of the symbols so far, and bounds that are worked out anew
+/// now and then. `T`: entries of the table that shortens the search for a symbol, a power of two.
 ///
 /// A model that was not used since [`Self::reset`] costs nothing: it is filled when its first symbol is due.
 #[derive(Debug, Clone)]
@@ -18,36 +20,45 @@ pub(super) struct Model<const N: usize, const T: usize> {
     left: u16,
     /// Symbols from the last bounds to the next ones.
     cycle: u16,
+    /// Bits of a share within a part of the table.
+    part_bits: u16,
     /// Sum of the counts when the bounds were worked out; 0 before the first symbol.
     total: u32,
+    /// The symbol in whose share each part of the interval begins, or one before it: in units of [`Self::UNIT`].
+    table: [u8; T],
     /// Where the share of each symbol begins, the first at 0; [`END`] from `symbols` on.
     bounds: [u16; N],
     counts: [u16; N],
-    /// The symbol in whose share each of `T` equal parts of the interval begins.
-    table: [u16; T],
 }
 
-/// Models of few symbols.
-pub(super) type Tiny = Model<16, 0>;
-/// Models of up to 40 symbols.
-pub(super) type Small = Model<40, 0>;
+/// Models of up to 16 symbols.
+pub(super) type Tiny = Model<19, 32>;
+/// Models of up to 64 symbols, but far fewer as a rule.
+pub(super) type Small = Model<67, 128>;
 /// Models of 64 symbols.
-pub(super) type Flags = Model<64, 32>;
+pub(super) type Flags = Model<67, 128>;
 /// Models of 128 symbols.
-pub(super) type Changes = Model<128, 64>;
+pub(super) type Changes = Model<131, 256>;
 /// Models of the values of a byte, or of the upper bits of a number.
-pub(super) type Bytes = Model<256, 128>;
+pub(super) type Bytes = Model<259, 256>;
 /// Models of the multiples of a time step.
-pub(super) type Multiples = Model<516, 128>;
+pub(super) type Multiples = Model<1027, 256>;
 
 impl<const N: usize, const T: usize> Model<N, T> {
     /// Counts are halved when they sum to more.
     const MAX_TOTAL: u32 = 1 << SHARE_BITS;
+    /// The most symbols.
+    const MOST: usize = N - AHEAD;
+    /// Entries of the table are bytes.
+    const UNIT: usize = Self::MOST.div_ceil(1 + u8::MAX as usize);
 
-    /// A model of `symbols` (2 to `N`) symbols.
+    /// A model of `symbols` (2 to `N` − 3) symbols.
     pub(super) fn new(symbols: usize) -> Self {
-        let symbols = symbols.clamp(2, N) as u16;
-        Self { symbols, left: 0, cycle: 0, total: 0, bounds: [END; N], counts: [0; N], table: [0; T] }
+        let symbols = symbols.clamp(2, Self::MOST);
+        let parts = (2 * symbols).next_power_of_two().clamp(16, T);
+        let part_bits = (SHARE_BITS - parts.trailing_zeros()) as u16;
+        let symbols = symbols as u16;
+        Self { symbols, left: 0, cycle: 0, part_bits, total: 0, table: [0; T], bounds: [END; N], counts: [0; N] }
     }
 
     /// Forgets everything.
@@ -55,39 +66,53 @@ impl<const N: usize, const T: usize> Model<N, T> {
         (self.left, self.total) = (0, 0);
     }
 
-    /// The symbol whose share holds `share`, and its bounds; the symbol is counted.
+    /// The symbol whose share holds `share`, and its bounds; the symbol is counted. What is above all shares belongs to
+    /// the last symbol.
     #[inline(always)]
-    pub(super) fn take(&mut self, share: u16) -> (usize, u16, u16) {
-        let symbol = self.find(share);
+    pub(super) fn take(&mut self, share: u32) -> (usize, u32, u32) {
+        let (symbol, low, high) = self.find(share);
         self.counts[symbol] += 1;
-        self.left -= 1;
-        (symbol, self.bounds[symbol], self.bounds.get(symbol + 1).copied().unwrap_or(END))
+        (symbol, low, high)
     }
 
     /// To be called before [`Self::take`].
     #[inline(always)]
     pub(super) fn prepare(&mut self) {
-        if self.left == 0 {
+        let (left, is_due) = self.left.overflowing_sub(1);
+        self.left = left;
+        if is_due {
             self.renew();
         }
     }
 
+    /// Without a branch that depends on the symbol, which nobody can predict, unless several small shares are in a part.
     #[inline(always)]
-    fn find(&self, share: u16) -> usize {
-        if T == 0 {
-            // no branch depends on the symbol, which nobody can predict
-            let begun: u16 = self.bounds.iter().map(|bound| u16::from(*bound <= share)).sum();
-            return (usize::from(begun).wrapping_sub(1)).min(N - 1);
+    fn find(&self, share: u32) -> (usize, u32, u32) {
+        // a share above all others begins its search at some symbol before its own
+        let part = share >> self.part_bits;
+        let first = (usize::from(self.table[part as usize & (T - 1)]) * Self::UNIT) & (Self::MOST - 1);
+        let bound = |ahead: usize| u32::from(self.bounds[first + ahead]);
+        let [b0, b1, b2, b3] = [bound(0), bound(1), bound(2), bound(3)];
+        if share >= b3 {
+            return self.search(first, share);
         }
-        let part = usize::from(share) >> (SHARE_BITS - T.trailing_zeros());
-        let mut symbol = self.table.get(part).map_or(0, |first| usize::from(*first)).min(N - 1);
-        while symbol + 1 < N && self.bounds[symbol + 1] <= share {
-            symbol += 1;
-        }
-        symbol
+        let (second, third) = (share >= b1, share >= b2);
+        let (low, high) = if second { (b1, b2) } else { (b0, b1) };
+        let (low, high) = if third { (b2, b3) } else { (low, high) };
+        (first + usize::from(second) + usize::from(third), low, high)
     }
 
-    /// Starts the model, or works out bounds from the counts.
+    #[cold]
+    fn search(&self, first: usize, share: u32) -> (usize, u32, u32) {
+        let bound = |symbol: usize| u32::from(self.bounds[symbol]);
+        let mut symbol = first + AHEAD;
+        while symbol + 1 < usize::from(self.symbols) && bound(symbol + 1) <= share {
+            symbol += 1;
+        }
+        (symbol, bound(symbol), bound(symbol + 1))
+    }
+
+    /// Starts the model, or works out bounds from the counts, before a symbol.
     #[cold]
     #[inline(never)]
     fn renew(&mut self) {
@@ -103,7 +128,7 @@ impl<const N: usize, const T: usize> Model<N, T> {
             }
             self.cycle = (u32::from(self.cycle) * 5 / 4).min((symbols + 6) << 3) as u16;
         }
-        self.left = self.cycle;
+        self.left = self.cycle - 1;
         self.share_out();
     }
 
@@ -117,25 +142,25 @@ impl<const N: usize, const T: usize> Model<N, T> {
 
     fn share_out(&mut self) {
         let scale = (1 << 31) / self.total.max(1);
-        let mut before = 0;
         let symbols = usize::from(self.symbols);
-        for (bound, count) in self.bounds[..symbols].iter_mut().zip(&self.counts) {
+        let parts = 1 << (SHARE_BITS as u16 - self.part_bits);
+        let table = &mut self.table[..parts];
+        table.fill(0);
+        let mut before = 0;
+        for (symbol, (bound, count)) in self.bounds[..symbols].iter_mut().zip(&self.counts).enumerate() {
             *bound = ((scale * before) >> (31 - SHARE_BITS)) as u16;
             before += u32::from(*count);
-        }
-        if T == 0 {
-            return;
-        }
-        let part_bits = SHARE_BITS - T.trailing_zeros();
-        let mut filled = 0;
-        for (symbol, next) in self.bounds[1..symbols].iter().enumerate() {
-            let end = (usize::from(*next) + (1 << part_bits) - 1) >> part_bits;
-            if filled < end {
-                self.table[filled..end].fill(symbol as u16);
-                filled = end;
+            // of the symbols that begin within a part, the last is the first to be tried in the next one
+            let part = (usize::from(*bound) + (1 << self.part_bits) - 1) >> self.part_bits;
+            if let Some(entry) = table.get_mut(part) {
+                *entry = (symbol / Self::UNIT) as u8;
             }
         }
-        self.table[filled..].fill(self.symbols - 1);
+        let mut last = 0;
+        for entry in table {
+            last = last.max(*entry);
+            *entry = last;
+        }
     }
 }
 
@@ -181,49 +206,6 @@ impl BitModel {
     }
 }
 
-/// A model for each of up to 256 contexts, made when its context first occurs.
-#[derive(Debug, Clone)]
-pub(super) struct Family<const N: usize, const T: usize> {
-    /// One more than the index in `models`; 0 for a context that did not occur.
-    places: [u16; 256],
-    models: Vec<Model<N, T>>,
-    used: usize,
-}
-
-impl<const N: usize, const T: usize> Family<N, T> {
-    /// Models of `N` symbols.
-    pub(super) fn new() -> Self {
-        Self { places: [0; 256], models: Vec::new(), used: 0 }
-    }
-
-    /// Forgets everything.
-    pub(super) fn reset(&mut self) {
-        if self.used > 0 {
-            self.places.fill(0);
-            self.used = 0;
-        }
-    }
-
-    #[inline]
-    pub(super) fn of(&mut self, context: u8) -> &mut Model<N, T> {
-        let context = usize::from(context);
-        if self.places[context] == 0 {
-            self.add(context);
-        }
-        &mut self.models[usize::from(self.places[context]) - 1]
-    }
-
-    #[cold]
-    fn add(&mut self, context: usize) {
-        match self.models.get_mut(self.used) {
-            Some(model) => model.reset(),
-            None => self.models.push(Model::new(N)),
-        }
-        self.used += 1;
-        self.places[context] = self.used as u16;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -235,31 +217,33 @@ mod tests {
         for _ in 0..20_000 {
             model.prepare();
             seed = next(seed);
-            let share = (seed >> 8) as u16 & 0x7fff;
+            let share = seed >> 8 & 0x7fff;
             let (symbol, low, high) = model.take(share);
             assert!(symbol < symbols && low <= share && share < high, "{symbol}: {low} {share} {high}");
-            assert_eq!(high == END, symbol + 1 == symbols);
+            assert_eq!(high == u32::from(END), symbol + 1 == symbols);
         }
         assert!(model.bounds[..symbols].windows(2).all(|pair| pair[0] < pair[1]));
         model.reset();
         model.prepare();
-        assert_eq!(model.take(0x7fff).0, symbols - 1, "equal shares again");
+        for above in [0x7fff, 0x8000, 0x803f] {
+            assert_eq!(model.take(above).0, symbols - 1, "equal shares again");
+        }
     }
 
     #[test]
     fn the_search_finds_the_symbol_of_every_share() {
         let random = |x: u32| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        check::<16, 0>(2, random);
-        check::<16, 0>(16, random);
-        check::<40, 0>(33, random);
-        check::<64, 32>(64, random);
-        check::<256, 128>(32, random);
-        check::<256, 128>(256, random);
-        check::<516, 128>(515, random);
+        check::<19, 32>(2, random);
+        check::<19, 32>(16, random);
+        check::<67, 128>(33, random);
+        check::<67, 128>(64, random);
+        check::<259, 256>(32, random);
+        check::<259, 256>(256, random);
+        check::<1027, 256>(515, random);
         // the first symbol alone, then the last alone: shares as unequal as can be
-        check::<256, 128>(256, |_| 0);
-        check::<256, 128>(256, |_| u32::MAX);
-        check::<16, 0>(6, |_| u32::MAX);
+        check::<259, 256>(256, |_| 0);
+        check::<259, 256>(256, |_| u32::MAX);
+        check::<19, 32>(6, |_| u32::MAX);
     }
 
     #[test]
@@ -271,18 +255,5 @@ mod tests {
                 assert!((1..1 << BitModel::SHARE_BITS).contains(&model.zero), "{}", model.zero);
             }
         }
-    }
-
-    #[test]
-    fn models_of_a_family_are_separate_and_start_anew() {
-        let mut family = Family::<64, 32>::new();
-        for context in [7, 200, 7] {
-            let model = family.of(context);
-            model.prepare();
-            model.take(100);
-        }
-        assert_eq!((family.of(7).total, family.of(200).counts[0], family.used), (64, 2, 2));
-        family.reset();
-        assert_eq!((family.of(200).total, family.used), (0, 1));
     }
 }

@@ -1,9 +1,11 @@
 //! `POINT10` version 2: the first 20 bytes of formats 0–5.
 
-use super::coder::Coder;
+use super::coder::{Coder, by_copy};
+use super::family::BytesFamily;
+use super::in_turn::in_turn;
 use super::integer::Integer;
 use super::median::Median;
-use super::model::{Bytes, Family, Flags};
+use super::model::{Bytes, Flags};
 use super::returns::{context_8, level};
 
 /// Bytes of the item.
@@ -44,14 +46,22 @@ impl Values {
         }
     }
 
+    /// The number of the return, and of returns.
     #[inline(always)]
-    pub(super) fn write(&self, item: &mut [u8; LEN]) {
+    fn number_of(&self) -> (u8, u8) {
+        (self.returns & 7, self.returns >> 3 & 7)
+    }
+
+    #[inline(always)]
+    pub(super) fn to_bytes(self) -> [u8; LEN] {
+        let mut item = [0; LEN];
         for (bytes, value) in item.as_chunks_mut::<4>().0.iter_mut().zip(self.xyz) {
             *bytes = value.to_le_bytes();
         }
         [item[12], item[13]] = self.intensity.to_le_bytes();
         [item[14], item[15], item[16], item[17]] = [self.returns, self.class, self.angle, self.user];
         [item[18], item[19]] = self.source.to_le_bytes();
+        item
     }
 }
 
@@ -60,9 +70,9 @@ impl Values {
 pub(super) struct Point10 {
     last: Values,
     changes: Flags,
-    returns: Family<256, 128>,
-    classes: Family<256, 128>,
-    users: Family<256, 128>,
+    returns: BytesFamily,
+    classes: BytesFamily,
+    users: BytesFamily,
     angles: [Bytes; 2],
     intensity: Integer,
     source: Integer,
@@ -81,9 +91,9 @@ impl Point10 {
         Self {
             last: Values::default(),
             changes: Flags::new(64),
-            returns: Family::new(),
-            classes: Family::new(),
-            users: Family::new(),
+            returns: BytesFamily::new(256),
+            classes: BytesFamily::new(256),
+            users: BytesFamily::new(256),
             angles: [256; 2].map(Bytes::new),
             intensity: Integer::new(16, 4),
             source: Integer::new(16, 1),
@@ -101,7 +111,7 @@ impl Point10 {
         // the first intensity is predicted from nothing
         self.last = Values { intensity: 0, ..Values::read(first) };
         self.changes.reset();
-        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(Family::reset);
+        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(BytesFamily::reset);
         self.angles.iter_mut().for_each(Bytes::reset);
         [&mut self.intensity, &mut self.source, &mut self.dx, &mut self.dy, &mut self.z]
             .into_iter()
@@ -111,29 +121,67 @@ impl Point10 {
         self.heights = [0; 8];
     }
 
-    #[inline]
-    pub(super) fn next(&mut self, coder: &mut Coder<'_>, item: &mut [u8; LEN]) {
-        let changes = coder.symbol(&mut self.changes);
-        if changes & RETURNS != 0 {
-            self.last.returns = coder.symbol(self.returns.of(self.last.returns)) as u8;
-        }
-        let (number, returns) = (self.last.returns & 7, self.last.returns >> 3 & 7);
-        let context = context_8(returns, number);
-        if changes != 0 {
-            self.others(coder, changes, context);
-        }
-        self.position(coder, context, returns, number);
-        self.last.write(item);
+    /// The next points of several decoders, in turn, so that none waits for itself.
+    #[inline(always)]
+    pub(super) fn next_of<const L: usize>(points: &mut [Self; L], coders: &mut [Coder<'_>; L]) -> [Values; L] {
+        let (mut changes, mut contexts) = ([0; L], [0; L]);
+        in_turn!(|l| changes[l] = coders[l].symbol(&mut points[l].changes));
+        in_turn!(|l| contexts[l] = points[l].returns(&mut coders[l], changes[l]));
+        Self::intensities(points, coders, changes, contexts);
+        in_turn!(|l| {
+            if changes[l] != 0 {
+                points[l].last.intensity = points[l].intensities[contexts[l]];
+            }
+            if changes[l] & (CLASS | ANGLE | USER | SOURCE) != 0 {
+                by_copy(&mut coders[l], |coder| points[l].others(coder, changes[l]));
+            }
+        });
+        Self::positions(points, coders, contexts);
+        points.each_ref().map(|point| point.last)
     }
 
-    #[inline]
-    fn others(&mut self, coder: &mut Coder<'_>, changes: usize, context: usize) {
-        let last = &mut self.last;
-        if changes & INTENSITY != 0 {
-            let predicted = i32::from(self.intensities[context]);
-            self.intensities[context] = self.intensity.next(coder, predicted, context.min(3)) as u16;
+    /// The context of the return.
+    #[inline(always)]
+    fn returns(&mut self, coder: &mut Coder<'_>, changes: usize) -> usize {
+        if changes & RETURNS != 0 {
+            self.last.returns = by_copy(coder, |coder| coder.symbol(self.returns.of(self.last.returns))) as u8;
         }
-        last.intensity = self.intensities[context];
+        let (number, returns) = self.last.number_of();
+        context_8(returns, number)
+    }
+
+    #[inline(always)]
+    fn intensities<const L: usize>(
+        points: &mut [Self; L],
+        coders: &mut [Coder<'_>; L],
+        changes: [usize; L],
+        contexts: [usize; L],
+    ) {
+        if changes.iter().all(|changes| changes & INTENSITY != 0) {
+            let mut predicted = [0; L];
+            in_turn!(|l| predicted[l] = i32::from(points[l].intensities[contexts[l]]));
+            let models = points.each_mut().map(|point| &mut point.intensity);
+            let values = Integer::next_of(models, coders, predicted, contexts.map(|context| context.min(3)));
+            in_turn!(|l| points[l].intensities[contexts[l]] = values[l] as u16);
+        } else if L > 1 {
+            in_turn!(|l| {
+                if changes[l] & INTENSITY != 0 {
+                    by_copy(&mut coders[l], |coder| points[l].intensity(coder, contexts[l]));
+                }
+            });
+        }
+    }
+
+    #[inline(never)]
+    fn intensity(&mut self, coder: &mut Coder<'_>, context: usize) {
+        let predicted = i32::from(self.intensities[context]);
+        self.intensities[context] = self.intensity.next(coder, predicted, context.min(3)) as u16;
+    }
+
+    /// What seldom changes.
+    #[inline(never)]
+    fn others(&mut self, coder: &mut Coder<'_>, changes: usize) {
+        let last = &mut self.last;
         if changes & CLASS != 0 {
             last.class = coder.symbol(self.classes.of(last.class)) as u8;
         }
@@ -149,25 +197,41 @@ impl Point10 {
         }
     }
 
-    #[inline]
-    fn position(&mut self, coder: &mut Coder<'_>, context: usize, returns: u8, number: u8) {
-        let single = usize::from(returns == 1);
-        let [x_median, y_median] = &mut self.medians[context];
-        let [x, y, z] = &mut self.last.xyz;
+    #[inline(always)]
+    fn positions<const L: usize>(points: &mut [Self; L], coders: &mut [Coder<'_>; L], contexts: [usize; L]) {
+        let (mut singles, mut levels) = ([0; L], [0; L]);
+        in_turn!(|l| {
+            let (number, returns) = points[l].last.number_of();
+            (singles[l], levels[l]) = (usize::from(returns == 1), level(returns, number));
+        });
+        let mut predicted = [0; L];
+        in_turn!(|l| predicted[l] = points[l].medians[contexts[l]][0].get());
+        let by = Integer::next_of(points.each_mut().map(|point| &mut point.dx), coders, predicted, singles);
+        in_turn!(|l| points[l].advance(0, by[l], contexts[l]));
 
-        let dx = self.dx.next(coder, x_median.get(), single);
-        *x = x.wrapping_add(dx);
-        x_median.add(dx);
+        let mut of_dx = [0; L];
+        in_turn!(|l| predicted[l] = points[l].medians[contexts[l]][1].get());
+        in_turn!(|l| of_dx[l] = singles[l] + (points[l].dx.last_bits() & !1).min(20));
+        let by = Integer::next_of(points.each_mut().map(|point| &mut point.dy), coders, predicted, of_dx);
+        in_turn!(|l| points[l].advance(1, by[l], contexts[l]));
 
-        let y_context = single + (self.dx.last_bits() & !1).min(20);
-        let dy = self.dy.next(coder, y_median.get(), y_context);
-        *y = y.wrapping_add(dy);
-        y_median.add(dy);
+        let mut of_both = [0; L];
+        in_turn!(|l| {
+            let bits = (points[l].dx.last_bits() + points[l].dy.last_bits()) / 2;
+            of_both[l] = singles[l] + (bits & !1).min(18);
+        });
+        in_turn!(|l| predicted[l] = points[l].heights[levels[l]]);
+        let heights = Integer::next_of(points.each_mut().map(|point| &mut point.z), coders, predicted, of_both);
+        in_turn!(|l| {
+            points[l].heights[levels[l]] = heights[l];
+            points[l].last.xyz[2] = heights[l];
+        });
+    }
 
-        let bits = (self.dx.last_bits() + self.dy.last_bits()) / 2;
-        let z_context = single + (bits & !1).min(18);
-        let height = &mut self.heights[level(returns, number)];
-        *height = self.z.next(coder, *height, z_context);
-        *z = *height;
+    /// Moves x or y.
+    #[inline(always)]
+    fn advance(&mut self, axis: usize, by: i32, context: usize) {
+        self.last.xyz[axis] = self.last.xyz[axis].wrapping_add(by);
+        self.medians[context][axis].add(by);
     }
 }

@@ -1,8 +1,9 @@
 //! The items of LASzip 1: simpler predictions than those of version 2.
 
 use super::coder::Coder;
+use super::family::BytesFamily;
 use super::integer::Integer;
-use super::model::{Family, Flags, Model, Tiny};
+use super::model::{Flags, Multiples, Tiny};
 use super::point10::{LEN, Values};
 
 /// Bits of the symbol that says which values differ from those of the point before.
@@ -21,9 +22,9 @@ pub(super) struct Point10 {
     differences: [[i32; 3]; 2],
     oldest: usize,
     changes: Flags,
-    returns: Family<256, 128>,
-    classes: Family<256, 128>,
-    users: Family<256, 128>,
+    returns: BytesFamily,
+    classes: BytesFamily,
+    users: BytesFamily,
     intensity: Integer,
     angle: Integer,
     source: Integer,
@@ -39,9 +40,9 @@ impl Point10 {
             differences: [[0; 3]; 2],
             oldest: 0,
             changes: Flags::new(64),
-            returns: Family::new(),
-            classes: Family::new(),
-            users: Family::new(),
+            returns: BytesFamily::new(256),
+            classes: BytesFamily::new(256),
+            users: BytesFamily::new(256),
             intensity: Integer::new(16, 1),
             angle: Integer::new(8, 2),
             source: Integer::new(16, 1),
@@ -56,12 +57,12 @@ impl Point10 {
         self.last = Values::read(first);
         (self.differences, self.oldest) = ([[0; 3]; 2], 0);
         self.changes.reset();
-        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(Family::reset);
+        [&mut self.returns, &mut self.classes, &mut self.users].into_iter().for_each(BytesFamily::reset);
         let integers = [&mut self.intensity, &mut self.angle, &mut self.source];
         integers.into_iter().chain([&mut self.dx, &mut self.dy, &mut self.z]).for_each(Integer::reset);
     }
 
-    pub(super) fn next(&mut self, coder: &mut Coder<'_>, item: &mut [u8; LEN]) {
+    pub(super) fn next(&mut self, coder: &mut Coder<'_>) -> Values {
         let [x, y, z] = &mut self.last.xyz;
         let dx = self.dx.next(coder, median(self.differences[0]), 0);
         let dy = self.dy.next(coder, median(self.differences[1]), self.dx.last_bits().min(19));
@@ -74,7 +75,7 @@ impl Point10 {
         if changes != 0 {
             self.others(coder, changes, bits);
         }
-        self.last.write(item);
+        self.last
     }
 
     fn others(&mut self, coder: &mut Coder<'_>, changes: usize, bits: usize) {
@@ -118,13 +119,13 @@ pub(super) struct GpsTime {
     step: i32,
     extremes: u8,
     without_step: Tiny,
-    multiples: Model<512, 128>,
+    multiples: Multiples,
     corrections: Integer,
 }
 
 impl GpsTime {
     pub(super) fn new() -> Self {
-        let (without_step, multiples) = (Tiny::new(3), Model::new(512));
+        let (without_step, multiples) = (Tiny::new(3), Multiples::new(512));
         Self { time: 0, step: 0, extremes: 0, without_step, multiples, corrections: Integer::new(32, 6) }
     }
 

@@ -61,7 +61,8 @@ impl WavePacket {
             .for_each(Integer::reset);
     }
 
-    pub(super) fn next(&mut self, coder: &mut Coder<'_>, item: &mut [u8; LEN]) {
+    pub(super) fn next(&mut self, coder: &mut Coder<'_>) -> [u8; LEN] {
+        let mut item = [0; LEN];
         item[0] = coder.symbol(&mut self.descriptors) as u8;
         self.last_kind = coder.symbol(&mut self.kinds[self.last_kind]);
         self.offset = match self.last_kind {
@@ -84,5 +85,6 @@ impl WavePacket {
         for (bytes, value) in item[13..].as_chunks_mut::<4>().0.iter_mut().zip(self.rest) {
             *bytes = value.to_le_bytes();
         }
+        item
     }
 }

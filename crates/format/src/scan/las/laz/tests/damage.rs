@@ -83,7 +83,7 @@ fn a_layer_cut_anywhere_gives_the_points_before() {
 }
 
 /// First byte of the layers of a chunk.
-fn first_layer(chunk: &[u8], sizes: usize, format: Format) -> usize {
+pub(super) fn first_layer(chunk: &[u8], sizes: usize, format: Format) -> usize {
     let layers = |start: usize| (start - sizes) / 4;
     let sum = |start: usize| (0..layers(start)).map(|i| damage::u32_at(chunk, sizes + 4 * i) as usize).sum::<usize>();
     let mut starts = (sizes + 36..sizes + 200).step_by(4);

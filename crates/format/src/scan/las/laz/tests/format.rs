@@ -7,7 +7,8 @@ use ::laz::record::{LayeredPointRecordCompressor, RecordCompressor, SequentialPo
 use pointmill_testkit::Random;
 
 use super::super::{
-    Input, Item, ItemKind, Layered, LayeredModels, Part, Parts, Pointwise, PointwiseModels, Stop, record_len,
+    Filled, Input, Item, ItemKind, Layered, LayeredModels, LayeredPair, Pair, Part, Parts, Pointwise, PointwiseModels,
+    Stop, record_len,
 };
 
 /// A point format with extra bytes, in a version of LASzip.
@@ -36,6 +37,9 @@ pub(super) fn all_parts() -> Parts {
 
 /// Fills records.
 type Fill<'a> = dyn FnMut(&mut [u8]) -> (usize, Result<(), Stop>) + 'a;
+
+/// Fills records of two chunks.
+type FillTwo<'a> = dyn FnMut([&mut [u8]; 2]) -> [Filled; 2] + 'a;
 
 /// What a decoder gave: whole records, and why there are no more.
 pub(super) type Decoded = (Vec<u8>, Result<(), Stop>);
@@ -126,7 +130,7 @@ impl Format {
     }
 
     /// The items as the crate `laz` has them.
-    fn laz_items(self) -> Vec<::laz::LazItem> {
+    pub(super) fn laz_items(self) -> Vec<::laz::LazItem> {
         let mut record = vec![0; 34];
         record[0] = if self.is_layered() { 3 } else { 2 };
         let items = self.items();
@@ -176,6 +180,46 @@ impl Format {
         }
         out.truncate(good * len);
         (out, result)
+    }
+
+    /// Decodes two chunks in turn, of so many points, in parts of `step` points.
+    pub(super) fn decode_two(
+        self,
+        models: &mut Models,
+        chunks: [&[u8]; 2],
+        points: [usize; 2],
+        step: usize,
+    ) -> [Decoded; 2] {
+        let len = self.record_len();
+        let fill: &mut FillTwo<'_> = match models {
+            Models::Layered(models) => match LayeredPair::new(models, chunks, all_parts()) {
+                Ok(mut pair) => &mut move |outs| pair.fill(outs),
+                // such chunks are decoded alone
+                Err(_) => return [0, 1].map(|i| self.decode(&mut self.models(), chunks[i], points[i], step)),
+            },
+            Models::Pointwise(models) => {
+                let mut pair = Pair::new(models, chunks);
+                &mut move |outs| pair.fill(outs)
+            }
+        };
+        let mut outs = points.map(|points| vec![0; points * len]);
+        let (mut good, mut results) = ([0; 2], [Ok(()), Ok(())]);
+        for _ in 0..=points[0].max(points[1]) / step {
+            let [one, other] = &mut outs;
+            let rest =
+                |out: &[u8], i: usize| if results[i].is_ok() { (out.len() - good[i]).min(step * len) } else { 0 };
+            let lens = [rest(one, 0), rest(other, 1)];
+            let parts = [&mut one[good[0]..][..lens[0]], &mut other[good[1]..][..lens[1]]];
+            for (i, (more, result)) in fill(parts).into_iter().enumerate().filter(|(i, _)| lens[*i] > 0) {
+                good[i] += more * len;
+                results[i] = result;
+            }
+        }
+        let [one, other] = &mut outs;
+        one.truncate(good[0]);
+        other.truncate(good[1]);
+        let ([one, other], [why_one, why_other]) = (outs, results);
+        [(one, why_one), (other, why_other)]
     }
 
     pub(super) fn models(self) -> Models {

@@ -1,0 +1,125 @@
+//! Columns and positions into records, each at the place of its cell.
+
+use std::ops::Range;
+
+use super::columns::{Part, RowsOf};
+use crate::cloud::{Checksum, JobColumns, StoredOrigin, copy_record};
+use crate::runtime::{Vectors, vectorized};
+use crate::sources::{MARK_BYTES, POSITION_BYTES, Schema};
+
+/// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
+const TILE_POINTS: usize = 512;
+
+/// What the records of a slice are made of.
+pub(super) struct Assembly<'a> {
+    pub(super) schema: &'a Schema,
+    pub(super) origin: StoredOrigin,
+    pub(super) q: &'a JobColumns,
+    pub(super) parts: Vec<Part<'a>>,
+    pub(super) rows: &'a Rows<'a>,
+    /// Where in a record its mark is, and the marks.
+    pub(super) marks: Option<(usize, &'a [u64])>,
+}
+
+/// Rows of a batch that are taken together.
+pub(super) enum Rows<'a> {
+    Consecutive(Range<usize>),
+    Selected(&'a [u32]),
+}
+
+impl Rows<'_> {
+    /// The row of the batch that is the `i`th of these.
+    pub(super) fn row(&self, i: usize) -> usize {
+        match self {
+            Self::Consecutive(range) => range.start + i,
+            Self::Selected(rows) => rows[i] as usize,
+        }
+    }
+
+    /// So many of these from `first` on.
+    #[inline(always)]
+    fn part(&self, first: usize, count: usize) -> RowsOf<'_> {
+        match self {
+            Self::Consecutive(range) => RowsOf::From(range.start + first),
+            Self::Selected(rows) => RowsOf::Named(&rows[first..first + count]),
+        }
+    }
+}
+
+/// Puts records together: in the order of the rows, whose columns are then read from front to back, and then moves each as a
+/// whole.
+#[derive(Default)]
+pub(super) struct Assembler {
+    vectors: Vectors,
+    tile: Vec<u8>,
+}
+
+impl Assembler {
+    /// Writes the records of a slice; `places`: where each goes among them, empty if all stay in order.
+    pub(super) fn put(&mut self, assembly: &Assembly<'_>, places: &[u32], records: &mut [u8], checksum: &mut Checksum) {
+        put(self.vectors, assembly, places, records, &mut self.tile, checksum);
+    }
+}
+
+vectorized! {
+    fn put(
+        assembly: &Assembly<'_>,
+        places: &[u32],
+        records: &mut [u8],
+        tile: &mut Vec<u8>,
+        checksum: &mut Checksum,
+    ) = Assembly::put;
+}
+
+impl Assembly<'_> {
+    #[inline(always)]
+    fn put(&self, places: &[u32], records: &mut [u8], tile: &mut Vec<u8>, checksum: &mut Checksum) {
+        match places {
+            [] => self.put_in_order(records, checksum),
+            places => self.put_to(places, records, tile, checksum),
+        }
+    }
+
+    #[inline(always)]
+    fn put_in_order(&self, records: &mut [u8], checksum: &mut Checksum) {
+        for (i, tile) in records.chunks_mut(TILE_POINTS * self.schema.stride).enumerate() {
+            self.put_tile(i * TILE_POINTS, tile, checksum);
+        }
+    }
+
+    #[inline(always)]
+    fn put_to(&self, places: &[u32], records: &mut [u8], tile: &mut Vec<u8>, checksum: &mut Checksum) {
+        let stride = self.schema.stride;
+        tile.resize(TILE_POINTS * stride, 0);
+        for (i, places) in places.chunks(TILE_POINTS).enumerate() {
+            let tile = &mut tile[..places.len() * stride];
+            self.put_tile(i * TILE_POINTS, tile, checksum);
+            for (record, place) in tile.chunks_exact(stride).zip(places) {
+                copy_record(record, &mut records[*place as usize * stride..][..stride]);
+            }
+        }
+    }
+
+    /// Puts the records from `first` on together.
+    #[inline(always)]
+    fn put_tile(&self, first: usize, tile: &mut [u8], checksum: &mut Checksum) {
+        let stride = self.schema.stride;
+        let count = tile.len() / stride;
+        let [x, y, z] = self.q.0.each_ref().map(|axis| &axis[first..first + count]);
+        for (i, record) in tile.chunks_exact_mut(stride).enumerate() {
+            let stored = self.origin.stored(crate::cloud::JobPoint([x[i], y[i], z[i]])).0;
+            if let Some(position) = record.first_chunk_mut::<POSITION_BYTES>() {
+                position.as_chunks_mut::<4>().0.iter_mut().zip(stored).for_each(|(to, q)| *to = q.to_le_bytes());
+            }
+        }
+        for part in &self.parts {
+            part.put(tile, stride, self.rows.part(first, count));
+        }
+        if let Some((at, marks)) = self.marks {
+            for (record, mark) in tile.chunks_exact_mut(stride).zip(&marks[first..]) {
+                record[at..at + MARK_BYTES].copy_from_slice(&mark.to_le_bytes());
+            }
+        }
+        checksum.add_all(tile, stride);
+    }
+}
