@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn another_reader_finds_every_point_inside_the_header_bounds_in_las_and_laz_alike() {
         let dir = tempfile::tempdir().unwrap();
-        for scene in [Scene::Aerial, Scene::Terrestrial, Scene::Volume] {
+        for scene in [Scene::Aerial, Scene::Terrestrial, Scene::Shuffled, Scene::Volume] {
             let [las, laz] = ["las", "laz"].map(|ending| {
                 let path = dir.path().join(format!("{}.{ending}", scene.name()));
                 write(scene, LasLayout::COLOUR, POINTS, 7, &path).unwrap();

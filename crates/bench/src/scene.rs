@@ -13,6 +13,8 @@ pub enum Scene {
     Terrestrial,
     /// A knobbly ball of 20 cm, points all over it in no order, local metres on a lattice of 10 µm.
     Object,
+    /// The land of [`Self::Aerial`], its points in random order.
+    Shuffled,
     /// A cube of 500 m filled evenly, points in no order, local metres on a lattice of 1 mm.
     Volume,
 }
@@ -34,6 +36,7 @@ impl Scene {
             Self::Aerial => "aerial",
             Self::Terrestrial => "terrestrial",
             Self::Object => "object",
+            Self::Shuffled => "shuffled",
             Self::Volume => "volume",
         }
     }
@@ -41,7 +44,7 @@ impl Scene {
     /// LAS offset, metres.
     pub const fn offset(self) -> [f64; 3] {
         match self {
-            Self::Aerial => [476_000.0, 4_428_000.0, 400.0],
+            Self::Aerial | Self::Shuffled => [476_000.0, 4_428_000.0, 400.0],
             Self::Terrestrial | Self::Object | Self::Volume => [0.0; 3],
         }
     }
@@ -49,18 +52,19 @@ impl Scene {
     /// LAS scale, metres, of all axes.
     pub const fn scale(self) -> f64 {
         match self {
-            Self::Aerial => 0.01,
+            Self::Aerial | Self::Shuffled => 0.01,
             Self::Terrestrial | Self::Volume => 0.001,
             Self::Object => 0.000_01,
         }
     }
 
-    /// Point `index` of `total`, in the order of acquisition. The points of a scene are drawn from one `random`, in order.
+    /// Point `index` of `total` (below 2^62), in the order of acquisition. The points of a scene are drawn from one `random`, in order.
     pub fn point(self, index: u64, total: u64, random: &mut Random) -> ScenePoint {
         match self {
             Self::Aerial => aerial(index as f64, total as f64, random),
             Self::Terrestrial => terrestrial(index, total, random),
             Self::Object => object(random),
+            Self::Shuffled => aerial(shuffled(index, total) as f64, total as f64, random),
             Self::Volume => volume(random),
         }
     }
@@ -141,6 +145,24 @@ fn object(random: &mut Random) -> ScenePoint {
     ScenePoint { position, rgb: colour(knobs * 250.0 + 15.0, random.normal()), class: 0, returns: 1 }
 }
 
+/// Where `index` goes when the numbers below `total` are shuffled: a Feistel network over a power of four, walked until
+/// the number is below `total`.
+fn shuffled(index: u64, total: u64) -> u64 {
+    let half = (u64::BITS - total.leading_zeros()).div_ceil(2);
+    let mask = (1 << half) - 1;
+    let mut number = index;
+    loop {
+        let (mut left, mut right) = (number >> half, number & mask);
+        for round in 1..=4 {
+            (left, right) = (right, left ^ (mixed(right + (round << 40)) & mask));
+        }
+        number = left << half | right;
+        if number < total {
+            return number;
+        }
+    }
+}
+
 fn volume(random: &mut Random) -> ScenePoint {
     let position = [(); 3].map(|()| random.unit() * 500.0);
     ScenePoint { position, rgb: colour(position[2] / 5.0 - 40.0, random.normal()), class: 1, returns: 1 }
@@ -162,10 +184,7 @@ impl Random {
     /// Uniform in 0 ≤ u < 1.
     pub fn unit(&mut self) -> f64 {
         self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.state;
-        z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ z >> 31) >> 11) as f64 / (1u64 << 53) as f64
+        (mixed(self.state) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// Normal with mean 0 and deviation 1 (Box and Muller).
@@ -180,9 +199,28 @@ impl Random {
     }
 }
 
+/// What SplitMix64 makes of its state.
+const fn mixed(state: u64) -> u64 {
+    let z = (state ^ state >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ z >> 31
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shuffled_numbers_are_each_there_once_and_in_no_order() {
+        for total in [1, 2, 5, 1000, 4096, 4097] {
+            let order: Vec<u64> = (0..total).map(|i| shuffled(i, total)).collect();
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..total), "{total}");
+            let rising = order.windows(2).filter(|pair| pair[0] < pair[1]).count() as f64;
+            assert!(total < 1000 || (0.45..0.55).contains(&(rising / total as f64)), "{rising} of {total}");
+        }
+    }
 
     #[test]
     fn the_street_is_denser_near_a_scanner_and_the_land_is_even() {

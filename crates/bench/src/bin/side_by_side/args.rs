@@ -14,7 +14,7 @@ pub(crate) struct Args {
         long,
         value_enum,
         value_delimiter = ',',
-        default_value = "aerial,terrestrial,random-order,large,brotli,outputs,decoder"
+        default_value = "aerial,terrestrial,random-order,volume,large,brotli,outputs,decoder"
     )]
     pub(crate) jobs: Vec<Job>,
     /// Points of the scene; the default depends on the job. Figures of other numbers of points change no row of the

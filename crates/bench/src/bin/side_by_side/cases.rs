@@ -115,7 +115,7 @@ impl Case {
 pub(crate) fn list(job: Job, points: u64, more: &str) -> Vec<Case> {
     let mut cases = Cases { scene: job.scene(points), more, cases: Vec::new() };
     match job {
-        Job::Aerial | Job::Terrestrial | Job::RandomOrder => one_scene(job, &mut cases),
+        Job::Aerial | Job::Terrestrial | Job::RandomOrder | Job::Volume => one_scene(job, &mut cases),
         Job::Large => {
             cases.add(Program::Pointmill, "", "");
             // In bytes: every spelling of a size takes those.
@@ -161,6 +161,9 @@ fn one_scene(job: Job, cases: &mut Cases<'_>) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     cases.add(Program::Pointmill, "", "");
     cases.add(Program::Floor, "", &threads.to_string());
+    if job == Job::Volume {
+        return;
+    }
     cases.add(Program::PotreeConverter, "", "-m poisson");
     if job == Job::RandomOrder {
         return;

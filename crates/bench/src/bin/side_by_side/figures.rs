@@ -122,6 +122,9 @@ pub(crate) const FIGURES: &[Figure] = {
         Figure::new(Job::RandomOrder, "random order: potree2 / floor, CPU", Told, |o| {
             o.ratio("pointmill", "floor", CPU)
         }),
+        Figure::new(Job::Volume, "a volume in random order: potree2 / floor, CPU", Told, |o| {
+            o.ratio("pointmill", "floor", CPU)
+        }),
         Figure::new(Job::Large, "100 million points: 256 MiB / in memory, CPU", AtMost(1.1), |o| {
             o.ratio("pointmill, 256 MiB", "pointmill", CPU)
         }),

@@ -11,8 +11,10 @@ pub(crate) enum Job {
     Aerial,
     /// Terrestrial LAZ, likewise, with one decode by the laz crate
     Terrestrial,
-    /// A volume in random order, with PotreeConverter
+    /// Aerial LAS with its points in random order, with PotreeConverter
     RandomOrder,
+    /// A volume in random order, with the floor (PotreeConverter does not come to an end)
+    Volume,
     /// 100 million points in memory and under a ceiling of 256 MiB
     Large,
     /// BROTLI payloads, with PotreeConverter's
@@ -41,7 +43,8 @@ impl Job {
         match self {
             Self::Aerial => format!("Aerial LAS, {points} points"),
             Self::Terrestrial => format!("Terrestrial LAZ, {points} points"),
-            Self::RandomOrder => format!("A volume in random order, LAS, {points} points"),
+            Self::RandomOrder => format!("Aerial LAS in random order, {points} points"),
+            Self::Volume => format!("A volume in random order, LAS, {points} points"),
             Self::Large => format!("A ceiling of memory: aerial LAS, {points} points"),
             Self::Brotli => format!("BROTLI: aerial LAS, {points} points"),
             Self::Outputs => format!("Binary trees, batches and several outputs: aerial LAS, {points} points"),
@@ -76,7 +79,8 @@ impl Job {
     pub(crate) const fn scene(self, points: u64) -> SceneFile {
         let scene = match self {
             Self::Terrestrial => Scene::Terrestrial,
-            Self::RandomOrder => Scene::Volume,
+            Self::RandomOrder => Scene::Shuffled,
+            Self::Volume => Scene::Volume,
             _ => Scene::Aerial,
         };
         let layout = if matches!(self, Self::HalfBillion) { LasLayout::PLAIN } else { LasLayout::COLOUR };
