@@ -38,7 +38,13 @@ pub(crate) fn copy_record(from: &[u8], to: &mut [u8]) {
     let n = from.len().min(to.len());
     let (from, to) = (&from[..n], &mut to[..n]);
     if n < 16 {
-        to.copy_from_slice(from);
+        match (from.first_chunk::<8>(), from.last_chunk::<8>()) {
+            (Some(first), Some(last)) => {
+                to[..8].copy_from_slice(first);
+                to[n - 8..].copy_from_slice(last);
+            }
+            _ => to.copy_from_slice(from),
+        }
         return;
     }
     for (from, to) in from.as_chunks::<16>().0.iter().zip(to.as_chunks_mut::<16>().0) {

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use super::item::Item;
 use crate::cloud::{MortonSorter, morton};
+use crate::runtime::{Vectors, vectorized};
 
 /// Puts indices of `items` into Morton order, all bits of the coordinates; points of one place by `tails`, which compares
 /// the bytes of their records behind the position.
@@ -20,14 +21,25 @@ pub(super) fn order(
     let levels = (MortonSorter::room(items.len()) / 3).min(width).min(21);
     let shift = width - levels;
     let relative = |item: &Item| -> [u32; 3] { std::array::from_fn(|a| item.q[a].abs_diff(min[a])) };
-    let code = |item: &Item| morton::interleave(relative(item).map(|r| r >> shift));
-    sorter.codes(items.len()).extend(items.iter().map(code));
+    put_codes(Vectors::best(), items, min, shift, sorter.codes(items.len()));
     sorter.sort(3 * levels, 0, |a, b| {
         let (a, b) = (&items[a], &items[b]);
         morton::compare(relative(a), relative(b)).then_with(|| tails(a, b))
     });
     out.clear();
     out.extend(sorter.indices(0..sorter.len()).map(|i| i as u32));
+}
+
+vectorized! {
+    fn put_codes(items: &[Item], min: [i32; 3], shift: u32, codes: &mut Vec<u64>) = put_codes_anyhow;
+}
+
+#[inline(always)]
+fn put_codes_anyhow(items: &[Item], min: [i32; 3], shift: u32, codes: &mut Vec<u64>) {
+    codes.resize(items.len(), 0);
+    for (code, item) in codes.iter_mut().zip(items) {
+        *code = morton::interleave(std::array::from_fn(|a| item.q[a].abs_diff(min[a]) >> shift));
+    }
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use super::upper::Task;
 use crate::cloud::{Cloud, JobBounds, Ledger, Moments, MortonSorter, StoredOrigin, StoredPoint, position};
 use crate::error::ConvertError;
 use crate::outputs::recovery::{Lost, Recovery};
-use crate::runtime::os_hints;
+use crate::runtime::{Vectors, os_hints, vectorized};
 
 /// Leaves above this are counted in the memory of a task.
 const LARGE_LEAF: u32 = 100_000;
@@ -164,7 +164,7 @@ impl<'a> Builder<'a> {
         let inner = |kind| Some(Node::new(Aabb::EMPTY, count as u64, kind));
         let leaves = match what {
             What::Split => {
-                let extent = extent(&self.items[range.clone()]);
+                let extent = extent(Vectors::best(), &self.items[range.clone()]);
                 if count <= capacity {
                     return self.leaf(&range, &extent, &path, start, true, ledger).map(Some);
                 }
@@ -190,7 +190,7 @@ impl<'a> Builder<'a> {
             What::Cut { leaves } => leaves,
         };
         if leaves == 1 {
-            let extent = extent(&self.items[range.clone()]);
+            let extent = extent(Vectors::best(), &self.items[range.clone()]);
             return self.leaf(&range, &extent, &path, start, false, ledger).map(Some);
         }
         // Runs differ by one point at most, larger ones first.
@@ -315,7 +315,12 @@ impl World<'_> {
     }
 }
 
-fn extent(items: &[Item]) -> Extent {
+vectorized! {
+    fn extent(items: &[Item]) -> Extent = extent_anyhow;
+}
+
+#[inline(always)]
+fn extent_anyhow(items: &[Item]) -> Extent {
     let mut e = Extent { min: [i32::MAX; 3], max: [i32::MIN; 3], sum: [0; 3] };
     for item in items {
         for a in 0..3 {
