@@ -6,6 +6,7 @@ use std::process::Command;
 
 /// Options in the documents that are not pointmill's: of cargo, and of the programs and scripts in the bench crate.
 const OTHER_OPTIONS: &[&str] = &[
+    "--as",
     "--all-features",
     "--bin",
     "--bench",
