@@ -90,7 +90,9 @@ impl Assembly<'_> {
     #[inline(always)]
     fn put_to(&self, places: &[u32], records: &mut [u8], tile: &mut Vec<u8>, checksum: &mut Checksum) {
         let stride = self.schema.stride;
-        tile.resize(TILE_POINTS * stride, 0);
+        // zeros are what columns hold that this source does not have, whatever the last source had
+        tile.clear();
+        tile.resize(TILE_POINTS.min(places.len()) * stride, 0);
         for (i, places) in places.chunks(TILE_POINTS).enumerate() {
             let tile = &mut tile[..places.len() * stride];
             self.put_tile(i * TILE_POINTS, tile, checksum);
@@ -121,5 +123,54 @@ impl Assembly<'_> {
             }
         }
         checksum.add_all(tile, stride);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pointmill_format::{Attribute, AttributeType, Column};
+
+    use super::*;
+    use crate::cloud::JobPoint;
+
+    #[test]
+    fn records_go_to_their_places_and_what_a_source_lacks_is_zero() {
+        let schema =
+            Schema::new([("a", 2), ("b", 1)].map(|(name, n)| Attribute::new(name, AttributeType::UInt16, n)).to_vec());
+        let points = 1300u32;
+        let q = JobColumns([10, 20, 30].map(|first| (0..i64::from(points)).map(|i| first + i).collect()));
+        let columns = [
+            Column::UInt16((0..points).flat_map(|i| [i as u16, 7]).collect()),
+            Column::UInt16((0..points).map(|i| 3 * i as u16).collect()),
+        ];
+        let columns: Vec<&Column> = columns.iter().collect();
+        let places: Vec<u32> = (0..points).map(|i| i * 7 % points).collect();
+        for vectors in Vectors::all() {
+            let mut assembler = Assembler { vectors, tile: Vec::new() };
+            // first a source with both columns, then one without the second
+            for (given, b) in [([Some(0), Some(1)], 3), ([Some(0), None], 0)] {
+                for places in [&places[..], &[]] {
+                    let assembly = Assembly {
+                        schema: &schema,
+                        origin: StoredOrigin(JobPoint([10, 20, 30])),
+                        q: &q,
+                        parts: Part::of(&columns, &given, &schema),
+                        rows: &Rows::Consecutive(0..points as usize),
+                        marks: None,
+                    };
+                    let mut records = vec![0; points as usize * schema.stride];
+                    let mut checksum = Checksum::default();
+                    assembler.put(&assembly, places, &mut records, &mut checksum);
+                    for i in 0..points {
+                        let place = places.get(i as usize).map_or(i, |place| *place) as usize;
+                        let record = &records[place * schema.stride..][..schema.stride];
+                        let mut expected: Vec<u8> = [i, i, i].iter().flat_map(|v| v.to_le_bytes()).collect();
+                        expected.extend([i as u16, 7, b * i as u16].iter().flat_map(|v| v.to_le_bytes()));
+                        assert_eq!(record, expected, "{vectors:?} point {i}");
+                    }
+                    assert_eq!(checksum.count(), u64::from(points));
+                }
+            }
+        }
     }
 }

@@ -313,3 +313,21 @@ fn quantize_axis(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_set_of_instructions_finds_the_same_extent() {
+        let mut random = pointmill_testkit::Random::new(9);
+        for count in [0, 1, 7, 1001] {
+            let q: Vec<i64> = (0..count).map(|_| random.next_u64() as i64 >> 9).collect();
+            let expected = (q.iter().copied().min(), q.iter().copied().max());
+            let expected = (expected.0.unwrap_or(i64::MAX), expected.1.unwrap_or(i64::MIN));
+            for vectors in Vectors::all() {
+                assert_eq!(extent(vectors, &q), expected, "{vectors:?}");
+            }
+        }
+    }
+}

@@ -65,28 +65,24 @@ impl<'a> PayloadEncoder<'a> {
         checksum: &mut Checksum,
     ) {
         let stride = self.layout.stored_stride;
-        out.reserve(records.len() * self.layout.stride + TILE_RECORDS * stride);
+        out.reserve(records.len() * self.layout.stride);
         let mut seen = Seen::default();
-        loop {
-            let start = out.len();
+        while records.len() > 0 {
+            let (start, bytes) = (out.len(), records.len().min(TILE_RECORDS) * stride);
             if self.layout.keeps_records() {
                 // put together where they stay
-                out.resize(start + TILE_RECORDS * stride, 0);
-                let bytes = stride * gather(&mut records, &mut out[start..], stride);
-                out.truncate(start + bytes);
+                out.resize(start + bytes, 0);
+                gather(&mut records, &mut out[start..], stride);
                 checksum.add_all(&out[start..], stride);
             } else {
                 self.tile.resize(TILE_RECORDS * stride, 0);
-                let bytes = stride * gather(&mut records, &mut self.tile, stride);
+                gather(&mut records, &mut self.tile[..bytes], stride);
                 checksum.add_all(&self.tile[..bytes], stride);
                 self.layout.select(&self.tile[..bytes], out);
             }
             self.layout.finish(&mut out[start..]);
             if let Some((watch, _)) = &self.watch {
                 watch.look(&mut out[start..], self.layout.stride, &mut seen);
-            }
-            if out.len() - start < TILE_RECORDS * self.layout.stride {
-                break;
             }
         }
         if let Some((_, all)) = &self.watch {
@@ -95,15 +91,12 @@ impl<'a> PayloadEncoder<'a> {
     }
 }
 
-/// Copies the next records, as many as there is room for; returns how many.
+/// Copies the next records, as many as there is room for.
 #[inline(always)]
-fn gather<'r>(records: &mut impl Iterator<Item = &'r [u8]>, out: &mut [u8], stride: usize) -> usize {
-    let mut count = 0;
+fn gather<'r>(records: &mut impl Iterator<Item = &'r [u8]>, out: &mut [u8], stride: usize) {
     for (slot, record) in out.chunks_exact_mut(stride).zip(records) {
         copy_record(record, slot);
-        count += 1;
     }
-    count
 }
 
 impl PayloadEncoder<'_> {
