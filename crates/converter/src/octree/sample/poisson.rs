@@ -197,7 +197,7 @@ mod tests {
         let taken = check(128.0, 14, volume);
         assert!(taken > 500 && taken < 4000, "{taken}");
         // A crowd in a tile and a half: many more than are decided together.
-        let crowd: Vec<[u32; 3]> = (0..4000).map(|_| [next() * 3 >> 6, next() >> 5, next() >> 5]).collect();
+        let crowd: Vec<[u32; 3]> = (0..4000).map(|_| [(next() * 3) >> 6, next() >> 5, next() >> 5]).collect();
         let taken = check(128.0, 14, crowd);
         assert!(taken > 30 && taken < 400, "{taken}");
         for divisor in [40.0, 100.0, 181.0, 255.0] {
