@@ -133,7 +133,7 @@ impl fmt::Display for ViewerNote {
             }
             Self::BehindColour { words } => write!(
                 f,
-                "BA_PointCloud does not know how many bytes {} takes, and would show nonsense",
+                "BA_PointCloud does not know the number of bytes of {}, and would show nonsense",
                 words.join(", ")
             ),
             Self::Geocentric { system } => write!(

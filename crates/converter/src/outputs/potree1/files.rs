@@ -12,6 +12,9 @@ use crate::octree::{FinishedNode, NodeSink};
 use crate::outputs::staging::StagedDataset;
 use crate::runtime::{Consumer, Reservation, Runtime};
 
+/// The system is asked to begin writing files of this size at once: of smaller ones the requests cost more than they gain.
+const LARGE_BYTES: usize = 128 << 10;
+
 const WRITING: &str = "writing a node";
 
 /// The files of nodes while they are made.
@@ -47,7 +50,9 @@ impl<'a> NodeFiles<'a> {
         self.make_folders(node.key)?;
         let file = self.staged.create(&self.metadata.node_file(node.key))?;
         file.write_at(bytes, 0, WRITING)?;
-        file.start_write_back(0, bytes.len());
+        if bytes.len() >= LARGE_BYTES {
+            file.start_write_back(0, bytes.len());
+        }
         Ok(())
     }
 
