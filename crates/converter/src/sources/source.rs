@@ -33,8 +33,8 @@ pub(crate) struct Source {
     pub(super) decode_bytes: u64,
     /// Parts that decode alone.
     pub(crate) pieces: u32,
-    /// Number of its first piece among those of all scans.
-    pub(super) first_unit: u64,
+    /// Number of its first pair of pieces among those of all scans.
+    pub(super) first_pair: u64,
     /// Tells whether the file is still the one that was opened first ([`super::same::mark`]).
     pub(super) mark: u64,
 }
@@ -76,6 +76,13 @@ impl Stored {
     }
 }
 
+impl Source {
+    /// Number of the pair of pieces that follows its last.
+    pub(super) fn end_of_pairs(&self) -> u64 {
+        self.first_pair + u64::from(self.pieces).div_ceil(super::PIECES_TOGETHER)
+    }
+}
+
 #[cfg(test)]
 impl Source {
     /// A source of which the header alone matters. `seen`: where its points are.
@@ -94,7 +101,7 @@ impl Source {
             file_bytes: 0,
             decode_bytes: 0,
             pieces: 0,
-            first_unit: 0,
+            first_pair: 0,
             mark: 0,
         }
     }
