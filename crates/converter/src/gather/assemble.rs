@@ -146,7 +146,8 @@ mod tests {
         let columns: Vec<&Column> = columns.iter().collect();
         let places: Vec<u32> = (0..points).map(|i| i * 7 % points).collect();
         for vectors in Vectors::all() {
-            let mut assembler = Assembler { vectors, tile: Vec::new() };
+            // as a shorter slice leaves it
+            let mut assembler = Assembler { vectors, tile: Vec::with_capacity(300 * schema.stride) };
             // first a source with both columns, then one without the second
             for (given, b) in [([Some(0), Some(1)], 3), ([Some(0), None], 0)] {
                 for places in [&places[..], &[]] {
