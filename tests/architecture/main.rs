@@ -34,9 +34,9 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
         "pointmill-format",
         &[
             &["error", "write_error", "bytes", "geometry", "names"],
-            &["points"],
+            &["json", "points"],
             &["scan"],
-            &["potree2", "bintree", "batches"],
+            &["potree1", "potree2", "bintree", "batches"],
             &["dataset_kind"],
         ],
     ),

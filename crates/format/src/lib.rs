@@ -33,6 +33,7 @@
 //!
 //! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
 //!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF); `scans` is all of them.
+//! * [`potree1`]: Potree 1.4 to 1.8 octrees (`cloud.js`), read lazily and written.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written
 //!   (feature `rstar`: nearest points too).
@@ -55,6 +56,7 @@
 mod dataset_kind;
 mod error;
 mod geometry;
+mod json;
 mod names;
 mod points;
 mod write_error;
@@ -62,6 +64,7 @@ mod write_error;
 pub mod batches;
 pub mod bintree;
 pub mod bytes;
+pub mod potree1;
 pub mod potree2;
 pub mod scan;
 

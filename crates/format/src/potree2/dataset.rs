@@ -8,7 +8,6 @@ use crate::bytes::{ByteSource, Folder, STEP};
 use crate::{NodeKey, ReadError};
 
 use super::chunk::{ChunkRanges, Parser};
-use super::morton::breadth_first_rank;
 use super::{HIERARCHY_FILE, METADATA_FILE, Metadata, Node, NodeRecord, OCTREE_FILE};
 
 /// More JSON than this is not metadata.
@@ -157,7 +156,7 @@ impl Dataset {
                 }
             }
         }
-        nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
+        nodes.sort_by_cached_key(|n| n.key.breadth_first_rank());
         Ok(nodes)
     }
 

@@ -137,18 +137,7 @@ impl Metadata {
     /// The box of a node: the cube halved [`NodeKey::level`] times, as viewers do it.
     #[must_use]
     pub fn node_cube(&self, key: NodeKey) -> Aabb {
-        let mut cube = self.cube;
-        for level in (0..key.level).rev() {
-            for (axis, cell) in [key.x, key.y, key.z].into_iter().enumerate() {
-                let mid = cube.min[axis] + (cube.max[axis] - cube.min[axis]) / 2.0;
-                if cell.checked_shr(level.into()).unwrap_or(0) & 1 == 1 {
-                    cube.min[axis] = mid;
-                } else {
-                    cube.max[axis] = mid;
-                }
-            }
-        }
-        cube
+        self.cube.octant(key)
     }
 
     /// Spacing of the nodes of `level`, world units: halves with every level.
