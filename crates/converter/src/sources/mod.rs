@@ -38,6 +38,7 @@ use self::open_scans::OpenScans;
 use self::opener::Opener;
 use self::probe::{Outcome, Probe, Probed};
 use self::shared::Shared;
+use self::source::PIECES_TOGETHER;
 use self::union::Union;
 use crate::error::{ConvertError, InputFault};
 use crate::plan::Plan;
@@ -49,9 +50,6 @@ const AT_ONCE: usize = 1024;
 
 /// Scans that are asked what decoding takes; of others it is what decoding all columns takes.
 const MOST_ASKED: usize = 16;
-
-/// Pieces of a scan that a thread takes together.
-const PIECES_TOGETHER: u64 = 2;
 
 /// Threads that read headers: more only wait for the disk.
 const MOST_THREADS: usize = 32;

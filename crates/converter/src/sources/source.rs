@@ -7,6 +7,9 @@ use pointmill_format::{Aabb, Crs, Lattice, Resolution};
 
 use super::survey::{Extent, Fineness, single_step};
 
+/// Pieces of a scan that a thread takes together.
+pub(super) const PIECES_TOGETHER: u64 = 2;
+
 /// A scan: what of its header is needed while its file is closed. What scans have in common is kept once.
 #[derive(Debug, Clone)]
 pub(crate) struct Source {
@@ -79,7 +82,7 @@ impl Stored {
 impl Source {
     /// Number of the pair of pieces that follows its last.
     pub(super) fn end_of_pairs(&self) -> u64 {
-        self.first_pair + u64::from(self.pieces).div_ceil(super::PIECES_TOGETHER)
+        self.first_pair + u64::from(self.pieces).div_ceil(PIECES_TOGETHER)
     }
 }
 
