@@ -8,7 +8,7 @@ use crate::octree::OctreeInfo;
 use crate::{NodeKey, ReadError};
 
 use super::index::{Parser, from_list};
-use super::{IndexRecord, METADATA_FILE, Metadata, Node, NodeFiles, octree};
+use super::{IndexRecord, METADATA_FILE, Metadata, Node, NodeFiles};
 
 /// More JSON than this is not metadata, even with all nodes of version 1.4 in it.
 const MAX_METADATA_BYTES: u64 = 256 << 20;
@@ -71,7 +71,7 @@ impl Dataset {
         let metadata = Metadata::from_json(&bytes, &path)?;
         let has_index = || source.size(&metadata.index_file(NodeKey::ROOT)).is_ok();
         let is_list = metadata.nodes.is_some() && !(metadata.has_folders() && has_index());
-        let info = octree::info(&metadata);
+        let info = metadata.octree_info();
         let mut dataset = Self { source: Box::new(source), metadata, info, is_list, max_node_bytes: MAX_NODE_BYTES };
         if dataset.metadata.files != NodeFiles::Bin {
             dataset.info.attributes = dataset.las_attributes()?;

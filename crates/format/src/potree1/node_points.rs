@@ -67,7 +67,7 @@ fn fill_from_records(
                         column_bytes::append_i32(values, block, record_len, at + 4 * axis);
                     }
                 }
-                Field::Rgba | Field::Rgb => part.colours(columns.next()),
+                Field::Rgba | Field::Rgb => part.colours(&mut columns),
                 Field::NormalOct16 => part.normals(&mut columns, |bytes: [u8; 2]| from_oct16(bytes)),
                 Field::NormalSpheremapped => part.normals(&mut columns, |bytes: [u8; 2]| from_spheremap(bytes)),
                 Field::Normal => {
@@ -105,9 +105,9 @@ impl Part<'_> {
         self.block.chunks_exact(self.record_len).map(part)
     }
 
-    /// Bytes become 16 bits of the same brightness.
-    fn colours(&self, column: Option<&mut Column>) {
-        if let Some(Column::UInt16(values)) = column {
+    /// The next column: bytes become 16 bits of the same brightness.
+    fn colours<'c>(&self, columns: &mut impl Iterator<Item = &'c mut Column>) {
+        if let Some(Column::UInt16(values)) = columns.next() {
             values.extend(self.each::<3>().flatten().map(|channel| u16::from(channel) * 257));
         }
     }

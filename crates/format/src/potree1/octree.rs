@@ -5,17 +5,7 @@ use std::path::PathBuf;
 use crate::octree::{Octree, OctreeInfo, OctreeNode};
 use crate::{NodeKey, NodePoints, ReadError};
 
-use super::{Dataset, Metadata, Node, PointAttribute};
-
-/// What the metadata says. LAS files have their own attributes.
-pub(super) fn info(metadata: &Metadata) -> OctreeInfo {
-    let attributes = metadata.attributes.iter().flat_map(PointAttribute::columns).collect();
-    let format = format!("Potree 1.{}", metadata.minor);
-    let mut info = OctreeInfo::new(format, metadata.cube, metadata.spacing, attributes);
-    info.points = metadata.points;
-    info.projection.clone_from(&metadata.projection);
-    info
-}
+use super::{Dataset, Node};
 
 impl Octree for Dataset {
     fn info(&self) -> &OctreeInfo {

@@ -9,7 +9,6 @@ use crate::octree::{ChunkRanges, OctreeInfo};
 use crate::{NodeKey, ReadError};
 
 use super::chunk::Parser;
-use super::octree::info;
 use super::{HIERARCHY_FILE, METADATA_FILE, Metadata, Node, NodeRecord, OCTREE_FILE};
 
 /// More JSON than this is not metadata.
@@ -77,7 +76,7 @@ impl Dataset {
         let mut bytes = vec![0; metadata_bytes as usize];
         source.read_at(METADATA_FILE, 0, &mut bytes).map_err(|e| ReadError::io(&path, "reading", e))?;
         let metadata = Metadata::from_json(&bytes, &path)?;
-        let (source, info) = (Box::new(source), info(&metadata));
+        let (source, info) = (Box::new(source), metadata.octree_info());
         Ok(Self { source, metadata, info, hierarchy_bytes, octree_bytes, max_node_bytes: MAX_NODE_BYTES })
     }
 

@@ -5,16 +5,7 @@ use std::path::PathBuf;
 use crate::octree::{Octree, OctreeInfo, OctreeNode};
 use crate::{NodeKey, NodePoints, ReadError};
 
-use super::{Dataset, HIERARCHY_FILE, Metadata, Node, NodeRecord, NodeType};
-
-/// What the metadata says.
-pub(super) fn info(metadata: &Metadata) -> OctreeInfo {
-    let attributes = metadata.attributes.iter().map(|a| &a.attribute).filter(|a| a.name != "position");
-    let mut info = OctreeInfo::new("Potree 2.0", metadata.cube, metadata.spacing, attributes.cloned().collect());
-    info.points = Some(metadata.points);
-    info.projection.clone_from(&metadata.projection);
-    info
-}
+use super::{Dataset, HIERARCHY_FILE, Node, NodeRecord, NodeType};
 
 impl Octree for Dataset {
     fn info(&self) -> &OctreeInfo {
