@@ -1,5 +1,6 @@
 //! What `cloud.js` says.
 
+use crate::octree::OctreeInfo;
 use crate::{Aabb, NodeKey};
 
 use super::path::node_path;
@@ -116,6 +117,15 @@ impl Metadata {
     #[must_use]
     pub fn spacing_at(&self, level: u8) -> f64 {
         self.spacing * (-f64::from(level)).exp2()
+    }
+
+    /// What is the same in all octrees. LAS files have their own attributes.
+    pub(super) fn octree_info(&self) -> OctreeInfo {
+        let attributes = self.attributes.iter().flat_map(PointAttribute::columns).collect();
+        let mut info = OctreeInfo::new(format!("Potree 1.{}", self.minor), self.cube, self.spacing, attributes);
+        info.points = self.points;
+        info.projection.clone_from(&self.projection);
+        info
     }
 
     /// The file with the points of a node, relative to the folder of `cloud.js`.

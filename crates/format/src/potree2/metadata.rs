@@ -1,6 +1,7 @@
 //! What `metadata.json` says.
 
 use crate::names::named;
+use crate::octree::OctreeInfo;
 use crate::{Aabb, Attribute, Lattice, NodeKey};
 
 /// How the payloads in `octree.bin` are stored.
@@ -144,6 +145,15 @@ impl Metadata {
     #[must_use]
     pub fn spacing_at(&self, level: u8) -> f64 {
         self.spacing * (-f64::from(level)).exp2()
+    }
+
+    /// What is the same in all octrees.
+    pub(super) fn octree_info(&self) -> OctreeInfo {
+        let attributes = self.attributes.iter().map(|a| &a.attribute).filter(|a| a.name != "position");
+        let mut info = OctreeInfo::new("Potree 2.0", self.cube, self.spacing, attributes.cloned().collect());
+        info.points = Some(self.points);
+        info.projection.clone_from(&self.projection);
+        info
     }
 
     /// Where `position` stands in [`Self::attributes`]; always there if the metadata was parsed.
