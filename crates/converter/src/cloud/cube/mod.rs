@@ -117,13 +117,13 @@ impl Cube {
         }))
     }
 
-    /// The same, rounded to the nearest: at most one more.
+    /// The same, rounded to the nearest that is in the cube.
     #[inline]
     pub(crate) fn nearest_tree(&self, q: JobPoint) -> [u64; 3] {
         std::array::from_fn(|a| {
             let steps = (q[a].wrapping_sub(self.min[a]) as u64) << self.shift[a];
             let product = u128::from(steps) * u128::from(self.factor[a]);
-            ((product + (1 << (u64::BITS - 1))) >> u64::BITS) as u64
+            (((product + (1 << (u64::BITS - 1))) >> u64::BITS) as u64).min(LONGEST)
         })
     }
 
