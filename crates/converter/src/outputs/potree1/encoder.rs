@@ -6,7 +6,7 @@ use pointmill_format::batches::eight_bit;
 use pointmill_format::{Changes, NodeKey};
 
 use super::content::{COLOUR_BYTES, Colour, Content};
-use super::errors::Meter;
+use super::errors::{Meter, Seen};
 use super::steps::Steps;
 use crate::cloud::{Checksum, copy_record};
 use crate::error::ConvertError;
@@ -46,10 +46,7 @@ impl<'a> Encoding<'a> {
 pub(super) struct Tally {
     /// By column.
     pub(super) changes: Vec<Changes>,
-    /// Largest error of positions by axis, world units, where a meter looks at them.
-    pub(super) largest: [f64; 3],
-    /// Points whose integers do not come back.
-    pub(super) lost: u64,
+    pub(super) positions: Seen,
 }
 
 /// Turns stored records into those of a node; one for each thread.
@@ -70,8 +67,7 @@ impl Tally {
     fn merge(&mut self, other: &Self) {
         self.changes.resize(self.changes.len().max(other.changes.len()), Changes::default());
         self.changes.iter_mut().zip(&other.changes).for_each(|(all, one)| all.merge(one));
-        self.largest = std::array::from_fn(|a| self.largest[a].max(other.largest[a]));
-        self.lost += other.lost;
+        self.positions.merge(&other.positions);
     }
 }
 
@@ -111,7 +107,7 @@ impl NodeEncoder for RecordEncoder<'_> {
                 column.source.fill(tile, *stored_stride, made, (column.at, stride), changes);
             }
             if let Some(meter) = meter {
-                self.tally.lost += meter.look(tile, &mut self.tally.largest);
+                meter.look(tile, &mut self.tally.positions);
             }
         }
         Ok(())

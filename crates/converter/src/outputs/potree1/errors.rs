@@ -2,7 +2,6 @@
 
 use pointmill_format::{Deviations, NodeKey};
 
-use super::encoder::Tally;
 use super::steps::Steps;
 use crate::cloud::{Cloud, JobPoint, RecordFrame, position};
 use crate::octree::FinishedNode;
@@ -11,13 +10,13 @@ use crate::outputs::recovery::Recovery;
 use crate::report::{FormatErrors, PositionErrors};
 
 /// The errors of a dataset with these nodes.
-pub(super) fn errors(cloud: &Cloud<'_>, steps: &Steps, nodes: &[FinishedNode], tally: &Tally) -> FormatErrors {
+pub(super) fn errors(cloud: &Cloud<'_>, steps: &Steps, nodes: &[FinishedNode], seen: &Seen) -> FormatErrors {
     let depth = nodes.iter().map(|node| node.key.level).max().unwrap_or(0);
     let rounding = rounding(cloud, steps, u32::from(depth));
     if steps.exact_level().is_none() {
-        let errors = PositionErrors::bound(std::array::from_fn(|a| tally.largest[a] + rounding[a]));
+        let errors = PositionErrors::bound(std::array::from_fn(|a| seen.largest[a] + rounding[a]));
         let is_certain = Recovery::new(cloud).is_certain(errors.max);
-        return FormatErrors { errors, lost: tally.lost, merged: is_certain.then_some(0) };
+        return FormatErrors { errors, lost: seen.lost, merged: is_certain.then_some(0) };
     }
     let mut moved = Deviations::default();
     for node in nodes {
@@ -59,9 +58,25 @@ fn rounding(cloud: &Cloud<'_>, steps: &Steps, depth: u32) -> [f64; 3] {
         let plain = product(cube.min[a]) + offset;
         let moved = (corner[a] - plain).abs() + half_ulp(product(cube.min[a])) + half_ulp(plain);
         let levels = f64::from(depth);
-        let sums = (3.0 + 2.0 * levels) * half_ulp(world) + (1.0 + levels) * half_ulp(cube.side);
+        let sums = (3.0 + 2.0 * levels) * half_ulp(world) + (3.0 + levels) * half_ulp(cube.side);
         (half_ulp(job) + sums + moved) * (1.0 + 8.0 * f64::EPSILON)
     })
+}
+
+/// What a [`Meter`] has seen.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Seen {
+    /// Largest error of positions by axis, world units.
+    largest: [f64; 3],
+    /// Points whose integers do not come back.
+    lost: u64,
+}
+
+impl Seen {
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.largest = std::array::from_fn(|a| self.largest[a].max(other.largest[a]));
+        self.lost += other.lost;
+    }
 }
 
 /// Looks at positions that are rounded to steps.
@@ -93,22 +108,20 @@ impl Meter {
         })
     }
 
-    /// Widens `largest`, by axis, to the errors of some points, and returns how many of them lose their integers.
-    pub(super) fn look(&self, records: &[u8], largest: &mut [f64; 3]) -> u64 {
+    /// Looks at some points.
+    pub(super) fn look(&self, records: &[u8], seen: &mut Seen) {
         let Self { frame, lattice, scale, corner, recovery } = self;
-        let mut lost = 0;
         for record in records.chunks_exact(frame.stride) {
             let q = frame.origin.job(position(record));
             let nearest = frame.cube.nearest_tree(q).map(|steps| steps as f64 * scale);
             for a in 0..3 {
                 let meant = (q[a] - frame.cube.min[a]) as f64 * lattice[a];
-                largest[a] = largest[a].max((nearest[a] - meant).abs());
+                seen.largest[a] = seen.largest[a].max((nearest[a] - meant).abs());
             }
             if let Some(recovery) = recovery {
                 let world = std::array::from_fn(|a| corner[a] + nearest[a]);
-                lost += u64::from(JobPoint(recovery.integers(world)) != q);
+                seen.lost += u64::from(JobPoint(recovery.integers(world)) != q);
             }
         }
-        lost
     }
 }

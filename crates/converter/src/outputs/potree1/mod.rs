@@ -116,7 +116,7 @@ impl Output for Potree1Settings {
         let mut warnings = self.foresee(cloud.schema(), &content.kept, &cloud.facts.crs);
         warnings.extend(content.warnings);
         warnings.extend(changes);
-        let errors = errors::errors(cloud, &steps, &tree.nodes, &tally);
+        let errors = errors::errors(cloud, &steps, &tree.nodes, &tally.positions);
         Ok(OutputReport {
             points: tree.ledger.points(),
             duplicates_dropped: tree.ledger.duplicates_dropped(),
