@@ -58,8 +58,11 @@ fn dense_corner(points: usize) -> Las {
     Las::numbered((0..points).map(|i| [0; 3].map(|_: i32| random.below(16 << (i % 11)) as i32)))
 }
 
-/// The points of all nodes, each in order: steps of the lattice of `las`, and colours of 8 bits.
-fn points_of_nodes(folder: &Path, las: &Las) -> BTreeMap<NodeKey, Vec<([i64; 3], [u8; 3])>> {
+/// Steps of the lattice of a scan, and a colour of 8 bits.
+type Coloured = ([i64; 3], [u8; 3]);
+
+/// The points of all nodes, each in order.
+fn points_of_nodes(folder: &Path, las: &Las) -> BTreeMap<NodeKey, Vec<Coloured>> {
     let octree = open_octree(folder).unwrap();
     let mut nodes = OctreeNodes::new(&*octree).unwrap();
     let (mut found, mut stack, mut points) = (BTreeMap::new(), vec![NodeKey::ROOT], NodePoints::default());
@@ -122,9 +125,8 @@ fn every_node_has_its_file_and_every_count_is_true() {
 #[test]
 fn threads_and_memory_do_not_show() {
     let bench = Bench::new(&Las::terrain(400_000, 3));
-    let mut plans = [bench.plan.clone(), bench.plan.clone()];
-    (plans[1].threads, plans[1].memory_bytes) = (1, 100 << 20);
-    let [plenty, scarce] = plans.map(|plan| {
+    let [plenty, scarce] = [(2, 4 << 30), (1, 100 << 20)].map(|(threads, memory_bytes)| {
+        let plan = Plan { threads, memory_bytes, ..bench.plan.clone() };
         convert(&plan, &[leaves_of(2000).into()], &Silent).unwrap();
         dataset(&plan.output)
     });

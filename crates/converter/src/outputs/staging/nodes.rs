@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn whatever_else_is_there_is_found_and_stays() {
-        let deep = format!("r/{}/{}", ["01234"; 6].join("/"), format!("r{}67.bin", "01234".repeat(6)));
+        let deep = format!("r/{}/r{}67.bin", ["01234"; 6].join("/"), "01234".repeat(6));
         for other in [
             "notes.txt",
             "r/notes.txt",
