@@ -273,7 +273,19 @@ fn without_colour_points_are_grey_by_intensity() {
     let bench = Bench::new(&las);
     let report = bench.convert(Potree1Settings::default());
     assert!(report.warnings.iter().any(|w| w.to_string().contains("grey shows the intensity, 0 to 499")));
+    let own = |out: &Path| Dataset::open(out).unwrap().metadata().extra["pointmill"]["colours"].clone();
+    assert_eq!(own(&bench.out()), serde_json::json!({ "intensity": [0.0, 499.0] }));
     let [least, greatest] = [0, 499].map(|i| las.points[i].xyz.map(i64::from));
     let all: BTreeMap<[i64; 3], [u8; 3]> = points_of_nodes(&bench.out(), &las).into_values().flatten().collect();
     assert_eq!((all[&least], all[&greatest]), ([0; 3], [255; 3]));
+
+    let xyz = bench.dir.path().join("scan.xyz");
+    fs::write(&xyz, "1 2 3\n4 5 6\n").unwrap();
+    let plan = Plan { inputs: vec![xyz], ..bench.plan.clone() };
+    let report = convert(&plan, &[Potree1Settings::default().into()], &Silent).unwrap();
+    assert!(report.warnings.iter().any(|w| w.to_string().contains("all points are white")));
+    assert_eq!(own(&plan.output), "white");
+    let mut points = NodePoints::default();
+    Dataset::open(&plan.output).unwrap().read_points(NodeKey::ROOT, &mut points).unwrap();
+    assert_eq!(points.column::<u16>("rgb").unwrap(), [u16::MAX; 6]);
 }

@@ -2,6 +2,7 @@
 
 use pointmill_format::potree1::{Field, PointAttribute};
 use pointmill_format::{Attribute, AttributeType, DatasetKind};
+use serde_json::{Value, json};
 
 use super::column::{Column, Source};
 use super::notes;
@@ -45,6 +46,17 @@ pub(super) enum Colour {
     Rgb { at: usize },
     Grey { at: usize, ty: AttributeType, least: f64, greatest: f64 },
     White,
+}
+
+impl Colour {
+    /// What the dataset says of colours that are none of the sources.
+    pub(super) fn made(self) -> Option<Value> {
+        match self {
+            Self::Rgb { .. } => None,
+            Self::Grey { least, greatest, .. } => Some(json!({ "intensity": [least, greatest] })),
+            Self::White => Some("white".into()),
+        }
+    }
 }
 
 impl Content {

@@ -34,6 +34,7 @@ pub(super) fn metadata(
     own.remove("latticeOffset");
     own.insert("lattice".into(), json!({ "scale": lattice.scale, "offset": lattice.offset }));
     own.insert("name".into(), cloud.plan.cloud_name().into());
+    own.extend(content.colour.made().map(|made| ("colours".to_owned(), made)));
     if !content.renamed.is_empty() {
         let renamed = content.renamed.iter().map(|r| (r.stored_as.clone(), r.name.clone().into()));
         own.insert("attributesRenamed".into(), renamed.collect::<Map<_, _>>().into());
