@@ -180,7 +180,7 @@ impl Serialize for DatasetKind {
 pub struct Located {
     /// What its files are called like.
     pub kind: DatasetKind,
-    /// Its folder; of a kind that is one file, the file.
+    /// Its folder; of a kind that is one file, the file; of an archive with a Potree 1.x dataset in it (feature `zip`), the archive.
     pub path: PathBuf,
 }
 
@@ -218,6 +218,9 @@ fn find(path: &Path) -> Option<Located> {
         let path = if kind.is_single_file() { path.join(kind.marker_file()) } else { path.to_path_buf() };
         return Some(Located { kind, path });
     }
+    if is_archive_of(path, DatasetKind::Potree1) {
+        return Some(Located { kind: DatasetKind::Potree1, path: path.to_path_buf() });
+    }
     let is = |kind: &DatasetKind| match kind.row().extension {
         Some(extension) => path.extension().is_some_and(|e| e == extension),
         None => path.file_name().is_some_and(|name| name == kind.marker_file()),
@@ -227,6 +230,18 @@ fn find(path: &Path) -> Option<Located> {
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let path = if kind.is_single_file() { path } else { parent };
     Some(Located { kind, path: path.to_path_buf() })
+}
+
+/// True for an archive with such a dataset in it.
+#[cfg(feature = "zip")]
+fn is_archive_of(path: &Path, kind: DatasetKind) -> bool {
+    use crate::bytes::Archive;
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("zip")) && Archive::open(path, kind.marker_file()).is_ok()
+}
+
+#[cfg(not(feature = "zip"))]
+const fn is_archive_of(_: &Path, _: DatasetKind) -> bool {
+    false
 }
 
 /// What can be given instead, of every kind.

@@ -6,7 +6,7 @@ use crate::dataset_kind::{DatasetKind, locate};
 use crate::octree::Octree;
 use crate::{ReadError, potree1, potree2};
 
-/// Opens the octree at `path`, a folder or its marker file; which kind it is, the names of files tell ([`locate`]).
+/// Opens the octree at `path`, a folder or its marker file (with the feature `zip` also an archive of Potree 1.x); which kind it is, the names of files tell ([`locate`]).
 ///
 /// # Errors
 /// There is no dataset, or one that is no octree, or those of opening it.

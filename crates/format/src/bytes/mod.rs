@@ -1,6 +1,8 @@
 //! Where bytes come from: sources of a dataset's files, and positioned reads and writes of open files, which any number
 //! of threads share without a cursor; files that are opened and memory that is taken on the word of a dataset.
 
+#[cfg(feature = "zip")]
+mod archive;
 mod room;
 mod source;
 mod tree;
@@ -8,6 +10,8 @@ mod tree;
 use std::fs::File;
 use std::io;
 
+#[cfg(feature = "zip")]
+pub use archive::Archive;
 pub(crate) use room::STEP;
 pub use room::{open_file, read_file, try_resize};
 pub use source::{ByteSource, Folder, Memory};

@@ -28,6 +28,7 @@
 //! # }
 //! ```
 
+mod linked_tree;
 mod nodes;
 mod ranges;
 
@@ -35,6 +36,7 @@ use std::path::PathBuf;
 
 use crate::{Aabb, Attribute, NodeKey, NodePoints, ReadError};
 
+pub(crate) use linked_tree::{Keyed, LinkedTree};
 pub use nodes::OctreeNodes;
 pub(crate) use ranges::ChunkRanges;
 

@@ -43,12 +43,18 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Opens the dataset in the folder `path` (or beside the `cloud.js` that is named) and reads its metadata.
+    /// Opens the dataset in the folder `path` (or beside the `cloud.js` that is named; with the feature `zip` also that in the
+    /// uncompressed archive `path`) and reads its metadata.
     ///
     /// # Errors
     /// A missing file, or those of [`Metadata::from_json`]; of datasets of LAS or LAZ files, the first of these.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = path.as_ref();
+        #[cfg(feature = "zip")]
+        if crate::bytes::Archive::is_one(path) {
+            let archive = crate::bytes::Archive::open(path, METADATA_FILE);
+            return Self::from_source(archive.map_err(|e| archive_error(path, e))?);
+        }
         let is_marker = path.file_name().is_some_and(|name| name == METADATA_FILE);
         let folder = if is_marker { path.parent().unwrap_or(path) } else { path };
         Self::from_source(FolderTree::new(folder))
@@ -187,6 +193,16 @@ impl Dataset {
                 .advise("the dataset was copied in part, or deleted in part; copy or convert it again"),
             _ => ReadError::io(self.locate(file), "opening", e),
         })
+    }
+}
+
+/// Why an archive cannot be read.
+#[cfg(feature = "zip")]
+fn archive_error(path: &Path, error: io::Error) -> ReadError {
+    match error.kind() {
+        io::ErrorKind::InvalidData => ReadError::broken(path, None, error.to_string()),
+        io::ErrorKind::NotFound => ReadError::unsupported(path, format!("an archive without {METADATA_FILE}")),
+        _ => ReadError::io(path, "reading the archive", error),
     }
 }
 

@@ -1,7 +1,6 @@
 //! The table of nodes, cut into `.hrc` files.
 
-use std::ops::Range;
-
+use crate::octree::{Keyed, LinkedTree};
 use crate::{NodeKey, WriteError};
 
 use super::IndexRecord;
@@ -14,6 +13,12 @@ pub struct NodeCount {
     pub key: NodeKey,
     /// Points of the node alone, at least 1.
     pub points: u32,
+}
+
+impl Keyed for NodeCount {
+    fn key(&self) -> NodeKey {
+        self.key
+    }
 }
 
 /// One `.hrc` file.
@@ -37,65 +42,21 @@ pub fn encode_index(nodes: &mut [NodeCount], step: u32) -> Result<Vec<IndexFile>
         return Err(WriteError::input("a hierarchy step of 0 levels"));
     }
     nodes.sort_by_cached_key(|n| n.key.breadth_first_rank());
-    let tree = Tree::new(nodes)?;
-    let roots = (0..nodes.len())
-        .filter(|n| *n == 0 || begins_index(nodes[*n].key.level, step) && !tree.children(*n).is_empty());
-    Ok(roots.map(|root| IndexFile { root: nodes[root].key, bytes: tree.encode(root, step) }).collect())
+    let Some(tree) = LinkedTree::new(nodes) else {
+        return Err(WriteError::input(
+            "nodes that are no octree: the root or a parent is missing, or a node is there twice",
+        ));
+    };
+    let roots = (0..tree.len())
+        .filter(|n| *n == 0 || begins_index(tree.nodes[*n].key.level, step) && !tree.children(*n).is_empty());
+    Ok(roots.map(|root| IndexFile { root: tree.nodes[root].key, bytes: encode(&tree, root, step) }).collect())
 }
 
-/// Nodes in breadth-first order, each with the range of its children.
-struct Tree<'a> {
-    nodes: &'a [NodeCount],
-    /// The children of node i are `first_child[i]..first_child[i + 1]`: they follow the children of the node before.
-    first_child: Vec<usize>,
-}
-
-impl<'a> Tree<'a> {
-    fn new(nodes: &'a [NodeCount]) -> Result<Self, WriteError> {
-        if nodes.first().is_none_or(|n| n.key != NodeKey::ROOT) {
-            return Err(WriteError::input("an octree without a root"));
-        }
-        let (mut first_child, mut next) = (Vec::with_capacity(nodes.len() + 1), 1);
-        for node in nodes {
-            first_child.push(next);
-            let mut mask = 0;
-            while let Some(child) = nodes.get(next).filter(|n| n.key.parent() == Some(node.key)) {
-                let bit = 1u8 << child.key.child_index();
-                if mask & bit != 0 {
-                    return Err(WriteError::input(format!("node {} is there twice", child.key)));
-                }
-                mask |= bit;
-                next += 1;
-            }
-        }
-        first_child.push(next);
-        match nodes.get(next) {
-            None => Ok(Self { nodes, first_child }),
-            Some(node) => Err(WriteError::input(format!("node {} is there twice, or without its parent", node.key))),
-        }
-    }
-
-    fn children(&self, node: usize) -> Range<usize> {
-        self.first_child[node]..self.first_child[node + 1]
-    }
-
-    /// The records of the levels from `root` to `step` levels below it.
-    fn encode(&self, root: usize, step: u32) -> Vec<u8> {
-        let (mut bytes, mut level) = (Vec::new(), root..root + 1);
-        for _ in 0..=step {
-            for node in level.clone() {
-                let children = &self.nodes[self.children(node)];
-                let child_mask = children.iter().fold(0, |mask, child| mask | 1 << child.key.child_index());
-                bytes.extend(IndexRecord { child_mask, points: self.nodes[node].points }.to_bytes());
-            }
-            // a level of a subtree is one range
-            level = self.first_child[level.start]..self.first_child[level.end];
-            if level.is_empty() {
-                break;
-            }
-        }
-        bytes
-    }
+/// The records of the levels from `root` to `step` levels below it.
+fn encode(tree: &LinkedTree<'_, NodeCount>, root: usize, step: u32) -> Vec<u8> {
+    let levels = tree.levels(root).take(usize::try_from(step).unwrap_or(usize::MAX).saturating_add(1));
+    let record = |node| IndexRecord { child_mask: tree.child_mask(node), points: tree.nodes[node].points };
+    levels.flatten().flat_map(|node| record(node).to_bytes()).collect()
 }
 
 #[cfg(test)]

@@ -5,14 +5,11 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::json::{Fault, Fields, broken, syntax_error, unsupported, without_javascript};
-use crate::{Aabb, Attribute, AttributeType, Lattice, NodeKey, ReadError};
+use crate::json::{self, Fault, Fields, broken, syntax_error, unsupported, without_javascript};
+use crate::{Aabb, Attribute, Lattice, NodeKey, ReadError};
 
 use super::names::{Field, PointAttribute};
 use super::{Metadata, NodeFiles};
-
-/// More elements per point than any attribute has; keeps a bad count from requesting memory.
-const MAX_ELEMENTS: u64 = 256;
 
 /// The reference divides the cube's side by about 115, older ones its diagonal by 250; what has no spacing gets this.
 const USUAL_CELLS: f64 = 200.0;
@@ -180,32 +177,11 @@ fn object(value: Value, index: usize) -> Result<PointAttribute, Fault> {
     let place = format!("pointAttributes[{index}].");
     let Value::Object(mut map) = value else { return broken(format!("pointAttributes[{index}] is no object or word")) };
     let mut fields = Fields { map: &mut map, place: &place };
-    let name = fields.text("name")?;
-    if name.is_empty() {
-        return broken(format!("{place}name is missing"));
-    }
-    let word = fields.text("type")?;
-    let Some(ty) = AttributeType::from_potree_name(&word) else {
-        return unsupported(format!("attribute \"{name}\" has the type \"{word}\""));
-    };
-    let elements = fields.integer("elements")?;
-    if !(1..=MAX_ELEMENTS).contains(&elements) {
-        return broken(format!("attribute \"{name}\" has elements {elements}"));
-    }
+    let Attribute { name, description, ty, elements, .. } = json::attribute(&mut fields, "elements")?;
     let field = Field::from_object_name(&name);
-    let (elements, description) = (elements as usize, fields.text("description")?);
     let attribute = PointAttribute { field, name, ty, elements, description };
-    let name = &attribute.name;
-    for (key, expected) in [("elementSize", ty.size()), ("size", attribute.size())] {
-        let found = fields.integer(key)?;
-        if found != expected as u64 {
-            return broken(format!(
-                "attribute \"{name}\" is {word} x {elements}, so its {key} is {expected}, not {found}"
-            ));
-        }
-    }
     if !attribute.is_sound() {
-        return unsupported(format!("attribute \"{name}\" as {word} x {elements}"));
+        return unsupported(format!("attribute \"{}\" as {ty} x {elements}", attribute.name));
     }
     Ok(attribute)
 }

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::NodeKey;
+use crate::octree::LinkedTree;
 
 use super::chunk_cut::chunk_roots;
-use super::linked_tree::LinkedTree;
 use super::{NodeEntry, NodeRecord, NodeType};
 
 /// Records of a hierarchy chunk that a client can take at once: what a full tree of four levels below its root has,
@@ -67,7 +67,7 @@ struct Chunk {
     byte_size: u64,
 }
 
-fn encode(tree: &LinkedTree<'_>, most: usize) -> HierarchyBytes {
+fn encode(tree: &LinkedTree<'_, NodeEntry>, most: usize) -> HierarchyBytes {
     let chunks = place(tree, most);
     let own = |node: usize| chunks.binary_search_by_key(&node, |c| c.root).ok().map(|i| &chunks[i]);
     let mut bytes = Vec::with_capacity((tree.len() + chunks.len()) * NodeRecord::LEN);
@@ -81,7 +81,7 @@ fn encode(tree: &LinkedTree<'_>, most: usize) -> HierarchyBytes {
 }
 
 /// The chunks in breadth-first order of their roots.
-fn place(tree: &LinkedTree<'_>, most: usize) -> Vec<Chunk> {
+fn place(tree: &LinkedTree<'_, NodeEntry>, most: usize) -> Vec<Chunk> {
     let roots = chunk_roots(tree, most);
     let mut byte_offset = 0;
     let place = |&root: &usize| {
@@ -94,12 +94,12 @@ fn place(tree: &LinkedTree<'_>, most: usize) -> Vec<Chunk> {
 }
 
 /// The record of a node, or the proxy for its chunk.
-fn record(tree: &LinkedTree<'_>, node: usize, own_chunk: Option<&Chunk>) -> NodeRecord {
+fn record(tree: &LinkedTree<'_, NodeEntry>, node: usize, own_chunk: Option<&Chunk>) -> NodeRecord {
     let NodeEntry { points, byte_offset, byte_size, .. } = tree.nodes[node];
     if let Some(&Chunk { byte_offset, byte_size, .. }) = own_chunk {
         return NodeRecord { node_type: NodeType::Proxy as u8, child_mask: 0, points, byte_offset, byte_size };
     }
-    let child_mask = tree.nodes[tree.children(node)].iter().fold(0, |mask, c| mask | 1 << c.key.child_index());
+    let child_mask = tree.child_mask(node);
     let node_type = if child_mask == 0 { NodeType::Leaf } else { NodeType::Normal } as u8;
     NodeRecord { node_type, child_mask, points, byte_offset, byte_size }
 }

@@ -4,13 +4,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::json::{Fault, Fields, broken, syntax_error, unsupported};
+use crate::json::{self, Fault, Fields, broken, syntax_error, unsupported};
 use crate::{Aabb, Attribute, AttributeType, Lattice, ReadError};
 
 use super::{AttributeStats, Encoding, Metadata};
-
-/// More elements per point than any attribute has; keeps a bad count from requesting memory.
-const MAX_ELEMENTS: u64 = 256;
 
 impl Metadata {
     /// Parses `metadata.json`; `path` is for messages.
@@ -109,33 +106,10 @@ fn attribute(value: Value, index: usize) -> Result<AttributeStats, Fault> {
     let place = format!("attributes[{index}].");
     let Value::Object(mut map) = value else { return broken(format!("attributes[{index}] is not an object")) };
     let mut fields = Fields { map: &mut map, place: &place };
-    let name = fields.text("name")?;
-    if name.is_empty() {
-        return broken(format!("{place}name is missing"));
-    }
-    let word = fields.text("type")?;
-    let Some(ty) = AttributeType::from_potree_name(&word) else {
-        return unsupported(format!("attribute \"{name}\" has the type \"{word}\""));
-    };
-    let elements = fields.integer("numElements")?;
-    if !(1..=MAX_ELEMENTS).contains(&elements) {
-        return broken(format!("attribute \"{name}\" has numElements {elements}"));
-    }
-    let mut attribute = Attribute::new(name, ty, elements as usize);
-    for (key, expected) in [("elementSize", ty.size()), ("size", attribute.size())] {
-        let found = fields.integer(key)?;
-        if found != expected as u64 {
-            let name = &attribute.name;
-            return broken(format!(
-                "attribute \"{name}\" is {word} x {elements}, so its {key} is {expected}, not {found}"
-            ));
-        }
-    }
-    attribute.description = fields.text("description")?;
+    let mut attribute = json::attribute(&mut fields, "numElements")?;
+    let elements = attribute.elements;
     let mut per_element = |key| match fields.numbers(key)? {
-        Some(n) if n.len() != elements as usize => {
-            broken(format!("{place}{key} has {} numbers, not {elements}", n.len()))
-        }
+        Some(n) if n.len() != elements => broken(format!("{place}{key} has {} numbers, not {elements}", n.len())),
         other => Ok(other),
     };
     if let Some(scale) = per_element("scale")? {

@@ -35,7 +35,6 @@ mod dataset;
 mod encode_brotli;
 mod encode_hierarchy;
 mod hierarchy;
-mod linked_tree;
 mod metadata;
 mod metadata_json;
 mod metadata_parse;

@@ -1,6 +1,7 @@
 //! One record of `hierarchy.bin`: 22 bytes.
 
 use crate::NodeKey;
+use crate::octree::Keyed;
 
 /// What the first byte of a record says; the format has these three. Do not distinguish inner nodes from leaves by it:
 /// PotreeConverter 2 marks most inner nodes as leaves; [`NodeRecord::child_mask`] is right.
@@ -107,6 +108,12 @@ impl NodeEntry {
     #[must_use]
     pub const fn new(key: NodeKey, points: u32, byte_offset: u64, byte_size: u64) -> Self {
         Self { key, points, byte_offset, byte_size }
+    }
+}
+
+impl Keyed for NodeEntry {
+    fn key(&self) -> NodeKey {
+        self.key
     }
 }
 

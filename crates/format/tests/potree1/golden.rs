@@ -34,7 +34,10 @@ const POINTS: [(&str, &[Row]); 7] = [
 ];
 
 /// Steps from the lower corner of the cube, and red, green, blue of 8 bits.
-fn places(points: &NodePoints) -> Vec<([i64; 3], [u16; 3])> {
+type Place = ([i64; 3], [u16; 3]);
+
+/// See [`Place`].
+fn places(points: &NodePoints) -> Vec<Place> {
     let rgb = points.column::<u16>("rgb").unwrap();
     let steps = |world: [f64; 3]| [0, 1, 2].map(|a| ((world[a] - [1000.0, 2000.0, -5.0][a]) / 0.001).round() as i64);
     let colour = |i: usize| {
@@ -45,7 +48,7 @@ fn places(points: &NodePoints) -> Vec<([i64; 3], [u16; 3])> {
     (0..points.len()).map(|i| (steps(points.world(i).unwrap()), colour(i))).collect()
 }
 
-fn expected_places() -> Vec<(String, Vec<([i64; 3], [u16; 3])>)> {
+fn expected_places() -> Vec<(String, Vec<Place>)> {
     POINTS.map(|(name, rows)| (name.to_owned(), rows.iter().map(|row| (row.0, row.1)).collect())).into()
 }
 

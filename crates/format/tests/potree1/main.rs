@@ -1,6 +1,8 @@
 //! Potree 1.x as a renderer or a converter meets it: datasets of others are read whole, wrong counts and all, what is
 //! written is read back, and hostile bytes end in an error.
 
+#[cfg(feature = "zip")]
+mod archive;
 mod corpus;
 mod golden;
 mod hostile;
