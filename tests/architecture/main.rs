@@ -49,7 +49,8 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
             &["report"],
             &["options", "accuracy", "outcome"],
             &["against"],
-            &["potree2", "bintree", "batches"],
+            &["octree"],
+            &["potree1", "potree2", "bintree", "batches"],
         ],
     ),
     (

@@ -52,6 +52,10 @@ pub enum Check {
     Colours,
     Originals,
     Errors,
+    Cloud,
+    IndexFiles,
+    NodeFiles,
+    NodeCounts,
     Report,
 }
 
@@ -63,6 +67,7 @@ impl Check {
     pub const fn of(kind: DatasetKind) -> &'static [Self] {
         match kind {
             DatasetKind::Potree2 => Self::POTREE2,
+            DatasetKind::Potree1 => Self::POTREE1,
             DatasetKind::Bintree => Self::BINTREE,
             DatasetKind::Batches => Self::BATCHES,
             _ => &[],
@@ -85,6 +90,26 @@ impl Check {
         Self::TightBox,
         Self::AttributeRanges,
         Self::Histogram,
+        Self::Spacing,
+        Self::Seams,
+        Self::Coverage,
+        Self::Against,
+        Self::Report,
+        Self::Accuracy,
+    ];
+
+    /// The checks of Potree 1.x.
+    pub(crate) const POTREE1: &[Self] = &[
+        Self::Cloud,
+        Self::IndexFiles,
+        Self::NodeFiles,
+        Self::EmptyNodes,
+        Self::NodeCounts,
+        Self::PointCount,
+        Self::Payloads,
+        Self::Coordinates,
+        Self::Boxes,
+        Self::TightBox,
         Self::Spacing,
         Self::Seams,
         Self::Coverage,
@@ -188,6 +213,10 @@ impl Check {
             Self::Colours => "colours",
             Self::Originals => "originals",
             Self::Errors => "errors",
+            Self::Cloud => "cloud",
+            Self::IndexFiles => "index-files",
+            Self::NodeFiles => "node-files",
+            Self::NodeCounts => "node-counts",
             Self::Report => "report",
         }
     }
@@ -243,6 +272,12 @@ impl Check {
             Self::Levels => "exactly the points nearest to the centres of cells of level 0, 1, 2 have that level",
             Self::Colours => "points below level 3 show the mean of their cell, greys follow from intensities",
             Self::Originals => "originals ascend and are those of points below level 3 that show another colour",
+            Self::Cloud => "cloud.js is complete, in range and consistent",
+            Self::IndexFiles => {
+                "every index file holds exactly its records; nodes at a border are in both files, the same"
+            }
+            Self::NodeFiles => "every node has a file of whole records, and no other file is there",
+            Self::NodeCounts => "the index states as many points of a node as its file holds",
             Self::Report => "the report of the conversion names this dataset, with its points and nodes",
             Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }

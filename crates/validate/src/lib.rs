@@ -31,9 +31,11 @@ mod bintree;
 mod check;
 mod finding;
 mod memory;
+mod octree;
 mod options;
 mod outcome;
 mod place;
+mod potree1;
 mod potree2;
 mod report;
 
@@ -61,6 +63,7 @@ pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) ->
     let Located { kind, path, .. } = locate(dataset)?;
     memory::pool(options.threads, dataset)?.install(|| match kind {
         DatasetKind::Potree2 => potree2::run(&path, options, progress),
+        DatasetKind::Potree1 => potree1::run(&path, options, progress),
         DatasetKind::Bintree => bintree::run(&path, options, progress),
         DatasetKind::Batches => batches::run(&path, options, progress),
         other => Err(ReadError::unsupported(&path, format!("datasets of kind {other} cannot be validated"))),

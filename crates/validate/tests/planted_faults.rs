@@ -217,26 +217,11 @@ fn a_histogram_that_miscounts() {
     assert_only(&files.validate(), Check::Histogram, 1);
 }
 
-/// Moves a leaf's point up to the root.
-fn raise(cloud: &mut Cloud, wanted: impl Fn(&Point, &[Point]) -> bool) {
-    let root = cloud.nodes[&NodeKey::ROOT].clone();
-    let leaves = cloud.nodes.keys().copied().filter(|k| !cloud.is_inner(*k) && cloud.nodes[k].len() > 1);
-    for leaf in leaves.collect::<Vec<_>>() {
-        let points = cloud.nodes.get_mut(&leaf).unwrap();
-        if let Some(i) = points.iter().position(|p| wanted(p, &root)) {
-            let point = points.remove(i);
-            cloud.nodes.get_mut(&NodeKey::ROOT).unwrap().push(point);
-            return;
-        }
-    }
-    panic!("no such point");
-}
-
 #[test]
 fn a_pair_closer_than_the_spacing() {
     for encoding in BOTH {
         let mut cloud = Cloud::new(Sampler::Poisson);
-        raise(&mut cloud, |p, root| root.iter().any(|q| distance_squared(p, q) < 120 * 120));
+        cloud.raise(|p, root| root.iter().any(|q| distance_squared(p, q) < 120 * 120));
         let outcome = cloud.encode(encoding).validate();
         assert_only(&outcome, Check::Spacing, 1);
         assert_eq!(outcome.problems[0].node, Some(NodeKey::ROOT.into()));
@@ -247,7 +232,7 @@ fn a_pair_closer_than_the_spacing() {
 fn two_points_in_a_cell_of_grid_sampling() {
     let mut cloud = Cloud::new(Sampler::Grid);
     let cell = |p: &Point| p.position.map(|v| v / 128);
-    raise(&mut cloud, |p, root| root.iter().any(|q| cell(q) == cell(p)));
+    cloud.raise(|p, root| root.iter().any(|q| cell(q) == cell(p)));
     assert_only(&cloud.encode(Encoding::Default).validate(), Check::Spacing, 1);
 }
 
@@ -255,15 +240,7 @@ fn two_points_in_a_cell_of_grid_sampling() {
 fn a_hole_at_the_coarsest_level() {
     for encoding in BOTH {
         let mut cloud = Cloud::new(Sampler::Poisson);
-        let root = cloud.nodes[&NodeKey::ROOT].clone();
-        let centre = Point { position: [700, 700, 3150], ..root[0] };
-        for p in root {
-            let near = distance_squared(&p, &centre) < 600 * 600;
-            if let (true, Some(leaf)) = (near, cloud.leaf_at(p.position)) {
-                cloud.nodes.get_mut(&NodeKey::ROOT).unwrap().retain(|q| *q != p);
-                cloud.nodes.get_mut(&leaf).unwrap().push(p);
-            }
-        }
+        cloud.make_hole();
         let outcome = cloud.encode(encoding).validate();
         assert_eq!(support::broken(&outcome), [Check::Coverage], "{:#?}", outcome.problems);
         let hole = outcome.quality[0].largest_hole.unwrap();

@@ -17,6 +17,28 @@ pub(crate) enum RgbDepth {
     Sixteen,
 }
 
+/// How many bits of a channel a dataset has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Channels {
+    /// All 16.
+    Wide,
+    /// 8: the value v becomes (v · 255 + 32767) / 65535.
+    Rounded,
+    /// The upper 8.
+    Upper,
+}
+
+impl Channels {
+    /// What is stored of a value of 16 bits.
+    pub(super) const fn of(self, v: u64) -> u64 {
+        match self {
+            Self::Wide => v,
+            Self::Rounded => (v * 255 + 32_767) / 65_535,
+            Self::Upper => v >> 8,
+        }
+    }
+}
+
 /// Positions that a dataset stores so coarsely that its lattice's integers do not come back: records are compared by
 /// what has to be stored for an integer position then.
 pub(crate) trait StoredPositions: fmt::Debug + Send + Sync {
@@ -50,8 +72,8 @@ pub(crate) struct Rules {
     pub(crate) has_no_wide_integers: bool,
     /// Where `rgb` (uint16 × 3) stands among them.
     pub(crate) rgb: Option<usize>,
-    /// The dataset has 8 bits a channel: each 16-bit value v of the rules below becomes (v · 255 + 32767) / 65535.
-    pub(crate) rgb_as_bytes: bool,
+    /// What becomes of each 16-bit value of the rules below.
+    pub(crate) channels: Channels,
     /// False if the integers of a dataset are not known: every position then counts as 0.
     pub(crate) compare_positions: bool,
     /// The dataset's lattice.
@@ -98,7 +120,7 @@ impl Rules {
             attributes,
             has_no_wide_integers: false,
             rgb,
-            rgb_as_bytes: false,
+            channels: Channels::Wide,
             compare_positions: true,
             lattice,
             stored: None,

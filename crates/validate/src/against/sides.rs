@@ -32,7 +32,7 @@ impl Colour {
             Self::Times257 => rgb.map(|v| v.min(255) * 257),
         };
         let wide = if rules.rounds_dark { wide.map(rounded_dark) } else { wide };
-        if rules.rgb_as_bytes { wide.map(|v| (v * 255 + 32_767) / 65_535) } else { wide }
+        wide.map(|v| rules.channels.of(v))
     }
 }
 

@@ -10,7 +10,7 @@ use super::examine::{axes, points_of};
 use super::header::Header;
 use super::task::{Task, slot_of};
 use crate::against::block::{BLOCK_POINTS, Block};
-use crate::against::rules::Conversion;
+use crate::against::rules::{Channels, Conversion};
 use crate::against::{self, Rules, Sink};
 use crate::finding::Findings;
 use crate::place::Place;
@@ -29,7 +29,7 @@ pub(crate) fn rules(header: &Header, description: &Description) -> Rules {
     let colour = colour.filter(|_| known);
     attributes.extend(colour.iter().map(|(attribute, _)| attribute.clone()));
     let mut rules = Rules::new(attributes, description.lattice, &description.json);
-    rules.rgb_as_bytes = true;
+    rules.channels = Channels::Rounded;
     // not an extra attribute of that name
     rules.rgb = colour.as_ref().filter(|(a, _)| a.elements == 3).map(|_| rules.attributes.len() - 1);
     if let (Some((_, conversion)), Some(last)) = (colour, rules.conversions.last_mut()) {

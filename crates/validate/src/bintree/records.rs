@@ -11,7 +11,7 @@ use super::leaf::Points;
 use super::routes::{self, Routes};
 use super::tree::Tree;
 use crate::against::block::{BLOCK_POINTS, Block};
-use crate::against::rules::Conversion;
+use crate::against::rules::{Channels, Conversion};
 use crate::against::{self, Rules, Sink};
 use crate::place::Place;
 
@@ -32,7 +32,9 @@ pub(super) fn rules(tree: &Tree<'_>) -> Rules {
     let own = if header.pointmill.is_empty() { Value::Null } else { Value::Object(header.pointmill.clone()) };
     let mut rules = Rules::new(attributes, header.lattice, &own);
     rules.conversions[0] = Conversion::WholeClass;
-    rules.rgb_as_bytes = only_bytes && rules.rgb.is_some();
+    if only_bytes && rules.rgb.is_some() {
+        rules.channels = Channels::Rounded;
+    }
     if !tree.is_certain() {
         rules.stored = Some(Arc::new(Routes::new(tree)));
     }
@@ -57,7 +59,11 @@ impl<'a> Filler<'a> {
     pub(super) fn new(tree: &'a Tree<'a>, rules: &Rules) -> Self {
         let header = tree.header();
         let place = |attribute: &Attribute| {
-            let name = if rules.rgb_as_bytes && attribute.name == "rgb" { "rgba" } else { attribute.name.as_str() };
+            let name = if rules.channels == Channels::Rounded && attribute.name == "rgb" {
+                "rgba"
+            } else {
+                attribute.name.as_str()
+            };
             let stored = header.record.columns().find(|c| c.attribute.name == name);
             stored.map_or((0, 0, 0), |c| (c.offset, c.attribute.ty.size(), attribute.elements))
         };

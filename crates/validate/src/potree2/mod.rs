@@ -15,16 +15,11 @@
 //! inner nodes on the path from the root (some megabytes) and a node as a whole, and a cache of half of what is left of
 //! [`Options::memory_bytes`]. Fewer threads work where all do not fit.
 
-mod cache;
 mod checks;
-mod expect;
-mod first_view;
-mod grid;
 mod lattices;
-mod quality;
+mod nodes;
 mod records;
 mod tree;
-mod walk;
 
 use std::path::Path;
 
@@ -37,19 +32,18 @@ use crate::accuracy::{self, Known, Side};
 use crate::against::{Against, Context, Rules};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::memory::{self, Budget, on_threads};
+use crate::memory::{self, Budget};
+use crate::octree::expect::Geometry;
+use crate::octree::first_view;
+use crate::octree::look::Look;
+use crate::octree::spacing::Sampling;
+use crate::octree::tree::{NODE_BYTES, Tree, TreeNode};
 use crate::options::{Options, ProgressFn};
-use crate::outcome::{LevelQuality, Outcome};
+use crate::outcome::Outcome;
 use crate::report;
-use checks::spacing::Sampling;
-use expect::Geometry;
 use lattices::Lattices;
+use nodes::Nodes;
 use records::Records;
-use tree::{Tree, TreeNode};
-use walk::{Task, Walked, walk};
-
-/// Positions that neighbours ask for again; more of them hardly ever are.
-const MAX_CACHE_BYTES: u64 = 512 << 20;
 
 /// More JSON than this is not metadata.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
@@ -76,7 +70,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     };
     checks::metadata::check(&read_json(folder)?.unwrap_or_default(), &findings);
     let metadata = dataset.metadata();
-    let geometry = Geometry { lattice: metadata.lattice, cube: metadata.cube, spacing: metadata.spacing };
+    let geometry = geometry(metadata);
     let against = match options.against.as_slice() {
         [] => None,
         paths => {
@@ -90,7 +84,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     };
 
     let mut tree = tree::walk(&source, metadata.first_chunk_size, &budget, &findings)?;
-    budget.take(tree.nodes.len() as u64 * tree::NODE_BYTES)?;
+    budget.take(tree.nodes.len() as u64 * NODE_BYTES)?;
     checks::structure::check(&tree, metadata.points, metadata.depth, &findings);
     let octree_bytes = tree::size_of(&source, OCTREE_FILE)?;
     let record_len = (metadata.encoding == Encoding::Default).then(|| metadata.record_len() as u64);
@@ -99,32 +93,25 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     dataset.set_max_node_bytes(budget.left());
     unmask(&dataset, &mut tree, &findings)?;
     let metadata = dataset.metadata();
-    let deepest = tree.nodes.iter().map(|n| n.key.level).max().unwrap_or(0);
-    let out_of_reach = out_of_reach(&geometry, deepest, options);
-    let neighbourhoods = out_of_reach.is_none();
-    let node_bytes = largest_node(&tree, metadata);
-    let thread_bytes = node_bytes + if neighbourhoods { tree.surroundings_bytes() } else { 0 };
-    let threads = budget.threads(thread_bytes)?;
-    let task = Task {
-        dataset: &dataset,
+    let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
+    let lattices = Lattices::new(metadata.lattice, own);
+    let nodes = Nodes::new(&dataset, geometry, lattices, against.as_ref().map(|a| &a.sums), &findings);
+    let look = Look {
+        folder,
+        nodes: &nodes,
         tree: &tree,
         geometry,
-        findings: &findings,
-        neighbourhoods,
-        sampling: Sampling::from_word(metadata.extra.get("pointmill").and_then(|own| own["sampling"].as_str())),
-        lattices: Lattices::new(metadata.lattice, metadata.extra.get("pointmill").unwrap_or(&Value::Null)),
-        sums: against.as_ref().map(|a| &a.sums),
+        sampling: Sampling::from_word(own["sampling"].as_str()),
+        node_bytes: largest_node(&tree, metadata),
+        options,
         progress,
-        cache_bytes: usize::try_from((budget.left() / 2).min(MAX_CACHE_BYTES)).unwrap_or(usize::MAX),
-        max_problems: options.max_problems,
+        findings: &findings,
     };
-    let walked = on_threads(threads, folder, || walk(&task))?;
-    budget.give_back(threads as u64 * (thread_bytes - node_bytes));
-    if neighbourhoods {
-        checks::seams::check(&walked.tallies, task.sampling, &findings);
-    }
-    checks::ranges::check(metadata, &geometry, &walked.seen, walked.unreadable == 0, &findings);
-    note_what_was_skipped(&walked, &dataset, out_of_reach, options, &findings);
+    let walked = look.at_all(&mut budget)?;
+    let quality = look.quality(&walked);
+    let (seen, deviation) = nodes.finish();
+    checks::ranges::check(metadata, &geometry, &seen, walked.unreadable == 0, &findings);
+    note_what_was_skipped(metadata, options, &findings);
     let summary = match &against {
         Some(against) => Some(against.compare(&Context {
             records: &Records { dataset: &dataset, tree: &tree },
@@ -142,17 +129,16 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         projection: &metadata.projection,
         bounds: position.and_then(|p| bounds_of(&p.min, &p.max)),
         lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
-        format: is_measured.then_some(Side { deviation: walked.deviation, lost: 0, merged: Some(0) }),
+        format: is_measured.then_some(Side { deviation, lost: 0, merged: Some(0) }),
     };
     let report = report::check(folder, (metadata.points, tree.nodes.len() as u64), &findings)?;
     let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
-    let quality = quality(&tree, &walked, &geometry);
     Ok(Outcome {
         encoding: Some(metadata.encoding.name()),
         points: metadata.points,
         nodes: tree.nodes.len() as u64,
         quality,
-        first_view: first_view::measure(&tree, metadata, metadata_bytes),
+        first_view: first_view::measure(&tree, metadata_bytes, cube_over_extent(metadata)),
         against: summary,
         accuracy,
         ..Outcome::new(findings)
@@ -234,50 +220,27 @@ fn unreadable_metadata(folder: &Path, findings: Findings, error: &ReadError) -> 
     Ok(Outcome::new(findings))
 }
 
-/// Why spacing and coverage are not looked at, if they are not.
-fn out_of_reach(geometry: &Geometry, deepest: u8, options: &Options) -> Option<&'static str> {
-    match options.neighbourhoods {
-        false => Some("not asked for"),
-        true if !geometry.spacing_is_sane() => Some("the spacing is out of proportion"),
-        true if !geometry.resolves(deepest) => Some("the spacing is below the rounding of coordinates so large"),
-        true => None,
-    }
-}
-
-fn note_what_was_skipped(
-    walked: &Walked,
-    dataset: &Dataset,
-    out_of_reach: Option<&'static str>,
-    options: &Options,
-    findings: &Findings,
-) {
-    let metadata = dataset.metadata();
+fn note_what_was_skipped(metadata: &Metadata, options: &Options, findings: &Findings) {
     if metadata.encoding == Encoding::Default {
         findings.skip(Check::Order, "only BROTLI requires an order");
     }
     if metadata.attributes.iter().all(|a| a.histogram.is_none()) {
         findings.skip(Check::Histogram, "there are none");
     }
-    if let Some(why) = out_of_reach {
-        findings.skip(Check::Spacing, why);
-        findings.skip(Check::Seams, why);
-        findings.skip(Check::Coverage, why);
-    } else if walked.unreadable > 0 {
-        findings.skip(Check::Coverage, format!("the points of {} nodes could not be read", walked.unreadable));
-    }
     if options.against.is_empty() {
         findings.skip(Check::Against, "no sources were given");
     }
 }
 
-fn quality(tree: &Tree, walked: &Walked, geometry: &Geometry) -> Vec<LevelQuality> {
-    let levels = walked.tallies.iter().zip(0..);
-    let mut quality: Vec<_> = levels.map(|(t, level)| t.figures(level, geometry.spacing_at(level))).collect();
-    for node in &tree.nodes {
-        let level = &mut quality[usize::from(node.key.level)];
-        level.nodes += 1;
-        level.inner_nodes += u64::from(node.record.child_mask != 0);
-        level.points += u64::from(node.record.points);
-    }
-    quality
+/// Distances of datasets that do not state their sampling may be a step of the lattice less.
+fn geometry(metadata: &Metadata) -> Geometry {
+    let Metadata { lattice, cube, spacing, .. } = *metadata;
+    Geometry { lattice, cube, spacing, rounding: lattice.scale.into_iter().fold(0.0, f64::max) }
+}
+
+/// How much longer the cube is than the box of the points.
+fn cube_over_extent(metadata: &Metadata) -> Option<f64> {
+    let position = metadata.attributes.iter().find(|a| a.attribute.name == "position")?;
+    let extent = position.min.iter().zip(&position.max).map(|(min, max)| max - min).fold(0.0, f64::max);
+    (extent > 0.0).then(|| (metadata.cube.max[0] - metadata.cube.min[0]) / extent)
 }

@@ -4,9 +4,9 @@ use pointmill_format::potree2::{Dataset, Node};
 use pointmill_format::{NodePoints, ReadError};
 use rayon::prelude::*;
 
-use super::tree::Tree;
 use crate::against::block::{BLOCK_POINTS, Block, append_words};
 use crate::against::{self, Rules, Sink};
+use crate::octree::tree::Tree;
 use crate::place::Place;
 
 /// All nodes of a dataset.

@@ -176,6 +176,34 @@ impl Cloud {
         Some(key)
     }
 
+    /// Moves the first point of the leaves that `wanted` takes, beside the points of the root, up to the root.
+    pub fn raise(&mut self, wanted: impl Fn(&Point, &[Point]) -> bool) {
+        let root = self.nodes[&NodeKey::ROOT].clone();
+        let leaves = self.nodes.keys().copied().filter(|k| !self.is_inner(*k) && self.nodes[k].len() > 1);
+        for leaf in leaves.collect::<Vec<_>>() {
+            let points = self.nodes.get_mut(&leaf).unwrap();
+            if let Some(i) = points.iter().position(|p| wanted(p, &root)) {
+                let point = points.remove(i);
+                self.nodes.get_mut(&NodeKey::ROOT).unwrap().push(point);
+                return;
+            }
+        }
+        panic!("no such point");
+    }
+
+    /// Moves the points of the root around the hill down to leaves.
+    pub fn make_hole(&mut self) {
+        let root = self.nodes[&NodeKey::ROOT].clone();
+        let centre = Point { position: [700, 700, 3150], ..root[0] };
+        for p in root {
+            let near = distance_squared(&p, &centre) < 600 * 600;
+            if let (true, Some(leaf)) = (near, self.leaf_at(p.position)) {
+                self.nodes.get_mut(&NodeKey::ROOT).unwrap().retain(|q| *q != p);
+                self.nodes.get_mut(&leaf).unwrap().push(p);
+            }
+        }
+    }
+
     /// All points, in the order of nodes.
     pub fn points(&self) -> impl Iterator<Item = &Point> {
         self.nodes.values().flatten()

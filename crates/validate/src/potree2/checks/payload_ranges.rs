@@ -2,7 +2,7 @@
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::potree2::tree::{Tree, TreeNode};
+use crate::octree::tree::{Tree, TreeNode};
 
 /// Checks all ranges and marks the nodes whose payload may be read.
 ///

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::potree2::expect::Geometry;
+use crate::octree::expect::Geometry;
 
 /// Smallest and largest values seen. NaN and infinities are neither: JSON cannot write them.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::potree2::tree::Tree;
+use crate::octree::tree::Tree;
 
 /// Types, empty nodes, depth and the sum of points. `points` and `depth` are from the metadata.
 pub(crate) fn check(tree: &Tree, points: u64, depth: u32, findings: &Findings) {

@@ -13,6 +13,8 @@ pub(crate) struct Geometry {
     pub(crate) lattice: Lattice,
     pub(crate) cube: Aabb,
     pub(crate) spacing: f64,
+    /// What rounding may take off distances in datasets that do not state how they were sampled, world units.
+    pub(crate) rounding: f64,
 }
 
 impl Geometry {
@@ -171,6 +173,7 @@ mod tests {
             lattice: Lattice { scale: [0.001; 3], offset: [4_428_000.125, -7.3, 0.0] },
             cube: Aabb { min: [4_428_000.125, -7.3, 0.0], max: [4_428_001.149, -6.276, 1.024] },
             spacing: 0.008,
+            rounding: 0.001,
         }
     }
 

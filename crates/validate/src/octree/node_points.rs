@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::potree2::expect::{Geometry, morton_cmp};
+use crate::octree::expect::{Geometry, morton_cmp};
 
 /// Stored coordinates below 0 (read as unsigned by some clients: 2^31 and more).
 pub(crate) fn coordinates(key: NodeKey, positions: [&[i32]; 3], findings: &Findings) {

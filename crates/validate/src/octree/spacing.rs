@@ -5,9 +5,9 @@ use serde_json::json;
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::potree2::expect::Geometry;
-use crate::potree2::grid::{Grid, Origin, square};
-use crate::potree2::quality::{NodeFigures, Tally};
+use crate::octree::expect::Geometry;
+use crate::octree::grid::{Grid, Origin, square};
+use crate::octree::quality::{NodeFigures, Tally};
 
 /// How inner nodes are sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,9 +36,9 @@ const RINGS: i32 = 4;
 
 impl Sampling {
     /// The square of the least distance that two points of an inner node may have. A dataset that does not state its rule
-    /// may have compared rounded positions: a lattice step less.
+    /// may have compared rounded positions.
     fn allowed_squared(self, spacing: f64, geometry: &Geometry) -> f64 {
-        let slack = if self == Self::Unknown { geometry.step() } else { geometry.sampling_slack() };
+        let slack = if self == Self::Unknown { geometry.rounding } else { geometry.sampling_slack() };
         // squares of doubles are off by a few of their last bits
         square((spacing - slack).max(0.0)) * (1.0 - 1e-12)
     }

@@ -8,37 +8,45 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pointmill_format::potree2::{Dataset, Encoding, Node};
 use pointmill_format::{ErrorKind, NodeKey, NodePoints, ReadError};
 use rayon::prelude::*;
 
-use crate::accuracy::{Deviation, Ordered};
-use crate::against::Sums;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
+use crate::octree::cache::{Cache, Positions};
+use crate::octree::expect::Geometry;
+use crate::octree::grid::{Grid, Origin, Site};
+use crate::octree::quality::Tally;
+use crate::octree::spacing::Sampling;
+use crate::octree::tree::{Tree, TreeNode};
+use crate::octree::{coverage, spacing};
 use crate::options::{Progress, ProgressFn};
-use crate::potree2::cache::{Cache, Positions};
-use crate::potree2::checks::spacing::Sampling;
-use crate::potree2::checks::{coverage, node_points, ranges, spacing};
-use crate::potree2::expect::Geometry;
-use crate::potree2::grid::{Grid, Origin, Site};
-use crate::potree2::lattices::Lattices;
-use crate::potree2::quality::Tally;
-use crate::potree2::records::fill_blocks;
-use crate::potree2::tree::{Tree, TreeNode};
+
+/// The nodes of a dataset, as its format has them.
+pub(crate) trait Nodes: Sync {
+    /// Reads the points of a node.
+    ///
+    /// # Errors
+    /// Points that are not there, or not as their format wants them.
+    fn read(&self, node: &TreeNode, points: &mut NodePoints) -> Result<(), ReadError>;
+
+    /// Where points that [`Self::read`] gave are on [`Geometry::lattice`].
+    fn positions(&self, node: &TreeNode, points: &NodePoints) -> Vec<[i32; 3]>;
+
+    /// Checks what needs no other node, of the points that [`Self::read`] gave for node `index`. True if all of them are in
+    /// the node's box.
+    fn check(&self, index: usize, node: &TreeNode, points: &NodePoints) -> bool;
+}
 
 /// What to walk over, and how.
 pub(crate) struct Task<'a> {
-    pub(crate) dataset: &'a Dataset,
+    pub(crate) nodes: &'a dyn Nodes,
     pub(crate) tree: &'a Tree,
     pub(crate) geometry: Geometry,
     pub(crate) findings: &'a Findings,
     /// Check spacing and coverage, and measure quality.
     pub(crate) neighbourhoods: bool,
     pub(crate) sampling: Sampling,
-    pub(crate) lattices: Lattices,
-    /// Where records are summed for the comparison with the sources.
-    pub(crate) sums: Option<&'a Sums>,
     pub(crate) progress: &'a ProgressFn<'a>,
     pub(crate) cache_bytes: usize,
     pub(crate) max_problems: usize,
@@ -46,13 +54,10 @@ pub(crate) struct Task<'a> {
 
 /// What the walk found beside the findings that it pushed.
 pub(crate) struct Walked {
-    pub(crate) seen: ranges::Seen,
     /// By level.
     pub(crate) tallies: Vec<Tally>,
     /// Nodes whose points could not be read.
     pub(crate) unreadable: u64,
-    /// Of decoded positions from the points of the lattice.
-    pub(crate) deviation: Deviation,
 }
 
 /// Visits every node.
@@ -66,12 +71,10 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
         total: task.tree.nodes.iter().map(|n| u64::from(n.record.points)).sum(),
         cache: Cache::new(task.cache_bytes),
         scratch: Mutex::default(),
-        seen: Mutex::new(ranges::Seen::new(task.dataset.metadata())),
         tallies: (0..levels).map(|_| Tally::default()).collect(),
         pairs: Findings::new(task.findings.format(), task.max_problems),
         cells: Findings::new(task.findings.format(), task.max_problems),
         unreadable: AtomicU64::new(0),
-        deviations: Ordered::default(),
         done: AtomicU64::new(0),
         stop: AtomicBool::new(false),
         failure: Mutex::default(),
@@ -90,14 +93,7 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
         Sampling::Unknown => walk.pairs,
     };
     task.findings.absorb(Check::Spacing, &kept);
-    let mut deviation = Deviation::default();
-    walk.deviations.finish().for_each(|d| deviation.merge(&d));
-    Ok(Walked {
-        deviation,
-        seen: walk.seen.into_inner().unwrap_or_else(PoisonError::into_inner),
-        tallies: walk.tallies,
-        unreadable: walk.unreadable.into_inner(),
-    })
+    Ok(Walked { tallies: walk.tallies, unreadable: walk.unreadable.into_inner() })
 }
 
 struct Walk<'a> {
@@ -105,13 +101,11 @@ struct Walk<'a> {
     total: u64,
     cache: Cache,
     scratch: Mutex<Vec<NodePoints>>,
-    seen: Mutex<ranges::Seen>,
     tallies: Vec<Tally>,
     /// Findings for both sampling rules, until it is known which one applies.
     pairs: Findings,
     cells: Findings,
     unreadable: AtomicU64,
-    deviations: Ordered<usize, Deviation>,
     done: AtomicU64,
     stop: AtomicBool,
     failure: Mutex<Option<ReadError>>,
@@ -158,26 +152,13 @@ impl Walk<'_> {
         let task = self.task;
         let node = &task.tree.nodes[index];
         let checked = self.with_points(node, |points| {
-            let (key, findings) = (node.key, task.findings);
-            findings.checked(Check::Payloads, 1);
-            let positions = points.quantized().unwrap_or_default();
-            node_points::coordinates(key, positions, findings);
-            let all_inside = node_points::boxes(key, positions, &task.geometry, findings);
-            if task.dataset.metadata().encoding == Encoding::Brotli {
-                node_points::order(key, positions, findings);
-            }
-            let mut seen = ranges::Seen::new(task.dataset.metadata());
-            seen.add(points);
-            self.deviations.put(index, task.lattices.deviation(positions));
-            self.seen.lock().unwrap_or_else(PoisonError::into_inner).merge(&seen);
-            if let Some(sums) = task.sums {
-                sums.add(|block, sink| fill_blocks(points, sums.rules(), block, sink));
-            }
+            task.findings.checked(Check::Payloads, 1);
+            let all_inside = task.nodes.check(index, node, points);
             task.neighbourhoods.then(|| {
-                let mut positions = transpose(points);
+                let mut positions = task.nodes.positions(node, points);
                 if !all_inside {
                     // a stray point has its finding; judged by the neighbourhood of this node it would get more
-                    let limits = task.geometry.node_limits(key);
+                    let limits = task.geometry.node_limits(node.key);
                     let inside = |p: &[i32; 3]| (0..3).all(|a| (limits[a].0..=limits[a].1).contains(&i64::from(p[a])));
                     positions.retain(inside);
                 }
@@ -220,7 +201,7 @@ impl Walk<'_> {
         }
         let pop = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut points = pop.unwrap_or_default();
-        let read = self.task.dataset.read_points(&Node::new(node.key, node.record), &mut points);
+        let read = self.task.nodes.read(node, &mut points);
         let result = read.map(|()| work(&points)).map_err(Some);
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(points);
         result
@@ -231,7 +212,8 @@ impl Walk<'_> {
         if let Some(positions) = self.cache.get(index) {
             return Some(positions);
         }
-        let positions = Arc::new(self.with_points(&self.task.tree.nodes[index], transpose).ok()?);
+        let node = &self.task.tree.nodes[index];
+        let positions = Arc::new(self.with_points(node, |points| self.task.nodes.positions(node, points)).ok()?);
         self.cache.put(index, positions.clone());
         Some(positions)
     }
@@ -282,9 +264,4 @@ impl Walk<'_> {
         }
         Grid::new(&sites, coverage::cell_side(geometry, key.level), &geometry.lattice)
     }
-}
-
-fn transpose(points: &NodePoints) -> Vec<[i32; 3]> {
-    let [xs, ys, zs] = points.quantized().unwrap_or_default();
-    xs.iter().zip(ys).zip(zs).map(|((x, y), z)| [*x, *y, *z]).collect()
 }

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
+use crate::octree::grid::Nearest;
 use crate::outcome::LevelQuality;
-use crate::potree2::grid::Nearest;
 
 /// Fixed point, so that sums do not depend on the order in which threads add: 2⁻²⁰ spacings.
 const FIXED: f64 = (1u64 << 20) as f64;

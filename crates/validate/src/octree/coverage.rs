@@ -8,10 +8,10 @@ use serde_json::json;
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::potree2::checks::spacing::Sampling;
-use crate::potree2::expect::Geometry;
-use crate::potree2::grid::{Grid, square};
-use crate::potree2::quality::Tally;
+use crate::octree::expect::Geometry;
+use crate::octree::grid::{Grid, square};
+use crate::octree::quality::Tally;
+use crate::octree::spacing::Sampling;
 
 /// How far a point may be from the nearest one drawn at any level above it, in spacings of that level; one lattice step is
 /// allowed on top where nothing more precise is promised.

@@ -3,23 +3,22 @@
 
 use std::cmp::Reverse;
 
-use pointmill_format::potree2::Metadata;
-
 use super::tree::{Tree, TreeNode};
 use crate::outcome::FirstView;
 
 /// Points that viewers show by default.
 const BUDGET: u64 = 1_000_000;
 
-/// Of a dataset whose `metadata.json` has so many bytes; `None` without a root.
-pub(crate) fn measure(tree: &Tree, metadata: &Metadata, metadata_bytes: u64) -> Option<FirstView> {
+/// Of a dataset whose description has so many bytes, and whose cube is so much longer than the longest side of its points'
+/// box; `None` without a root.
+pub(crate) fn measure(tree: &Tree, metadata_bytes: u64, cube_over_extent: Option<f64>) -> Option<FirstView> {
     let root = tree.nodes.first()?;
     let mut order: Vec<&TreeNode> = tree.nodes.iter().collect();
     order.sort_by_key(|n| (n.key.level, Reverse(n.record.points)));
     let mut view = FirstView {
         root_points: u64::from(root.record.points),
-        cube_over_extent: cube_over_extent(metadata),
-        first_chunk_bytes: metadata.first_chunk_size,
+        cube_over_extent,
+        first_chunk_bytes: root.chunk_bytes,
         points: 0,
         nodes: 0,
         requests: 1,
@@ -36,10 +35,4 @@ pub(crate) fn measure(tree: &Tree, metadata: &Metadata, metadata_bytes: u64) -> 
         view.bytes = view.bytes.saturating_add(node.record.byte_size).saturating_add(node.chunk_bytes);
     }
     Some(view)
-}
-
-fn cube_over_extent(metadata: &Metadata) -> Option<f64> {
-    let position = metadata.attributes.iter().find(|a| a.attribute.name == "position")?;
-    let extent = position.min.iter().zip(&position.max).map(|(min, max)| max - min).fold(0.0, f64::max);
-    (extent > 0.0).then(|| (metadata.cube.max[0] - metadata.cube.min[0]) / extent)
 }

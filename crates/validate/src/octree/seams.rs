@@ -3,8 +3,8 @@
 
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
-use crate::potree2::checks::spacing::Sampling;
-use crate::potree2::quality::Tally;
+use crate::octree::quality::Tally;
+use crate::octree::spacing::Sampling;
 
 /// So many points of a level may have one of another node nearer than the spacing, however few the level has.
 const FEW: u64 = 8;
@@ -34,8 +34,8 @@ mod tests {
     use pointmill_format::DatasetKind;
 
     use super::*;
-    use crate::potree2::grid::Nearest;
-    use crate::potree2::quality::NodeFigures;
+    use crate::octree::grid::Nearest;
+    use crate::octree::quality::NodeFigures;
 
     /// Findings about a level of nodes of 100 points, a number of which are half a spacing from what `near` says.
     fn found(nodes: usize, close: usize, near: Nearest) -> u64 {

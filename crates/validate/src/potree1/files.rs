@@ -1,0 +1,77 @@
+//! What is in the folder of the nodes.
+
+use std::collections::{BTreeSet, HashMap};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pointmill_format::{NodeKey, ReadError};
+
+use super::expect::Names;
+use crate::check::Check;
+use crate::finding::{Finding, Findings};
+use crate::memory::Budget;
+
+/// What a file takes in the tables, at most.
+const FILE_BYTES: u64 = 96;
+
+/// The files that have the names of nodes.
+#[derive(Debug, Default)]
+pub(crate) struct Files {
+    /// Bytes of each node's file.
+    pub(crate) nodes: HashMap<NodeKey, u64>,
+    /// Bytes of each index.
+    pub(crate) indexes: HashMap<NodeKey, u64>,
+}
+
+impl Files {
+    /// Looks at everything below the folder of the nodes; links to folders are not followed. What has no name of a node, or
+    /// is in the wrong folder, is a finding.
+    ///
+    /// # Errors
+    /// The operating system could not read a folder; or more files than there is memory for.
+    pub(crate) fn look(folder: &Path, names: &Names, budget: &Budget, findings: &Findings) -> Result<Self, ReadError> {
+        let mut files = Self::default();
+        let mut strays = BTreeSet::new();
+        let mut waiting = vec![PathBuf::from(&names.octree_dir)];
+        while let Some(below) = waiting.pop() {
+            let path = folder.join(&below);
+            let entries = match fs::read_dir(&path) {
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound && waiting.is_empty() => return Ok(files),
+                entries => entries.map_err(|e| ReadError::io(&path, "listing the folder", e))?,
+            };
+            for entry in entries {
+                let entry = entry.map_err(|e| ReadError::io(&path, "listing the folder", e))?;
+                let inside = below.join(entry.file_name());
+                let kind = entry.file_type().map_err(|e| ReadError::io(entry.path(), "looking at it", e))?;
+                if kind.is_dir() {
+                    waiting.push(inside);
+                } else if !files.take(&inside, &entry.path(), names)? && strays.len() <= findings.cap() {
+                    strays.insert(inside);
+                }
+            }
+            budget.require((files.nodes.len() + files.indexes.len() + waiting.len()) as u64 * FILE_BYTES)?;
+        }
+        for stray in strays {
+            let found = stray.to_string_lossy().into_owned();
+            findings.push(Finding::new(Check::NodeFiles, "a file", "the name and folder of a node", found));
+        }
+        Ok(files)
+    }
+
+    /// Takes in a file that is where a node's should be. False if it is none.
+    fn take(&mut self, inside: &Path, path: &Path, names: &Names) -> Result<bool, ReadError> {
+        let size = || path.metadata().map(|m| m.len()).map_err(|e| ReadError::io(path, "asking for the size", e));
+        let key = inside.file_stem().and_then(|stem| stem.to_str()).and_then(NodeKey::from_name);
+        match key {
+            Some(key) if Path::new(&names.node(key)) == inside => {
+                self.nodes.insert(key, size()?);
+                Ok(true)
+            }
+            Some(key) if names.begins_index(key.level) && Path::new(&names.index(key)) == inside => {
+                self.indexes.insert(key, size()?);
+                Ok(true)
+            }
+            _ => Ok(false),
+        }
+    }
+}
