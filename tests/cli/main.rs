@@ -21,6 +21,8 @@ mod odd_places;
 mod overwriting;
 mod placing;
 mod potree1;
+mod potree1_of_others;
+mod potree1_proofs;
 mod precision;
 mod reporting;
 
