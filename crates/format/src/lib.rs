@@ -33,7 +33,8 @@
 //!
 //! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
 //!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF); `scans` is all of them.
-//! * [`potree1`]: Potree 1.4 to 1.8 octrees (`cloud.js`), read lazily and written.
+//! * [`potree1`]: Potree 1.4 to 1.8 octrees (`cloud.js`), read lazily from a folder or (feature `zip`) an uncompressed
+//!   archive, and what a writer of them needs.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
 //! * [`octree`]: what the two have in common, for renderers that do not care which one it is.
 //! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written

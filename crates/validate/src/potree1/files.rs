@@ -36,7 +36,9 @@ impl Files {
         while let Some(below) = waiting.pop() {
             let path = folder.join(&below);
             let entries = match fs::read_dir(&path) {
-                Err(e) if e.kind() == std::io::ErrorKind::NotFound && waiting.is_empty() => return Ok(files),
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound && below == Path::new(&names.octree_dir) => {
+                    return Ok(files); // no node has a file then
+                }
                 entries => entries.map_err(|e| ReadError::io(&path, "listing the folder", e))?,
             };
             for entry in entries {

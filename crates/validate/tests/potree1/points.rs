@@ -53,14 +53,11 @@ fn a_pair_closer_than_the_spacing() {
 }
 
 #[test]
-fn two_steps_are_nothing_in_datasets_that_state_no_rule() {
-    let mut cloud = Cloud::new(Sampler::Poisson);
-    cloud.raise(|p, root| {
-        let nearest = root.iter().map(|q| distance_squared(p, q)).min();
-        nearest.is_some_and(|nearest| (126 * 126..128 * 128).contains(&nearest))
-    });
-    let mut files = encode(&cloud);
-    assert_only(&files.validate(), Check::Spacing, 1);
+fn three_steps_are_nothing_in_datasets_that_state_no_rule() {
+    let mut files = good();
+    let spacing = files.cloud["spacing"].as_f64().unwrap();
+    files.cloud["spacing"] = json!(spacing + 3.0 * SCALE);
+    assert!(!files.validate().check(Check::Spacing).unwrap().ok);
     files.cloud["pointmill"].as_object_mut().unwrap().remove("sampling");
     let outcome = files.validate();
     assert!(outcome.ok, "{:#?}", outcome.problems);
