@@ -45,7 +45,7 @@ pub(crate) fn rules(dataset: &Dataset, attributes: &[Attribute], steps: &Steps, 
             ("rgb", Colours::Made) => continue,
             _ => (attribute.clone(), Conversion::AsStored, Feed::Column(column)),
         };
-        compared.push(attribute);
+        compared.push(scaled(attribute, own));
         conversions.push(conversion);
         feeds.push(feed);
     }
@@ -63,6 +63,18 @@ pub(crate) fn rules(dataset: &Dataset, attributes: &[Attribute], steps: &Steps, 
         _ => Channels::Wide,
     };
     (rules, Columns(feeds))
+}
+
+/// The attribute with the scale and offset that the dataset's own key states of its values.
+fn scaled(mut attribute: Attribute, own: &Value) -> Attribute {
+    let stated = &own["attributeScales"][&attribute.name];
+    let numbers = |key: &str| -> Option<Vec<f64>> { stated[key].as_array()?.iter().map(Value::as_f64).collect() };
+    for (key, place) in [("scale", &mut attribute.scale), ("offset", &mut attribute.offset)] {
+        if let Some(numbers) = numbers(key).filter(|numbers| numbers.len() == attribute.elements) {
+            *place = numbers;
+        }
+    }
+    attribute
 }
 
 /// Normals are stored as three floats.

@@ -1,8 +1,8 @@
 //! What `cloud.js` says.
 
-use pointmill_format::Aabb;
 use pointmill_format::potree1::Metadata;
-use serde_json::{Map, json};
+use pointmill_format::{Aabb, Attribute};
+use serde_json::{Map, Value, json};
 
 use super::content::Content;
 use super::settings::{Potree1Settings, Potree1Version};
@@ -39,8 +39,24 @@ pub(super) fn metadata(
         let renamed = content.renamed.iter().map(|r| (r.stored_as.clone(), r.name.clone().into()));
         own.insert("attributesRenamed".into(), renamed.collect::<Map<_, _>>().into());
     }
+    let scaled = scaled(cloud, content);
+    if !scaled.is_empty() {
+        own.insert("attributeScales".into(), scaled.into());
+    }
     own.insert("sampling".into(), settings.sampling.name().into());
     own.insert("leafCapacity".into(), settings.leaf_capacity.into());
     metadata.extra = Map::from_iter([("pointmill".to_owned(), own.into())]);
     metadata
+}
+
+/// Scale and offset of attributes whose stored values are not the meant ones, by their names in the dataset: the format has no
+/// other place for them.
+fn scaled(cloud: &Cloud<'_>, content: &Content) -> Map<String, Value> {
+    let kept = content.kept.iter().filter_map(|&i| cloud.schema().attributes.get(i));
+    let is_scaled = |a: &&Attribute| a.scale.iter().any(|s| *s != 1.0) || a.offset.iter().any(|o| *o != 0.0);
+    let stored_as = |a: &Attribute| {
+        let renamed = content.renamed.iter().find(|renamed| renamed.name == a.name);
+        renamed.map_or_else(|| a.name.clone(), |renamed| renamed.stored_as.clone())
+    };
+    kept.filter(is_scaled).map(|a| (stored_as(a), json!({ "scale": a.scale, "offset": a.offset }))).collect()
 }
