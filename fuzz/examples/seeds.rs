@@ -37,6 +37,15 @@ fn main() -> io::Result<()> {
         let lengths = [metadata.len() as u32, hierarchy.len() as u32].map(u32::to_le_bytes).concat();
         fs::write(corpus.join(name), [lengths, metadata, hierarchy, octree].concat())?;
     }
+    let corpus = fuzz.join("corpus/potree1");
+    fs::create_dir_all(&corpus)?;
+    for (name, node) in [("words", "data/r/00/00/r00007.bin"), ("objects", "data/r/r.bin"), ("flat", "data/r.bin")] {
+        let file =
+            |file: &str| fs::read(fixtures.join("potree1").join(name).join(file)).or(Ok::<_, io::Error>(Vec::new()));
+        let (cloud, index, node) = (file("cloud.js")?, file("data/r/r.hrc")?, file(node)?);
+        let lengths = [cloud.len() as u32, index.len() as u32].map(u32::to_le_bytes).concat();
+        fs::write(corpus.join(name), [lengths, cloud, index, node].concat())?;
+    }
     let corpus = fuzz.join("corpus/bintree");
     fs::create_dir_all(&corpus)?;
     for (name, index) in [("packed", "packed"), ("nested", "nested")] {

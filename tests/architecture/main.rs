@@ -34,10 +34,11 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
         "pointmill-format",
         &[
             &["error", "write_error", "bytes", "geometry", "names"],
-            &["points"],
-            &["scan"],
-            &["potree2", "bintree", "batches"],
+            &["json", "points"],
+            &["scan", "octree"],
+            &["potree1", "potree2", "bintree", "batches"],
             &["dataset_kind"],
+            &["open_octree"],
         ],
     ),
     (

@@ -16,6 +16,8 @@ use crate::names::named;
 pub enum DatasetKind {
     /// Potree 2.0: a folder with `metadata.json` ([`crate::potree2`]).
     Potree2,
+    /// Potree 1.x: a folder with `cloud.js` ([`crate::potree1`]).
+    Potree1,
     /// Mean-split binary tree: a folder with `index.json` ([`crate::bintree`]).
     Bintree,
     /// Quantised batches: a file `*.qbatch`, or a folder with `points.qbatch` ([`crate::batches`]).
@@ -49,6 +51,17 @@ const POTREE2: Row = Row {
     extension: None,
 };
 
+const POTREE1: Row = Row {
+    name: "potree1",
+    title: "Potree 1.x",
+    marker: "cloud.js",
+    mark: "\"octreeDir\"",
+    required: &[],               // the folder of the nodes can have any name
+    optional: &["sources.json"], // PotreeConverter writes it
+    owns: is_node_file,
+    extension: None,
+};
+
 const BINTREE: Row = Row {
     name: "bintree",
     title: "binary tree",
@@ -71,6 +84,12 @@ const BATCHES: Row = Row {
     extension: Some("qbatch"),
 };
 
+/// `r0427.bin`, `r0427.hrc`: a node of an octree, named after its path from the root.
+fn is_node_file(name: &str) -> bool {
+    let path = name.strip_prefix('r').and_then(|r| r.strip_suffix(".bin").or_else(|| r.strip_suffix(".hrc")));
+    path.is_some_and(|p| p.bytes().all(|b| matches!(b, b'0'..=b'7')))
+}
+
 /// `n0101.bin`: a leaf of a binary tree, named after its path from the root.
 fn is_leaf_file(name: &str) -> bool {
     let path = name.strip_prefix('n').and_then(|n| n.strip_suffix(".bin"));
@@ -82,11 +101,12 @@ const MARK_WITHIN_BYTES: u64 = 64 << 10;
 
 impl DatasetKind {
     /// Every kind.
-    pub const ALL: &[Self] = &[Self::Potree2, Self::Bintree, Self::Batches];
+    pub const ALL: &[Self] = &[Self::Potree2, Self::Potree1, Self::Bintree, Self::Batches];
 
     const fn row(self) -> &'static Row {
         match self {
             Self::Potree2 => &POTREE2,
+            Self::Potree1 => &POTREE1,
             Self::Bintree => &BINTREE,
             Self::Batches => &BATCHES,
         }
@@ -255,7 +275,8 @@ mod tests {
         fs::write(&scan, "LASF").unwrap();
         for path in [temp.path(), &scan] {
             let line = locate(path).unwrap_err().to_string();
-            let advice = "give a folder with metadata.json (Potree 2.0) or index.json (binary tree), or a .qbatch file";
+            let advice = "give a folder with metadata.json (Potree 2.0) or cloud.js (Potree 1.x) or index.json (binary tree), or a \
+                          .qbatch file";
             assert!(line.ends_with(advice), "{line}");
         }
         assert!(locate(temp.path().join("nothing")).is_err());
@@ -268,6 +289,10 @@ mod tests {
             ("metadata.json", DatasetKind::Potree2),
             ("octree.bin", DatasetKind::Potree2),
             ("log.txt", DatasetKind::Potree2),
+            ("cloud.js", DatasetKind::Potree1),
+            ("sources.json", DatasetKind::Potree1),
+            ("r.hrc", DatasetKind::Potree1),
+            ("r0427.bin", DatasetKind::Potree1),
             ("leaves.bin", DatasetKind::Bintree),
             ("n.bin", DatasetKind::Bintree),
             ("n0101.bin", DatasetKind::Bintree),
@@ -275,12 +300,14 @@ mod tests {
         ] {
             assert_eq!(owned(name), [kind], "{name}");
         }
-        for name in ["", "n2.bin", "n01", "letter.txt", "report.json"] {
+        for name in ["", "n2.bin", "r8.bin", "r0.laz", "n01", "letter.txt", "report.json"] {
             assert_eq!(owned(name), [], "{name}");
         }
         for &kind in DatasetKind::ALL {
             assert_eq!(kind.to_string().parse(), Ok(kind));
         }
-        assert!("Potree".parse::<DatasetKind>().unwrap_err().to_string().contains("potree2, bintree, batches"));
+        assert!(
+            "Potree".parse::<DatasetKind>().unwrap_err().to_string().contains("potree2, potree1, bintree, batches")
+        );
     }
 }

@@ -33,7 +33,9 @@
 //!
 //! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
 //!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF); `scans` is all of them.
+//! * [`potree1`]: Potree 1.4 to 1.8 octrees (`cloud.js`), read lazily and written.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
+//! * [`octree`]: what the two have in common, for renderers that do not care which one it is.
 //! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written
 //!   (feature `rstar`: nearest points too).
 //! * [`batches`]: quantised batches with levels of detail, mapped as they stand (features `mmap`, `zstd`), and written.
@@ -55,13 +57,17 @@
 mod dataset_kind;
 mod error;
 mod geometry;
+mod json;
 mod names;
+mod open_octree;
 mod points;
 mod write_error;
 
 pub mod batches;
 pub mod bintree;
 pub mod bytes;
+pub mod octree;
+pub mod potree1;
 pub mod potree2;
 pub mod scan;
 
@@ -69,6 +75,7 @@ pub use dataset_kind::{DatasetKind, Located, locate};
 pub use error::{Advice, ErrorKind, Fault, ReadError, system_reason};
 pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Lattice, NodeKey};
 pub use names::UnknownName;
+pub use open_octree::open_octree;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
     Batches, Blob, Counted, Crs, Decimal, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_BYTES,
@@ -88,6 +95,7 @@ pub use rstar;
 /// What threads share stays shareable: this compiles, or the types have lost it.
 const _: () = {
     const fn shared<T: Send + Sync>() {}
+    shared::<potree1::Dataset>();
     shared::<potree2::Dataset>();
     shared::<potree2::Hierarchy>();
     shared::<bintree::Bintree>();

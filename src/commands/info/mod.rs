@@ -5,6 +5,7 @@ mod bintree;
 mod description;
 mod measure;
 mod parts;
+mod potree1;
 mod potree2;
 mod scan;
 
@@ -25,6 +26,7 @@ fn describe_dataset(dataset: &Located) -> Result<Description, Failure> {
     let marker = dataset.marker_path();
     match dataset.kind {
         DatasetKind::Potree2 => potree2::describe(&marker),
+        DatasetKind::Potree1 => potree1::describe(&marker),
         DatasetKind::Bintree => bintree::describe(&marker),
         DatasetKind::Batches => batches::describe(&marker),
         other => Err(Failure::Usage(format!("{}: info does not read datasets of kind {other}", marker.display()))),

@@ -114,4 +114,27 @@ mod tests {
         few.merge(&all);
         assert_eq!(few, ColourRange { min: [3, 9, 255], max: [1006, 1006, 60_000] });
     }
+    #[test]
+    fn each_set_of_instructions_finds_the_range_of_each_channel() {
+        let mut random = pointmill_testkit::Random::new(4);
+        // none, fewer than are compared at once, as many, and some more
+        for points in [0, 1, 7, 8, 9, 16, 203] {
+            let channel = |i: usize, v: u64| (1 + 100 * (i % 3) as u64 + v) as u16;
+            let values: Vec<u16> = (0..3 * points).map(|i| channel(i, random.below(60_000))).collect();
+            let some: Vec<u32> = (0..points as u32).filter(|i| i % 4 == 1).collect();
+            let all: Vec<u32> = (0..points as u32).collect();
+            for selection in [None, Some(&some[..])] {
+                let of = |e: usize| selection.unwrap_or(&all).iter().map(move |i| 3 * *i as usize + e);
+                let least = |e| of(e).map(|i| values[i]).min().unwrap_or(u16::MAX);
+                let greatest = |e| of(e).map(|i| values[i]).max().unwrap_or(0);
+                let expected = ColourRange { min: [0, 1, 2].map(least), max: [0, 1, 2].map(greatest) };
+                let column = Column::UInt16(values.clone());
+                for vectors in Vectors::all() {
+                    let mut found = ColourRange::default();
+                    include(vectors, &mut found, &column, selection);
+                    assert_eq!(found, expected, "{vectors:?}, {points} points");
+                }
+            }
+        }
+    }
 }

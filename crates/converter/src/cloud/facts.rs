@@ -2,8 +2,9 @@
 //! coordinate reference system.
 
 use super::intake::Intake;
+use super::range::Range;
 use super::shortfall::{self, Shortfall};
-use super::stats::{Range, SourceStats, Stats};
+use super::stats::{SourceStats, Stats};
 use super::widening::Widening;
 use crate::error::{ConvertError, InputFault};
 use crate::plan::{Plan, RgbDepth};

@@ -4,11 +4,8 @@ use std::ops::Range;
 
 use super::columns::{Part, RowsOf};
 use crate::cloud::{Checksum, JobColumns, StoredOrigin, copy_record};
-use crate::runtime::{Vectors, vectorized};
+use crate::runtime::{TILE_POINTS, Vectors, vectorized};
 use crate::sources::{MARK_BYTES, POSITION_BYTES, Schema};
-
-/// Records are put together in tiles that stay in the first-level cache while one column after the other is written.
-const TILE_POINTS: usize = 512;
 
 /// What the records of a slice are made of.
 pub(super) struct Assembly<'a> {
@@ -47,10 +44,12 @@ impl Rows<'_> {
 }
 
 /// Puts records together: in the order of the rows, whose columns are then read from front to back, and then moves each as a
-/// whole.
+/// whole. It does so in tiles of [`TILE_POINTS`] records, which stay in the first-level cache while one column after the
+/// other is written.
 #[derive(Default)]
 pub(super) struct Assembler {
     vectors: Vectors,
+    /// Of what a thread may take for it ([`crate::runtime::Budget`]).
     tile: Vec<u8>,
 }
 
@@ -92,6 +91,7 @@ impl Assembly<'_> {
         let stride = self.schema.stride;
         // zeros are what columns hold that this source does not have, whatever the last source had
         tile.clear();
+        tile.reserve_exact(TILE_POINTS.min(places.len()) * stride);
         tile.resize(TILE_POINTS.min(places.len()) * stride, 0);
         for (i, places) in places.chunks(TILE_POINTS).enumerate() {
             let tile = &mut tile[..places.len() * stride];
@@ -146,7 +146,8 @@ mod tests {
         let columns: Vec<&Column> = columns.iter().collect();
         let places: Vec<u32> = (0..points).map(|i| i * 7 % points).collect();
         for vectors in Vectors::all() {
-            let mut assembler = Assembler { vectors, tile: Vec::new() };
+            // as a shorter slice leaves it
+            let mut assembler = Assembler { vectors, tile: Vec::with_capacity(300 * schema.stride) };
             // first a source with both columns, then one without the second
             for (given, b) in [([Some(0), Some(1)], 3), ([Some(0), None], 0)] {
                 for places in [&places[..], &[]] {
@@ -169,6 +170,7 @@ mod tests {
                         assert_eq!(record, expected, "{vectors:?} point {i}");
                     }
                     assert_eq!(checksum.count(), u64::from(points));
+                    assert!(assembler.tile.capacity() <= TILE_POINTS * schema.stride, "as much as is accounted for");
                 }
             }
         }

@@ -124,15 +124,13 @@ impl<'a> Pass<'a> {
 
     fn read(&self) -> Result<(Stats, Collected, Reservation), ConvertError> {
         let sources = self.context.sources;
-        let pieces = sources.pieces();
         let parts = self.rt.in_parallel(
-            pieces.div_ceil(AT_ONCE),
+            sources.pairs(),
             || Reader { worker: Worker::new(&self.context), visit: None, scratch: Scratch::default() },
             |reader, unit| {
-                for number in unit * AT_ONCE..pieces.min((unit + 1) * AT_ONCE) {
-                    let (source, piece) = sources.piece(number);
-                    let is_last = (number + 1) % AT_ONCE == 0;
-                    reader.scratch.next_piece = (!is_last).then_some(piece + 1);
+                let (source, pieces) = sources.pair(unit);
+                for piece in pieces.clone() {
+                    reader.scratch.next_piece = Some(piece + 1).filter(|next| pieces.contains(next));
                     self.piece(source, piece, reader)?;
                 }
                 Ok(())
@@ -198,10 +196,6 @@ impl<'a> Pass<'a> {
         }
     }
 }
-
-/// Consecutive pieces that a thread reads, one after the other: two take less time in some formats when one thread decodes
-/// them.
-const AT_ONCE: usize = 2;
 
 /// What a thread works with.
 struct Reader<'a> {

@@ -105,3 +105,38 @@ fn world_bounds(lattice: Option<&Lattice>, positions: &Positions) -> Aabb {
     }
     bounds
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_set_of_instructions_finds_the_same_extremes() {
+        let mut random = pointmill_testkit::Random::new(6);
+        for vectors in Vectors::all() {
+            assert_eq!(extremes(vectors, &[]), None);
+            assert_eq!(extremes(vectors, &[i32::MAX, i32::MIN]), Some((i32::MIN, i32::MAX)));
+            // the smallest and the largest at every place of several vectors and what is left behind them
+            for count in [1, 7, 8, 75] {
+                for at in 0..count {
+                    let mut values: Vec<i32> = (0..count).map(|_| random.below(1000) as i32 - 500).collect();
+                    values[at] = -600;
+                    values[(at + count / 2) % count] += 1200;
+                    let expected = (values.iter().copied().min(), values.iter().copied().max());
+                    let (min, max) = extremes(vectors, &values).unwrap();
+                    assert_eq!((Some(min), Some(max)), expected, "{vectors:?} {values:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_are_in_world_units_and_of_what_is_finite() {
+        let lattice = Lattice { scale: [0.5, 0.25, 2.0], offset: [10.0, 0.0, -1.0] };
+        let q = Positions::Quantized([vec![4, -2, 0], vec![8, 8, 8], vec![i32::MAX, 0, i32::MIN]]);
+        let found = world_bounds(Some(&lattice), &q);
+        assert_eq!(found, Aabb { min: [9.0, 2.0, -4_294_967_297.0], max: [12.0, 2.0, 4_294_967_293.0] });
+        let world = Positions::World([vec![1.0, f64::NAN], vec![2.0, 5.0], vec![f64::INFINITY, -3.0]]);
+        assert_eq!(world_bounds(None, &world), Aabb { min: [1.0, 2.0, -3.0], max: [1.0, 5.0, -3.0] });
+    }
+}

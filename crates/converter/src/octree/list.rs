@@ -51,7 +51,8 @@ impl List {
     }
 
     /// Looks at the records in memory, all of which are there, and keeps some: `thin` puts those that stay to the front and
-    /// returns their bytes. The memory of the others stays with the list, which is written soon.
+    /// returns their bytes. The memory of the others stays with the list, since most lists are written at once: one that
+    /// waits is [trimmed](Self::trim).
     pub(super) fn thin<E>(&mut self, stride: usize, thin: impl FnOnce(&mut [u8]) -> Result<usize, E>) -> Result<(), E> {
         if let Place::Memory(records, _) = &mut self.place {
             let kept = thin(records)?;
@@ -59,6 +60,16 @@ impl List {
             self.count = (kept / stride) as u64;
         }
         Ok(())
+    }
+
+    /// Gives back the memory of records that the list had once.
+    pub(super) fn trim(&mut self) {
+        if let Place::Memory(records, room) = &mut self.place {
+            records.shrink_to_fit();
+            if let Some(room) = room {
+                room.try_resize(records.len() as u64); // less is always granted
+            }
+        }
     }
 
     /// Of nothing.
@@ -91,8 +102,9 @@ impl Lists {
         }
     }
 
-    /// Accounts for a list of a chunk: it stays in memory if there is room.
+    /// Accounts for a list that is to wait: one of a chunk stays in memory if there is room.
     pub(super) fn admit(&self, list: &mut List) -> Result<(), ConvertError> {
+        list.trim();
         if let Place::Memory(records, None) = &mut list.place {
             let records = std::mem::take(records);
             list.place = self.settle(records)?;
@@ -100,8 +112,7 @@ impl Lists {
         Ok(())
     }
 
-    fn settle(&self, mut records: Vec<u8>) -> Result<Place, ConvertError> {
-        records.shrink_to_fit();
+    fn settle(&self, records: Vec<u8>) -> Result<Place, ConvertError> {
         match self.reserve(records.len()) {
             Some(reservation) => Ok(Place::Memory(records, Some(reservation))),
             None => {
@@ -274,15 +285,11 @@ impl Writer {
         self.flush(lists)?;
         let place = match self.in_file {
             Some((start, _)) => Place::Disk(lists.file()?, start),
-            None => {
-                self.records.shrink_to_fit();
-                if let Some(room) = &mut self.room {
-                    room.try_resize(self.records.len() as u64);
-                }
-                Place::Memory(self.records, self.room)
-            }
+            None => Place::Memory(self.records, self.room),
         };
-        Ok(List { count: self.count, place, is_one_place: false })
+        let mut list = List { count: self.count, place, is_one_place: false };
+        list.trim();
+        Ok(list)
     }
 }
 
@@ -327,5 +334,48 @@ mod tests {
             drop((even, odd, middle, chunk));
             assert_eq!(memory.free(), room, "all was given back");
         }
+    }
+    /// A list in memory of the numbers below `count`, four bytes each.
+    fn counted(lists: &Lists, count: u32) -> List {
+        let mut writer = Writer::new(u64::from(count));
+        (0..count).for_each(|i| writer.push(&i.to_le_bytes(), lists).unwrap());
+        writer.finish(lists).unwrap()
+    }
+
+    /// Keeps the numbers of which `stays` is true.
+    fn thin(list: &mut List, stays: impl Fn(u32) -> bool) {
+        let front = |records: &mut [u8]| -> Result<usize, ()> {
+            let kept: Vec<u8> = records.chunks_exact(4).filter(|r| stays(r[0].into())).flatten().copied().collect();
+            records[..kept.len()].copy_from_slice(&kept);
+            Ok(kept.len())
+        };
+        list.thin(4, front).unwrap();
+    }
+
+    #[test]
+    fn a_thinned_list_is_what_stays_and_gives_the_rest_back_when_it_waits() {
+        let memory = Arc::new(Pool::new(1 << 20, 1 << 20));
+        let lists = Lists::new(4, &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
+        for (count, step) in [(0, 1), (1, 1), (1, 2), (200, 1), (200, 3), (200, 200)] {
+            let mut list = counted(&lists, count);
+            thin(&mut list, |i| (i + 1) % step == 0);
+            let left: Vec<u32> = (0..count).filter(|i| (i + 1) % step == 0).collect();
+            assert_eq!((numbers(&lists, &list), list.count()), (left, u64::from(count / step)));
+            assert_eq!(memory.taken_by(Consumer::Waiting), 4 * u64::from(count), "until it waits");
+            lists.admit(&mut list).unwrap();
+            assert_eq!(memory.taken_by(Consumer::Waiting), 4 * u64::from(count / step));
+            assert!(matches!(&list.place, Place::Memory(records, Some(_)) if records.capacity() == records.len()));
+            assert_eq!(numbers(&lists, &list).len() as u64, list.count());
+        }
+        assert_eq!(memory.free(), 1 << 20);
+    }
+
+    #[test]
+    fn a_list_that_cannot_be_thinned_stays_as_it_was() {
+        let memory = Arc::new(Pool::new(1 << 20, 1 << 20));
+        let lists = Lists::new(4, &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
+        let mut list = counted(&lists, 5);
+        assert_eq!(list.thin(4, |_| Err("no")), Err("no"));
+        assert_eq!((numbers(&lists, &list), list.count()), (vec![0, 1, 2, 3, 4], 5));
     }
 }

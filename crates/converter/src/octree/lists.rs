@@ -225,10 +225,11 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
         Ok(pairs.count >= enough)
     }
 
-    fn write(&mut self, key: NodeKey, points: List) -> Result<(), ConvertError> {
+    fn write(&mut self, key: NodeKey, mut points: List) -> Result<(), ConvertError> {
         let (count, stride) = (points.count(), self.lists.stride);
         let is_large = count * stride as u64 > LARGE_BYTES;
         if is_large && self.encoder.row_bytes().is_some() {
+            points.trim(); // it waits for its place in the tree
             self.finished.add_large(key, points);
             return Ok(());
         }
@@ -253,3 +254,6 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -11,6 +11,9 @@ const FIXED_BYTES: u64 = 32 << 20;
 /// points are grouped.
 const GATHER_BYTES: u64 = 20 << 20;
 
+/// Records that a reading thread puts together, in memory of its own, before it moves them to their places.
+pub(crate) const TILE_POINTS: usize = 512;
+
 /// What a building thread has beside the chunk that it builds: the sampler's grid and candidates, records of a node and of a
 /// part of one, buffers of encoders.
 const BUILD_BYTES: u64 = 10 << 20;
@@ -78,7 +81,7 @@ impl Budget {
         let threads = plan.threads.max(1) as u64;
         let window = plan.threads.max(1) * (1 + AHEAD_PER_THREAD);
         let fixed_bytes = FIXED_BYTES + least.input_bytes;
-        let reader_bytes = GATHER_BYTES + least.decode_bytes;
+        let reader_bytes = GATHER_BYTES + (TILE_POINTS * stride) as u64 + least.decode_bytes;
         // Allocators keep some of what is freed.
         let usable = ceiling - ceiling / 10;
         let bytes_per_chunk_point = bytes_per_chunk_point(stride, window as u64, threads);
@@ -214,5 +217,17 @@ mod tests {
             assert!(enough.build_bytes(u64::MAX) + LEAST_POOL_BYTES / 2 <= enough.pool_bytes);
             assert!(Budget::new(&plan((needed >> 20) - 1, threads), 38, least).is_err());
         }
+    }
+    #[test]
+    fn a_thread_that_reads_wide_records_takes_more() {
+        let taken = |stride| {
+            let budget = Budget::new(&plan(8192, 2), stride, Least::of([], 3 << 20, 0)).unwrap();
+            let memory = std::sync::Arc::new(Pool::new(budget.pool_bytes, 8192 << 20));
+            let reading = budget.reading(&memory).unwrap();
+            assert_eq!(memory.free(), budget.pool_bytes - reading.bytes());
+            reading.bytes()
+        };
+        assert_eq!(taken(38), 2 * (GATHER_BYTES + (3 << 20) + 512 * 38));
+        assert_eq!(taken(5000) - taken(38), 2 * 512 * (5000 - 38));
     }
 }

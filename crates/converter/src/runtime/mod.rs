@@ -11,7 +11,7 @@ mod pool;
 mod vectors;
 mod workers;
 
-pub(crate) use budget::{Budget, Least};
+pub(crate) use budget::{Budget, Least, TILE_POINTS};
 pub(crate) use clock::{Clock, PhaseTime};
 pub use disk::{Disk, DiskOperation, Replacing, SystemDisk};
 pub(crate) use disk::{DiskFile, Sequential, TempFiles};

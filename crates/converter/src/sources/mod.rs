@@ -16,6 +16,7 @@ mod survey;
 mod union;
 
 use std::cmp::Reverse;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -37,6 +38,7 @@ use self::open_scans::OpenScans;
 use self::opener::Opener;
 use self::probe::{Outcome, Probe, Probed};
 use self::shared::Shared;
+use self::source::PIECES_TOGETHER;
 use self::union::Union;
 use crate::error::{ConvertError, InputFault};
 use crate::plan::Plan;
@@ -95,8 +97,8 @@ impl Found {
             open.keep(self.all.len(), scan)?;
         }
         let Probed { source, attributes, points, points_missing, mut warnings, .. } = *probed;
-        let first_unit = self.all.last().map_or(0, |last| last.first_unit + u64::from(last.pieces));
-        self.all.push(Source { first_unit, ..source });
+        let first_pair = self.all.last().map_or(0, Source::end_of_pairs);
+        self.all.push(Source { first_pair, ..source });
         self.attributes.push(attributes);
         self.points_declared = self.points_declared.saturating_add(points);
         self.points_missing = self.points_missing.saturating_add(points_missing);
@@ -182,16 +184,19 @@ impl Sources {
         Ok(most)
     }
 
-    /// The number of pieces of all scans.
-    pub(crate) fn pieces(&self) -> usize {
-        self.all.last().map_or(0, |last| (last.first_unit + u64::from(last.pieces)) as usize)
+    /// The number of pairs of pieces of all scans: a thread takes two consecutive pieces of a scan together, since two take
+    /// less time in some formats when one thread decodes them ([`pointmill_format::Scratch::next_piece`]).
+    pub(crate) fn pairs(&self) -> usize {
+        self.all.last().map_or(0, |last| last.end_of_pairs() as usize)
     }
 
-    /// The source of the piece with that number among those of all scans, and which of its pieces it is.
-    pub(crate) fn piece(&self, number: usize) -> (usize, usize) {
+    /// The source of the pair with that number among those of all scans, and its pieces: two, or the last of the source.
+    pub(crate) fn pair(&self, number: usize) -> (usize, Range<usize>) {
         // sources without pieces begin where the next one does
-        let source = self.all.partition_point(|s| s.first_unit <= number as u64).saturating_sub(1);
-        (source, number - self.all.get(source).map_or(0, |s| s.first_unit as usize))
+        let source = self.all.partition_point(|s| s.first_pair <= number as u64).saturating_sub(1);
+        let Some(s) = self.all.get(source) else { return (source, 0..0) };
+        let first = (number as u64).saturating_sub(s.first_pair) * PIECES_TOGETHER;
+        (source, first as usize..(first + PIECES_TOGETHER).min(u64::from(s.pieces)) as usize)
     }
 
     /// True if headers say where all points are, as opposed to a sample.
@@ -234,5 +239,26 @@ fn settle_fineness(sources: &mut [Source], divisors: &Divisors) {
             source.stored = same.unwrap_or_else(|| Arc::new(stored));
             last = Some(Arc::clone(&source.stored));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sources::source::Stored;
+
+    #[test]
+    fn pairs_are_of_one_source_and_every_piece_is_in_one() {
+        let stored = Stored { lattice: None, resolution: Default::default(), fineness: [Fineness::Double; 3] };
+        let mut first_pair = 0;
+        let source = |pieces: u32| {
+            let source = Source { pieces, first_pair, ..Source::of_header(stored.clone(), None, None) };
+            first_pair = source.end_of_pairs();
+            source
+        };
+        let sources = Sources::of_headers([0, 3, 1, 0, 0, 4, 1, 0].map(source).into());
+        let pairs: Vec<_> = (0..sources.pairs()).map(|number| sources.pair(number)).collect();
+        assert_eq!(pairs, [(1, 0..2), (1, 2..3), (2, 0..1), (5, 0..2), (5, 2..4), (6, 0..1)]);
+        assert_eq!(Sources::of_headers(Vec::new()).pairs(), 0);
     }
 }

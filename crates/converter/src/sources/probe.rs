@@ -104,7 +104,7 @@ impl Probe<'_> {
             file_bytes: info.file_bytes,
             decode_bytes: scan.decode_bytes(&Wanted::all(info)),
             pieces: pieces.map_err(|_| ReadError::unsupported(path, "more than 4,294,967,295 pieces"))?,
-            first_unit: 0,
+            first_pair: 0,
             mark,
         };
         let warn = |warning: &pointmill_format::ScanWarning| {

@@ -7,6 +7,9 @@ use pointmill_format::{Aabb, Crs, Lattice, Resolution};
 
 use super::survey::{Extent, Fineness, single_step};
 
+/// Pieces of a scan that a thread takes together.
+pub(super) const PIECES_TOGETHER: u64 = 2;
+
 /// A scan: what of its header is needed while its file is closed. What scans have in common is kept once.
 #[derive(Debug, Clone)]
 pub(crate) struct Source {
@@ -33,8 +36,8 @@ pub(crate) struct Source {
     pub(super) decode_bytes: u64,
     /// Parts that decode alone.
     pub(crate) pieces: u32,
-    /// Number of its first piece among those of all scans.
-    pub(super) first_unit: u64,
+    /// Number of its first pair of pieces among those of all scans.
+    pub(super) first_pair: u64,
     /// Tells whether the file is still the one that was opened first ([`super::same::mark`]).
     pub(super) mark: u64,
 }
@@ -76,6 +79,13 @@ impl Stored {
     }
 }
 
+impl Source {
+    /// Number of the pair of pieces that follows its last.
+    pub(super) fn end_of_pairs(&self) -> u64 {
+        self.first_pair + u64::from(self.pieces).div_ceil(PIECES_TOGETHER)
+    }
+}
+
 #[cfg(test)]
 impl Source {
     /// A source of which the header alone matters. `seen`: where its points are.
@@ -94,7 +104,7 @@ impl Source {
             file_bytes: 0,
             decode_bytes: 0,
             pieces: 0,
-            first_unit: 0,
+            first_pair: 0,
             mark: 0,
         }
     }

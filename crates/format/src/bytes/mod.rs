@@ -3,6 +3,7 @@
 
 mod room;
 mod source;
+mod tree;
 
 use std::fs::File;
 use std::io;
@@ -10,6 +11,7 @@ use std::io;
 pub(crate) use room::STEP;
 pub use room::{open_file, read_file, try_resize};
 pub use source::{ByteSource, Folder, Memory};
+pub use tree::FolderTree;
 
 /// Fills `buf` with the bytes of `file` from `offset` on.
 ///

@@ -1,5 +1,7 @@
 //! Axis-aligned boxes in world coordinates.
 
+use super::NodeKey;
+
 /// An axis-aligned box, world coordinates, closed: `min ≤ p ≤ max`.
 ///
 /// ```
@@ -57,6 +59,23 @@ impl Aabb {
     #[must_use]
     pub fn extent(&self) -> [f64; 3] {
         std::array::from_fn(|a| self.max[a] - self.min[a])
+    }
+
+    /// The box of a node, if this is the root's: halved [`NodeKey::level`] times, as viewers do it.
+    #[must_use]
+    pub fn octant(&self, key: NodeKey) -> Self {
+        let mut node = *self;
+        for level in (0..key.level).rev() {
+            for (axis, cell) in [key.x, key.y, key.z].into_iter().enumerate() {
+                let mid = node.min[axis] + (node.max[axis] - node.min[axis]) / 2.0;
+                if cell.checked_shr(level.into()).unwrap_or(0) & 1 == 1 {
+                    node.min[axis] = mid;
+                } else {
+                    node.max[axis] = mid;
+                }
+            }
+        }
+        node
     }
 
     /// The midpoint.

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::morton::morton32;
 use crate::UnknownName;
 
 /// Address of an octree node: its level (root = 0) and its cell in the `2^level` grid of that level.
@@ -68,6 +69,11 @@ impl NodeKey {
         Some(Self { level, x: above(self.x), y: above(self.y), z: above(self.z) })
     }
 
+    /// Where the node stands in breadth-first order: the level in the top bits, then the digits of the name.
+    pub(crate) fn breadth_first_rank(self) -> u128 {
+        u128::from(self.level) << 96 | morton32([self.z, self.y, self.x])
+    }
+
     /// Parses a Potree name: `r` and one digit 0–7 per level.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
@@ -127,5 +133,13 @@ mod tests {
         let deepest = NodeKey::from_name(&format!("r{}", "7".repeat(31))).unwrap();
         assert_eq!(deepest.x, (1 << 31) - 1);
         assert_eq!(deepest.child(0), None);
+    }
+
+    #[test]
+    fn ranks_order_nodes_by_level_and_then_by_name() {
+        let deep = format!("r{}", "0".repeat(31));
+        let names = ["r", "r0", "r3", "r7", "r00", "r04", "r40", "r777", &deep];
+        let ranks = names.map(|n| NodeKey::from_name(n).unwrap().breadth_first_rank());
+        assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:x?}");
     }
 }

@@ -1,6 +1,6 @@
 //! One chunk of `hierarchy.bin`: a subtree down to its proxies, breadth first.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::path::Path;
 
 use crate::{NodeKey, ReadError};
@@ -69,28 +69,5 @@ impl<'a> Parser<'a> {
     /// The nodes, breadth first.
     pub(super) fn finish(self) -> Vec<Node> {
         self.nodes
-    }
-}
-
-/// The byte ranges of the chunks read so far. No two may overlap: that is what keeps a walk over hostile proxies from
-/// going round in circles, and the number of nodes below what `hierarchy.bin` can hold.
-#[derive(Debug, Clone, Default)]
-pub(super) struct ChunkRanges {
-    /// Start → (end, root of the chunk).
-    by_start: BTreeMap<u64, (u64, NodeKey)>,
-}
-
-impl ChunkRanges {
-    /// Adds the chunk of `root`, or reports which chunk is there already.
-    pub(super) fn claim(&mut self, root: NodeKey, start: u64, size: u64, path: &Path) -> Result<(), ReadError> {
-        let end = start.saturating_add(size);
-        if let Some((_, (other_end, other))) = self.by_start.range(..end).next_back()
-            && *other_end > start
-        {
-            let what = format!("the hierarchy chunk of {root} overlaps the one of {other}");
-            return Err(ReadError::broken(path, start, what));
-        }
-        self.by_start.insert(start, (end, root));
-        Ok(())
     }
 }

@@ -5,10 +5,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::bytes::{ByteSource, Folder, STEP};
+use crate::octree::{ChunkRanges, OctreeInfo};
 use crate::{NodeKey, ReadError};
 
-use super::chunk::{ChunkRanges, Parser};
-use super::morton::breadth_first_rank;
+use super::chunk::Parser;
 use super::{HIERARCHY_FILE, METADATA_FILE, Metadata, Node, NodeRecord, OCTREE_FILE};
 
 /// More JSON than this is not metadata.
@@ -35,6 +35,7 @@ const MAX_NODE_BYTES: u64 = 512 << 20;
 pub struct Dataset {
     pub(super) source: Box<dyn ByteSource>,
     pub(super) metadata: Metadata,
+    pub(super) info: OctreeInfo,
     hierarchy_bytes: u64,
     octree_bytes: u64,
     pub(super) max_node_bytes: u64,
@@ -75,8 +76,8 @@ impl Dataset {
         let mut bytes = vec![0; metadata_bytes as usize];
         source.read_at(METADATA_FILE, 0, &mut bytes).map_err(|e| ReadError::io(&path, "reading", e))?;
         let metadata = Metadata::from_json(&bytes, &path)?;
-        let source = Box::new(source);
-        Ok(Self { source, metadata, hierarchy_bytes, octree_bytes, max_node_bytes: MAX_NODE_BYTES })
+        let (source, info) = (Box::new(source), metadata.octree_info());
+        Ok(Self { source, metadata, info, hierarchy_bytes, octree_bytes, max_node_bytes: MAX_NODE_BYTES })
     }
 
     /// What `metadata.json` says.
@@ -157,7 +158,7 @@ impl Dataset {
                 }
             }
         }
-        nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
+        nodes.sort_by_cached_key(|n| n.key.breadth_first_rank());
         Ok(nodes)
     }
 

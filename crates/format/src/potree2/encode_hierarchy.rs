@@ -6,7 +6,6 @@ use crate::NodeKey;
 
 use super::chunk_cut::chunk_roots;
 use super::linked_tree::LinkedTree;
-use super::morton::breadth_first_rank;
 use super::{NodeEntry, NodeRecord, NodeType};
 
 /// Records of a hierarchy chunk that a client can take at once: what a full tree of four levels below its root has,
@@ -38,7 +37,7 @@ pub struct HierarchyBytes {
 #[must_use]
 pub fn encode_hierarchy(nodes: &mut [NodeEntry], max_records: u32) -> HierarchyBytes {
     let most = usize::try_from(max_records).unwrap_or(usize::MAX);
-    nodes.sort_by_cached_key(|n| breadth_first_rank(n.key));
+    nodes.sort_by_cached_key(|n| n.key.breadth_first_rank());
     if let Some(tree) = LinkedTree::new(nodes) {
         return encode(&tree, most);
     }
@@ -49,12 +48,12 @@ pub fn encode_hierarchy(nodes: &mut [NodeEntry], max_records: u32) -> HierarchyB
 /// `nodes` and the ancestors that they lack, in breadth-first order, keys that repeat merged.
 fn with_missing_ancestors(nodes: &[NodeEntry]) -> Vec<NodeEntry> {
     let empty = |key| NodeEntry { key, points: 0, byte_offset: 0, byte_size: 0 };
-    let mut by_rank = BTreeMap::from([(breadth_first_rank(NodeKey::ROOT), empty(NodeKey::ROOT))]);
-    by_rank.extend(nodes.iter().map(|n| (breadth_first_rank(n.key), *n)));
+    let mut by_rank = BTreeMap::from([(NodeKey::ROOT.breadth_first_rank(), empty(NodeKey::ROOT))]);
+    by_rank.extend(nodes.iter().map(|n| (n.key.breadth_first_rank(), *n)));
     for node in nodes {
         let mut key = node.key;
         while let Some(parent) = key.parent() {
-            by_rank.entry(breadth_first_rank(parent)).or_insert(empty(parent));
+            by_rank.entry(parent.breadth_first_rank()).or_insert(empty(parent));
             key = parent;
         }
     }

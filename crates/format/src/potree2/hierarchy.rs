@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
+use crate::octree::ChunkRanges;
 use crate::{NodeKey, ReadError};
 
-use super::chunk::ChunkRanges;
 use super::{Dataset, HIERARCHY_FILE, Node, NodeRecord};
 
 /// The part of the octree that is known, for renderers: it begins with the root's chunk and grows by a chunk whenever

@@ -1,6 +1,7 @@
 //! What `metadata.json` says.
 
 use crate::names::named;
+use crate::octree::OctreeInfo;
 use crate::{Aabb, Attribute, Lattice, NodeKey};
 
 /// How the payloads in `octree.bin` are stored.
@@ -137,24 +138,22 @@ impl Metadata {
     /// The box of a node: the cube halved [`NodeKey::level`] times, as viewers do it.
     #[must_use]
     pub fn node_cube(&self, key: NodeKey) -> Aabb {
-        let mut cube = self.cube;
-        for level in (0..key.level).rev() {
-            for (axis, cell) in [key.x, key.y, key.z].into_iter().enumerate() {
-                let mid = cube.min[axis] + (cube.max[axis] - cube.min[axis]) / 2.0;
-                if cell.checked_shr(level.into()).unwrap_or(0) & 1 == 1 {
-                    cube.min[axis] = mid;
-                } else {
-                    cube.max[axis] = mid;
-                }
-            }
-        }
-        cube
+        self.cube.octant(key)
     }
 
     /// Spacing of the nodes of `level`, world units: halves with every level.
     #[must_use]
     pub fn spacing_at(&self, level: u8) -> f64 {
         self.spacing * (-f64::from(level)).exp2()
+    }
+
+    /// What is the same in all octrees.
+    pub(super) fn octree_info(&self) -> OctreeInfo {
+        let attributes = self.attributes.iter().map(|a| &a.attribute).filter(|a| a.name != "position");
+        let mut info = OctreeInfo::new("Potree 2.0", self.cube, self.spacing, attributes.cloned().collect());
+        info.points = Some(self.points);
+        info.projection.clone_from(&self.projection);
+        info
     }
 
     /// Where `position` stands in [`Self::attributes`]; always there if the metadata was parsed.

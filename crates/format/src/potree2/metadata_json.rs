@@ -1,8 +1,8 @@
 //! Writes `metadata.json`: the reference's keys in the reference's order, arrays on one line.
 
-use std::fmt::Write;
-
 use serde_json::Value;
+
+use crate::json::{number, numbers, string, write_field};
 
 use super::{AttributeStats, Metadata};
 
@@ -20,10 +20,10 @@ fn to_json(metadata: &Metadata) -> String {
     let m = metadata;
     let mut json = String::from("{\n\t\"version\": \"2.0\"");
     let mut field = |name: &str, value: &dyn std::fmt::Display| write_field(&mut json, "\t", name, value);
-    field("name", &text(&m.name));
-    field("description", &text(&m.description));
+    field("name", &string(&m.name));
+    field("description", &string(&m.description));
     field("points", &m.points);
-    field("projection", &text(&m.projection));
+    field("projection", &string(&m.projection));
     field(
         "hierarchy",
         &format_args!(
@@ -36,7 +36,7 @@ fn to_json(metadata: &Metadata) -> String {
     field("spacing", &number(m.spacing));
     let (min, max) = (numbers(&m.cube.min), numbers(&m.cube.max));
     field("boundingBox", &format_args!("{{\n\t\t\"min\": {min},\n\t\t\"max\": {max}\n\t}}"));
-    field("encoding", &text(m.encoding.name()));
+    field("encoding", &string(m.encoding.name()));
     let attributes: Vec<String> = m.attributes.iter().map(attribute).collect();
     field("attributes", &format_args!("[\n\t\t{}\n\t]", attributes.join(",\n\t\t")));
     for (name, value) in &m.extra {
@@ -48,13 +48,13 @@ fn to_json(metadata: &Metadata) -> String {
 
 fn attribute(stats: &AttributeStats) -> String {
     let a = &stats.attribute;
-    let mut json = format!("{{\n\t\t\t\"name\": {}", text(&a.name));
+    let mut json = format!("{{\n\t\t\t\"name\": {}", string(&a.name));
     let mut field = |name: &str, value: &dyn std::fmt::Display| write_field(&mut json, "\t\t\t", name, value);
-    field("description", &text(&a.description));
+    field("description", &string(&a.description));
     field("size", &a.size());
     field("numElements", &a.elements);
     field("elementSize", &a.ty.size());
-    field("type", &text(a.ty.potree_name()));
+    field("type", &string(a.ty.potree_name()));
     if let Some(histogram) = &stats.histogram {
         field("histogram", &Value::from(histogram.as_slice()));
     }
@@ -68,30 +68,4 @@ fn attribute(stats: &AttributeStats) -> String {
     field("offset", &numbers(&a.offset));
     json.push_str("\n\t\t}");
     json
-}
-
-fn write_field(json: &mut String, indent: &str, name: &str, value: &dyn std::fmt::Display) {
-    // Writing to a string cannot fail.
-    let _ = write!(json, ",\n{indent}{}: {value}", text(name));
-}
-
-fn text(text: &str) -> String {
-    Value::from(text).to_string()
-}
-
-fn numbers(values: &[f64]) -> String {
-    format!("[{}]", values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(", "))
-}
-
-/// The shortest text that reads back as the same double; whole numbers without a fraction, as the reference writes
-/// them. What JSON cannot say becomes the nearest thing that it can.
-fn number(value: f64) -> String {
-    let value = if value.is_nan() { 0.0 } else { value.clamp(f64::MIN, f64::MAX) };
-    let negative_zero = value == 0.0 && value.is_sign_negative();
-    // 2^53: up to here every whole number is its own double.
-    if value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0 && !negative_zero {
-        (value as i64).to_string()
-    } else {
-        Value::from(value).to_string()
-    }
 }

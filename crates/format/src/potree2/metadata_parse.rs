@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-use crate::error::json_reason;
+use crate::json::{Fault, Fields, broken, syntax_error, unsupported};
 use crate::{Aabb, Attribute, AttributeType, Lattice, ReadError};
 
 use super::{AttributeStats, Encoding, Metadata};
@@ -26,24 +26,7 @@ impl Metadata {
 fn parse(bytes: &[u8], path: &Path) -> Result<Metadata, ReadError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let value = serde_json::from_slice(bytes).map_err(|e| syntax_error(bytes, path, &e))?;
-    from_value(value).map_err(|fault| match fault {
-        Fault::Broken(what) => ReadError::broken(path, None, what),
-        Fault::Unsupported(what) => ReadError::unsupported(path, what),
-    })
-}
-
-/// What is wrong; the path is added once, above.
-enum Fault {
-    Broken(String),
-    Unsupported(String),
-}
-
-fn broken<T>(what: impl Into<String>) -> Result<T, Fault> {
-    Err(Fault::Broken(what.into()))
-}
-
-fn unsupported<T>(what: impl Into<String>) -> Result<T, Fault> {
-    Err(Fault::Unsupported(what.into()))
+    from_value(value).map_err(|fault| fault.of(path))
 }
 
 fn from_value(value: Value) -> Result<Metadata, Fault> {
@@ -173,92 +156,4 @@ fn histogram(value: Option<Value>, place: &str) -> Result<Option<Vec<u64>>, Faul
         Some(counts) if counts.len() == 256 => Ok(Some(counts)),
         _ => broken(format!("{place}histogram is not an array of 256 counts")),
     }
-}
-
-/// An object whose fields are taken out one by one; `place` stands before their names in messages.
-struct Fields<'a> {
-    map: &'a mut Map<String, Value>,
-    place: &'a str,
-}
-
-impl Fields<'_> {
-    fn take(&mut self, key: &str) -> Option<Value> {
-        self.map.remove(key)
-    }
-
-    /// A string; empty if there is none.
-    fn text(&mut self, key: &str) -> Result<String, Fault> {
-        match self.take(key) {
-            None => Ok(String::new()),
-            Some(Value::String(text)) => Ok(text),
-            Some(other) => self.wrong(key, "a string", &other),
-        }
-    }
-
-    fn object(&mut self, key: &str) -> Result<Map<String, Value>, Fault> {
-        match self.take(key) {
-            Some(Value::Object(map)) => Ok(map),
-            Some(other) => self.wrong(key, "an object", &other),
-            None => broken(format!("{key} is missing")),
-        }
-    }
-
-    fn integer(&mut self, key: &str) -> Result<u64, Fault> {
-        match self.take(key) {
-            None => broken(format!("{}{key} is missing", self.place)),
-            Some(value) => value.as_u64().map_or_else(|| self.wrong(key, "a whole number, at least 0", &value), Ok),
-        }
-    }
-
-    /// An integer that readers take as a hint; 0 if there is none.
-    fn small(&mut self, key: &str) -> Result<u32, Fault> {
-        let Some(value) = self.take(key) else { return Ok(0) };
-        let small = value.as_u64().and_then(|v| u32::try_from(v).ok());
-        small.map_or_else(|| self.wrong(key, "a whole number below 2^32", &value), Ok)
-    }
-
-    fn number(&mut self, key: &str) -> Result<f64, Fault> {
-        match self.take(key) {
-            None => broken(format!("{}{key} is missing", self.place)),
-            Some(value) => value.as_f64().map_or_else(|| self.wrong(key, "a number", &value), Ok),
-        }
-    }
-
-    fn numbers(&mut self, key: &str) -> Result<Option<Vec<f64>>, Fault> {
-        let Some(value) = self.take(key) else { return Ok(None) };
-        let numbers = value.as_array().and_then(|list| list.iter().map(Value::as_f64).collect());
-        numbers.map_or_else(|| self.wrong(key, "an array of numbers", &value), |n| Ok(Some(n)))
-    }
-
-    fn vector(&mut self, key: &str) -> Result<[f64; 3], Fault> {
-        match self.numbers(key)?.as_deref() {
-            Some(&[x, y, z]) => Ok([x, y, z]),
-            Some(other) => broken(format!("{}{key} has {} numbers, not 3", self.place, other.len())),
-            None => broken(format!("{}{key} is missing", self.place)),
-        }
-    }
-
-    fn wrong<T>(&self, key: &str, expected: &str, found: &Value) -> Result<T, Fault> {
-        let mut found = found.to_string();
-        if let Some((end, _)) = found.char_indices().nth(40) {
-            found.truncate(end);
-            found.push('…');
-        }
-        broken(format!("{}{key} is {found}, not {expected}", self.place))
-    }
-}
-
-/// Says where JSON ends to be JSON, and names the one fault that the reference converter is known for.
-fn syntax_error(bytes: &[u8], path: &Path, error: &serde_json::Error) -> ReadError {
-    let line_start: usize =
-        bytes.split_inclusive(|b| *b == b'\n').take(error.line().saturating_sub(1)).map(<[u8]>::len).sum();
-    let offset = (line_start + error.column().saturating_sub(1)).min(bytes.len());
-    let word = bytes[offset..].trim_ascii_start();
-    let word = word.strip_prefix(b"-").unwrap_or(word);
-    if word.starts_with(b"inf") || word.starts_with(b"nan") {
-        let what = "is not valid JSON: a number is written as inf or nan";
-        return ReadError::broken(path, offset as u64, what)
-            .advise("PotreeConverter does so for attributes that it leaves empty; replace the word by 0");
-    }
-    ReadError::broken(path, offset as u64, format!("is not valid JSON: {}", json_reason(error)))
 }

@@ -41,6 +41,7 @@ mod metadata_json;
 mod metadata_parse;
 mod morton;
 mod node_points;
+mod octree;
 mod payload;
 mod record;
 

@@ -1,7 +1,6 @@
 //! What Potree 2.0 interleaves. In payloads x owns bit 0; in the names of nodes z does.
 
-use crate::NodeKey;
-use crate::geometry::morton::{deinterleave16, morton21, morton32};
+use crate::geometry::morton::{deinterleave16, morton21};
 
 /// The position as Potree's BROTLI encoding keeps it: the (upper, lower) words, Morton codes of bits 16–31 and 0–15.
 pub(super) fn position_words(p: [i32; 3]) -> (u64, u64) {
@@ -13,11 +12,6 @@ pub(super) fn position_words(p: [i32; 3]) -> (u64, u64) {
 pub(super) fn position_from_words(upper: u64, lower: u64) -> [i32; 3] {
     let (upper, lower) = (deinterleave16(upper), deinterleave16(lower));
     std::array::from_fn(|a| (u32::from(upper[a]) << 16 | u32::from(lower[a])) as i32)
-}
-
-/// Where a node stands in breadth-first order: the level in the top bits, then the digits of the name.
-pub(super) fn breadth_first_rank(key: NodeKey) -> u128 {
-    u128::from(key.level) << 96 | morton32([key.z, key.y, key.x])
 }
 
 #[cfg(test)]
@@ -37,13 +31,5 @@ mod tests {
             let (upper, lower) = position_words(p);
             assert_eq!(position_from_words(upper, lower), p);
         }
-    }
-
-    #[test]
-    fn ranks_order_nodes_by_level_and_then_by_name() {
-        let deep = format!("r{}", "0".repeat(31));
-        let names = ["r", "r0", "r3", "r7", "r00", "r04", "r40", "r777", &deep];
-        let ranks = names.map(|n| breadth_first_rank(NodeKey::from_name(n).unwrap()));
-        assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:x?}");
     }
 }

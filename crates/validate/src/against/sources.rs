@@ -11,14 +11,14 @@ use rayon::prelude::*;
 use super::block::{BLOCK_POINTS, Block};
 use super::opened::{Common, Look, Opened};
 use super::rules::Rules;
-use super::shelf::{Gathered, Shelf, Source};
+use super::shelf::{Gathered, PIECES_TOGETHER, Shelf, Source};
 use crate::options::{Progress, ProgressFn};
 
 /// All scans.
 pub(crate) struct Sources {
     pub(crate) list: Vec<Source>,
-    /// (source, piece), all of them.
-    pieces: Vec<(u32, u32)>,
+    /// (source, first piece) of all that a thread decodes together.
+    pairs: Vec<(u32, u32)>,
     pub(crate) points: u64,
     shelf: Shelf,
     common: Common,
@@ -43,7 +43,7 @@ impl Sources {
         };
         Ok(Self {
             list: all.list,
-            pieces: all.pieces,
+            pairs: all.pairs,
             points: all.points,
             shelf,
             common: Common {
@@ -87,25 +87,29 @@ impl Sources {
         let done = AtomicU64::new(0);
         let failed = AtomicBool::new(false);
         self.common.deviating.iter().for_each(|count| count.store(0, Relaxed));
-        self.pieces.par_iter().with_max_len(1).try_for_each(|&(at, piece)| {
+        self.pairs.par_iter().with_max_len(1).try_for_each(|&(at, first)| {
             if failed.load(Relaxed) {
                 return Ok(()); // another piece brings the error
             }
-            let (at, piece) = (at as usize, piece as usize);
-            let source = self.open_again(at, piece, rules)?;
+            let (at, first) = (at as usize, first as usize);
+            let source = self.open_again(at, rules)?;
             let pop = idle.lock().map_or(None, |mut idle| idle.pop());
             let (mut scratch, mut block) = pop.unwrap_or_default();
             let wanted = source.wanted();
-            let result = source.scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
-                for start in (0..batch.len()).step_by(BLOCK_POINTS) {
-                    let points = (batch.len() - start).min(BLOCK_POINTS);
-                    source.fill(batch, start, points, (&self.common, rules), &mut block);
-                    work(&mut block, at);
-                }
-                let batch_points = batch.len() as u64;
-                let done = done.fetch_add(batch_points, Relaxed) + batch_points;
-                progress(Progress { phase, done, total: self.points });
-                ControlFlow::Continue(())
+            let pieces = first..(first + PIECES_TOGETHER as usize).min(self.list[at].pieces);
+            let result = pieces.clone().try_for_each(|piece| {
+                scratch.next_piece = Some(piece + 1).filter(|next| pieces.contains(next));
+                source.scan.decode(piece, &wanted, &mut scratch, &mut |batch| {
+                    for start in (0..batch.len()).step_by(BLOCK_POINTS) {
+                        let points = (batch.len() - start).min(BLOCK_POINTS);
+                        source.fill(batch, start, points, (&self.common, rules), &mut block);
+                        work(&mut block, at);
+                    }
+                    let batch_points = batch.len() as u64;
+                    let done = done.fetch_add(batch_points, Relaxed) + batch_points;
+                    progress(Progress { phase, done, total: self.points });
+                    ControlFlow::Continue(())
+                })
             });
             if let Ok(mut idle) = idle.lock() {
                 idle.push((scratch, block));
@@ -119,10 +123,10 @@ impl Sources {
 }
 
 impl Sources {
-    fn open_again(&self, at: usize, piece: usize, rules: &Rules) -> Result<Arc<Opened>, ReadError> {
+    fn open_again(&self, at: usize, rules: &Rules) -> Result<Arc<Opened>, ReadError> {
         let path = &self.list[at].path;
         let source = self.shelf.get(at, path, rules)?;
-        match source.scan.pieces().len() == self.list[at].pieces && piece < self.list[at].pieces {
+        match source.scan.pieces().len() == self.list[at].pieces {
             true => Ok(source),
             false => Err(ReadError::broken(path, None, "has changed since it was opened first")),
         }

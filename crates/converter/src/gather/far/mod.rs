@@ -32,19 +32,22 @@ pub(super) fn find(
     rt: &Runtime<'_>,
 ) -> Result<Option<FarPoints>, ConvertError> {
     let parts = rt.in_parallel(
-        sources.pieces(),
+        sources.pairs(),
         || (Default::default(), Recent::default(), Scratch::default()),
-        |(spreads, recent, scratch), unit| {
-            let (source, piece) = sources.piece(unit);
-            add_piece(&*sources.scan(source)?, piece, cut, scratch, |p| {
-                if recent.is_new(p) {
-                    let spreads: &mut [Spread; 3] = spreads;
-                    spreads.iter_mut().zip(p).for_each(|(spread, v)| spread.add(v));
-                }
-            });
+        |(spreads, recent, scratch): &mut ([Spread; 3], Recent, Scratch), unit| {
+            let (source, pieces) = sources.pair(unit);
+            let scan = sources.scan(source)?;
+            for piece in pieces.clone() {
+                scratch.next_piece = Some(piece + 1).filter(|next| pieces.contains(next));
+                add_piece(&*scan, piece, cut, scratch, |p| {
+                    if recent.is_new(p) {
+                        spreads.iter_mut().zip(p).for_each(|(spread, v)| spread.add(v));
+                    }
+                });
+            }
             Ok(())
         },
-        |(spreads, _, _): ([Spread; 3], Recent, Scratch)| spreads,
+        |(spreads, _, _)| spreads,
     )?;
     let mut all: [Spread; 3] = Default::default();
     for part in parts {

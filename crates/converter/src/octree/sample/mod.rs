@@ -1,7 +1,7 @@
 //! How an inner node chooses its points from those of its children.
 //!
-//! All samplers see the candidates in Morton order, in tree coordinates, and what neighbours of the same level that were
-//! sampled before have taken near the border; they depend on nothing else.
+//! All samplers see the candidates in Morton order, in tree coordinates, and what neighbours of the same level that
+//! were sampled before have taken near the border; they depend on nothing else.
 
 mod cells;
 mod lanes;
@@ -110,15 +110,16 @@ impl Sampler {
         self.candidates.extend(points);
     }
 
-    /// One flag for each candidate since the last call: true if the node takes it. Where neighbours have taken nothing, at
-    /// least one of all candidates of a node is taken. Between two calls for a node, no part may be cut
+    /// One flag for each candidate since the last call: true if the node takes it. Where neighbours have taken nothing,
+    /// at least one of all candidates of a node is taken. Between two calls for a node, no part may be cut
     /// ([`Self::may_be_cut`]).
     pub(crate) fn choose(&mut self) -> &[bool] {
         self.accepted.clear();
         self.accepted.resize(self.candidates.len(), false);
         let level = self.node.level;
         match (&mut self.method, self.spacing.unit_bits(level)) {
-            // The spacing is less than one unit: only repeated places conflict, and they are neighbours in Morton order.
+            // The spacing is less than one unit: only repeated places conflict, and they are neighbours in Morton
+            // order.
             (_, None) => {
                 for (i, accepted) in self.accepted.iter_mut().enumerate() {
                     *accepted = i == 0 || self.candidates[i] != self.candidates[i - 1];

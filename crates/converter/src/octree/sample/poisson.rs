@@ -2,21 +2,21 @@
 //! to one that was taken. By greedy choice in a fixed order.
 //!
 //! Candidates come in Morton order, so those of a cube are one run, and so are the points taken from it. The node is
-//! walked in *tiles* of four units, each a spacing or a little more. When a tile's run begins, the few points around it that can
-//! conflict (closer than the spacing to the tile's box) are found by [`Taken`]; then [`Tile`] chooses among the candidates of
-//! the run.
+//! walked in *tiles* of four units, each a spacing or a little more. When a tile's run begins, the few points around it
+//! that can conflict (closer than the spacing to the tile's box) are found by [`Taken`]; then [`Tile`] chooses among
+//! the candidates of the run.
 //!
 //! Within a tile the candidates are visited in a scattered order. Any sweep (along the Morton curve, outwards from a
 //! centre) packs each point against the ones before: nearest neighbours are then 1.04 to 1.08 spacings apart on a dense
 //! plane. Scattered, they are 1.09 to 1.12 apart, with a sixth fewer points and no hole larger.
 //!
 //! Distances are compared in `f32`, in units from the corner of the tile (-1 to 5, so a coordinate is off by 2^-22 at
-//! most): a pair conflicts below the spacing plus a margin, which is more than all rounding together. So no pair is ever
-//! closer than the spacing, exactly; and a candidate that was omitted lies within 1.00002 spacings of one that was not
-//! (`MARGIN`, and the same rounding once more).
+//! most): a pair conflicts below the spacing plus a margin, which is more than all rounding together. So no pair is
+//! ever closer than the spacing, exactly; and a candidate that was omitted lies within 1.00002 spacings of one that was
+//! not (`MARGIN`, and the same rounding once more).
 //!
-//! What neighbours have taken over the border of the node ([`OverBorder`]) is among the points around a tile, and is kept
-//! at the same distance.
+//! What neighbours have taken over the border of the node ([`OverBorder`]) is among the points around a tile, and is
+//! kept at the same distance.
 
 #[cfg(target_arch = "x86_64")]
 use super::lanes::Avx2;
@@ -28,8 +28,8 @@ use super::tile::Tile;
 use crate::cloud::TreePoint;
 use crate::runtime::Vectors;
 
-/// Added to the squared spacing (at least a quarter of a squared unit): coordinates carry an error of 2^-22, differences
-/// of 2^-21, squared distances near 1 of 2·√3·2^-21 + rounding < 1.9e-6.
+/// Added to the squared spacing (at least a quarter of a squared unit): coordinates carry an error of 2^-22,
+/// differences of 2^-21, squared distances near 1 of 2·√3·2^-21 + rounding < 1.9e-6.
 const MARGIN: f32 = 3e-6;
 
 /// What a thread needs to choose, kept from node to node.
@@ -37,7 +37,8 @@ pub(super) struct Poisson {
     vectors: Vectors,
     /// Squared distances (in squared units) below this conflict.
     conflict_below: f32,
-    /// More points of a node cannot be that far apart: spheres as dense as they can be packed, and some over the border.
+    /// More points of a node cannot be that far apart: spheres as dense as they can be packed, and some over the
+    /// border.
     most_taken: u64,
     taken: Taken,
     tile: Tile,
@@ -75,8 +76,8 @@ impl Poisson {
         candidates.min(self.most_taken) * size_of::<TreePoint>() as u64
     }
 
-    /// Makes room for what a node may take of so many candidates, so that the list never moves: what is not touched costs
-    /// no memory.
+    /// Makes room for what a node may take of so many candidates, so that the list never moves: what is not touched
+    /// costs no memory.
     pub(super) fn expect(&mut self, candidates: u64) {
         self.taken.reserve(candidates.min(self.most_taken) as usize);
     }

@@ -30,8 +30,8 @@ impl Sampling {
 
 /// The distance that the points of a level keep: the side of a node divided by the same number on every level.
 ///
-/// A node has `2^bits` *units* along each axis, powers of two of tree coordinates; the spacing is a whole unit or less, but
-/// more than half of one.
+/// A node has `2^bits` *units* along each axis, powers of two of tree coordinates; the spacing is a whole unit or less,
+/// but more than half of one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spacing {
     divisor: f64,
@@ -73,8 +73,8 @@ impl Spacing {
         (2f64.powi(TREE_BITS as i32 - i32::from(level)) / self.divisor).powi(2)
     }
 
-    /// Whole tree coordinates that are not less than the spacing; `None` where nodes are too small for one another's points
-    /// to matter: what lies at one place lies in one node.
+    /// Whole tree coordinates that are not less than the spacing; `None` where nodes are too small for one another's
+    /// points to matter: what lies at one place lies in one node.
     pub(in crate::octree) fn reach(self, level: u8) -> Option<u32> {
         self.unit_bits(level).map(|_| self.squared(level).sqrt().ceil() as u32)
     }

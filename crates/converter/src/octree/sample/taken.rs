@@ -18,8 +18,8 @@ pub(super) struct Taken {
     reach: f64,
     /// A node has `2^grid_bits` cells along each axis.
     grid_bits: u32,
-    /// One bit for each cell from which a point was taken, a word for each column of cells: bit z of word (x + 1, y + 1). The
-    /// columns around the node stay empty.
+    /// One bit for each cell from which a point was taken, a word for each column of cells: bit z of word
+    /// (x + 1, y + 1). The columns around the node stay empty.
     occupied: Vec<u64>,
     /// Range in `points` of each occupied cell, by Morton code of the cell: neighbours in space are near in memory.
     ranges: Vec<Range>,
@@ -135,8 +135,8 @@ impl Taken {
         }
     }
 
-    /// The occupied ones of the cells from the one before a tile to the one behind it, four an axis: bits x, y, z of two bits each
-    /// make the number of a bit. `cell`: the first of the tile. The tile's own are not occupied yet.
+    /// The occupied ones of the cells from the one before a tile to the one behind it, four an axis: bits x, y, z of
+    /// two bits each make the number of a bit. `cell`: the first of the tile. The tile's own are not occupied yet.
     #[inline(always)]
     fn cells_around(&self, cell: [u32; 3]) -> u64 {
         // a word is turned so that the cell before the tile comes first; the ends of the node do not touch

@@ -10,8 +10,9 @@ const BLOCK: usize = 64;
 
 /// Candidates of a tile, in the order in which they are visited, and the taken points that they may conflict with.
 ///
-/// The taken points are few: each strikes out all candidates near to it, eight at a time; the next that is left is taken, and
-/// strikes out in turn. So the only branches are one for each point that is taken, and no candidate waits for the one before.
+/// The taken points are few: each strikes out all candidates near to it, eight at a time; the next that is left is
+/// taken, and strikes out in turn. So the only branches are one for each point that is taken, and no candidate waits
+/// for the one before.
 pub(super) struct Tile {
     /// The lower corner, in tree coordinates.
     corner: [u32; 3],
@@ -106,7 +107,8 @@ impl Tile {
         }
     }
 
-    /// Adds a taken point around the tile if `is_near`: without a branch, since nobody can predict it. There must be room.
+    /// Adds a taken point around the tile if `is_near`: without a branch, since nobody can predict it. There must be
+    /// room.
     #[inline(always)]
     pub(super) fn push_near_if(&mut self, is_near: bool, point: TreePoint) {
         if let Some(slot) = self.near.get_mut(self.near_count) {

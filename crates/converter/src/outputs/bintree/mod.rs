@@ -10,6 +10,7 @@
 //! Planes come from exact integers, so the tree is the same for any order of points, number of threads and memory.
 
 mod assemble;
+mod extent;
 mod files;
 mod item;
 mod large;

@@ -79,4 +79,24 @@ mod tests {
             }
         }
     }
+    #[test]
+    fn each_set_of_instructions_makes_the_same_codes() {
+        let mut random = Random::new(8);
+        for (count, shift) in [(0, 0), (1, 0), (9, 11), (130, 3), (130, 11)] {
+            let q = |random: &mut Random| StoredPoint(std::array::from_fn(|_| random.next_u32() as i32));
+            let items: Vec<Item> = (0..count).map(|record| Item { q: q(&mut random), record }).collect();
+            let min: [i32; 3] = std::array::from_fn(|a| items.iter().map(|i| i.q[a]).min().unwrap_or(0));
+            // bit k of x is bit 3k + 2, of y 3k + 1, of z 3k; 21 bits of each
+            let code = |item: &Item| -> u64 {
+                let c: [u64; 3] = std::array::from_fn(|a| (i64::from(item.q[a]) - i64::from(min[a])) as u64 >> shift);
+                (0..21).map(|k| (0..3).map(|a| (c[a] >> k & 1) << (3 * k + 2 - a)).sum::<u64>()).sum()
+            };
+            let expected: Vec<u64> = items.iter().map(code).collect();
+            for vectors in Vectors::all() {
+                let mut codes = Vec::new();
+                put_codes(vectors, &items, min, shift, &mut codes);
+                assert_eq!(codes, expected, "{vectors:?}");
+            }
+        }
+    }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, RecordLayout, leaf_center};
 use pointmill_format::{Aabb, Deviations, Lattice};
 
+use super::extent::Extent;
 use super::files::Leaves;
 use super::item::Item;
 use super::leaf::Columns;
@@ -15,7 +16,7 @@ use super::upper::Task;
 use crate::cloud::{Cloud, JobBounds, Ledger, Moments, MortonSorter, StoredOrigin, StoredPoint, position};
 use crate::error::ConvertError;
 use crate::outputs::recovery::{Lost, Recovery};
-use crate::runtime::{Vectors, os_hints, vectorized};
+use crate::runtime::os_hints;
 
 /// Leaves above this are counted in the memory of a task.
 const LARGE_LEAF: u32 = 100_000;
@@ -60,13 +61,6 @@ enum What {
     Cut {
         leaves: usize,
     },
-}
-
-/// Extremes and sums of a range, in stored integers.
-struct Extent {
-    min: [i32; 3],
-    max: [i32; 3],
-    sum: [i64; 3],
 }
 
 impl<'a> Builder<'a> {
@@ -164,7 +158,7 @@ impl<'a> Builder<'a> {
         let inner = |kind| Some(Node::new(Aabb::EMPTY, count as u64, kind));
         let leaves = match what {
             What::Split => {
-                let extent = extent(Vectors::best(), &self.items[range.clone()]);
+                let extent = Extent::of(&self.items[range.clone()]);
                 if count <= capacity {
                     return self.leaf(&range, &extent, &path, start, true, ledger).map(Some);
                 }
@@ -190,7 +184,7 @@ impl<'a> Builder<'a> {
             What::Cut { leaves } => leaves,
         };
         if leaves == 1 {
-            let extent = extent(Vectors::best(), &self.items[range.clone()]);
+            let extent = Extent::of(&self.items[range.clone()]);
             return self.leaf(&range, &extent, &path, start, false, ledger).map(Some);
         }
         // Runs differ by one point at most, larger ones first.
@@ -313,23 +307,6 @@ impl World<'_> {
     fn of(&self, q: StoredPoint) -> [f64; 3] {
         self.lattice.world(self.origin.job(q).0)
     }
-}
-
-vectorized! {
-    fn extent(items: &[Item]) -> Extent = extent_anyhow;
-}
-
-#[inline(always)]
-fn extent_anyhow(items: &[Item]) -> Extent {
-    let mut e = Extent { min: [i32::MAX; 3], max: [i32::MIN; 3], sum: [0; 3] };
-    for item in items {
-        for a in 0..3 {
-            e.min[a] = e.min[a].min(item.q[a]);
-            e.max[a] = e.max[a].max(item.q[a]);
-            e.sum[a] += i64::from(item.q[a]);
-        }
-    }
-    e
 }
 
 /// Boxes of inner nodes: the unions of what is below. Children come after their parents, so backwards.

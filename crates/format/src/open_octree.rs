@@ -1,0 +1,20 @@
+//! Opens an octree of any kind.
+
+use std::path::Path;
+
+use crate::dataset_kind::{DatasetKind, locate};
+use crate::octree::Octree;
+use crate::{ReadError, potree1, potree2};
+
+/// Opens the octree at `path`, a folder or its marker file; which kind it is, the names of files tell ([`locate`]).
+///
+/// # Errors
+/// There is no dataset, or one that is no octree, or those of opening it.
+pub fn open_octree(path: impl AsRef<Path>) -> Result<Box<dyn Octree>, ReadError> {
+    let located = locate(path)?;
+    match located.kind {
+        DatasetKind::Potree1 => Ok(Box::new(potree1::Dataset::open(&located.path)?)),
+        DatasetKind::Potree2 => Ok(Box::new(potree2::Dataset::open(&located.path)?)),
+        other => Err(ReadError::unsupported(&located.path, format!("a {}, no octree", other.title()))),
+    }
+}
