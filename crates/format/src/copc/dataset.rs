@@ -72,6 +72,11 @@ impl Dataset {
         self.file.point_format
     }
 
+    /// The number of points by the header of the file, unchecked.
+    pub fn points_declared(&self) -> u64 {
+        self.file.points
+    }
+
     /// The box of the points by the header of the file, unchecked; `None` if it says nothing or nonsense.
     pub fn bounds_declared(&self) -> Option<Aabb> {
         self.file.bounds
@@ -207,12 +212,8 @@ impl Dataset {
         if points == 0 {
             return Ok(());
         }
-        let (most, allowed) = (bytes.max(points.saturating_mul(self.file.record_len() as u64)), self.max_node_bytes);
-        if most > allowed {
-            let what = format!("node {key} would take {most} bytes of memory, {allowed} are allowed");
-            return Err(ReadError::memory(self.file.path(), what));
-        }
-        self.file.decode(ChunkPlace { offset, bytes, points }, &format!("node {key}"), stored, positions, columns)
+        let place = ChunkPlace { offset, bytes, points, most_bytes: self.max_node_bytes };
+        self.file.decode(place, &format!("node {key}"), stored, positions, columns)
     }
 }
 

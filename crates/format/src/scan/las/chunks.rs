@@ -27,6 +27,8 @@ pub(crate) struct ChunkPlace {
     pub(crate) offset: u64,
     pub(crate) bytes: u64,
     pub(crate) points: u64,
+    /// More bytes than this, stored or as records, are refused.
+    pub(crate) most_bytes: u64,
 }
 
 /// A compressed file of layered chunks (point formats 6–10).
@@ -123,11 +125,6 @@ impl ChunkFile {
         &self.schema.attributes
     }
 
-    /// Bytes of a point before compression.
-    pub(crate) fn record_len(&self) -> usize {
-        self.layout.record_len
-    }
-
     /// First byte of the first chunk.
     pub(crate) fn chunks_start(&self) -> u64 {
         self.layout.chunks_start()
@@ -174,7 +171,7 @@ impl ChunkFile {
 
     /// Reads the bytes of a chunk, and compares what its head says.
     fn read(&self, place: ChunkPlace, who: &str, stored: &mut Vec<u8>) -> Result<(), ReadError> {
-        let ChunkPlace { offset, bytes, points } = place;
+        let ChunkPlace { offset, bytes, points, most_bytes } = place;
         let path = self.source.path();
         stored.clear();
         let head = (self.layout.record_len + 4 + 4 * self.layout.layers) as u64;
@@ -192,6 +189,11 @@ impl ChunkFile {
                 let what = format!("{who} should have {points} points in {bytes} bytes, but no chunk begins there");
                 return Err(ReadError::broken(path, offset, what).advise(Advice::Damaged));
             }
+        }
+        let most = bytes.max(points.saturating_mul(self.layout.record_len as u64));
+        if most > most_bytes {
+            let what = format!("{who} would take {most} bytes of memory, {most_bytes} are allowed");
+            return Err(ReadError::memory(path, what));
         }
         let room = usize::try_from(bytes).ok().filter(|len| stored.try_reserve_exact(*len).is_ok());
         let Some(len) = room else {
@@ -247,7 +249,7 @@ impl ChunkFile {
     }
 
     fn error(&self, place: ChunkPlace, who: &str, good: usize, stop: Stop) -> ReadError {
-        let ChunkPlace { offset, bytes, points } = place;
+        let ChunkPlace { offset, bytes, points, .. } = place;
         let (at, why, advice) = match stop {
             Stop::CutShort => (bytes, "the bytes end".to_owned(), Advice::CutShort),
             Stop::LayerEnds { at, layer } => (at as u64, format!("the layer of {layer} ends early"), Advice::Damaged),
