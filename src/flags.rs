@@ -138,6 +138,7 @@ pub(crate) fn warning_line(warning: &Warning) -> String {
 pub(crate) fn drop_reason(why: &DropReason) -> String {
     match why {
         DropReason::NotUsual => format!("{why}; --attributes adds it"),
+        DropReason::NoPlace("1.7") => format!("{why}; --potree1-version 1.8 has"),
         other => other.to_string(),
     }
 }

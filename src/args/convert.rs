@@ -27,7 +27,7 @@ pub(crate) struct ConvertArgs {
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 
-    /// Output format; repeat --to to write several formats in one run, to OUT/potree2, OUT/bintree and OUT/batches
+    /// Output format; repeat --to to write several formats in one run, to OUT/potree2, OUT/bintree and so on
     #[arg(long, value_name = "FORMAT", default_value = "potree2", help_heading = "Output")]
     pub(crate) to: Vec<TargetArg>,
     /// Replaces OUT if it is a dataset; the old dataset is kept until the new one is complete
@@ -65,6 +65,8 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_enum, help_heading = "Output")]
     pub(crate) dark_colours: Option<DarkColoursArg>,
     #[command(flatten)]
+    pub(crate) potree1: Potree1Args,
+    #[command(flatten)]
     pub(crate) bintree: BintreeArgs,
     #[command(flatten)]
     pub(crate) batches: BatchesArgs,
@@ -75,7 +77,7 @@ pub(crate) struct ConvertArgs {
     pub(crate) scale: Scale,
 
     /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
-    /// [default: all for potree2, classification for bintree, colour for batches]
+    /// [default: all for potree2, colour for potree1 and batches, classification for bintree]
     #[arg(long, value_name = "all|scene|LIST", value_parser = parse_attributes, help_heading = "Selecting data")]
     pub(crate) attributes: Option<Attributes>,
     /// Keeps only points inside this box, in world coordinates
@@ -141,6 +143,15 @@ pub(crate) struct ConvertArgs {
     pub(crate) talk: TalkArgs,
 }
 
+/// Settings of an octree before Potree 2.0.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Potree1Args {
+    /// Version of the octree: 1.7, which every client reads, holds colour, intensity, classification and normals; 1.8 any
+    /// attribute, and Potree and BA_PointCloud alone read it [default: 1.7]
+    #[arg(long, value_enum, value_name = "VERSION", help_heading = "Output: potree1")]
+    pub(crate) potree1_version: Option<Potree1VersionArg>,
+}
+
 /// Settings of a mean-split binary tree.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BintreeArgs {
@@ -199,7 +210,7 @@ pub(crate) enum LayoutArg {
 pub(crate) enum TargetArg {
     /// Octree with levels of detail, for Potree and compatible viewers
     Potree2,
-    #[value(hide = true)]
+    /// The octree before Potree 2.0, a file per node: for engines, three-loader and installations that read nothing newer
     Potree1,
     /// Mean-split binary tree with tight boxes, which draws every point at every distance
     Bintree,
@@ -217,6 +228,14 @@ impl TargetArg {
             Self::Batches => "batches",
         }
     }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Potree1VersionArg {
+    #[value(name = "1.7")]
+    V1_7,
+    #[value(name = "1.8")]
+    V1_8,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -57,12 +57,15 @@ fn what(error: &Error, commands: &[String]) -> String {
 /// A value that is none of the choices, or none at all.
 fn unknown_value(error: &Error, name: &str) -> String {
     let value = text(error, ContextKind::InvalidValue);
-    let choices = texts(error, ContextKind::ValidValue).join(", ");
-    match (value.as_str(), choices.as_str()) {
+    let all = texts(error, ContextKind::ValidValue);
+    match (value.as_str(), all.join(", ").as_str()) {
         ("", "") => format!("{name} needs a value"),
         ("", choices) => format!("{name} needs a value: {choices}"),
         (value, choices) => {
-            format!("{name} '{value}': expected one of {choices}{}", meant(error, ContextKind::SuggestedValue))
+            // of several that begin so the first is the usual one
+            let begun = all.iter().find(|choice| choice.starts_with(value)).map(|near| did_you_mean(near));
+            let meant = begun.unwrap_or_else(|| meant(error, ContextKind::SuggestedValue));
+            format!("{name} '{value}': expected one of {choices}{meant}")
         }
     }
 }
@@ -75,7 +78,11 @@ fn missing(arguments: &[String]) -> String {
 
 /// "; did you mean --memory?".
 fn meant(error: &Error, kind: ContextKind) -> String {
-    texts(error, kind).first().map_or_else(String::new, |near| format!("; did you mean {near}?"))
+    texts(error, kind).first().map_or_else(String::new, |near| did_you_mean(near))
+}
+
+fn did_you_mean(near: &str) -> String {
+    format!("; did you mean {near}?")
 }
 
 /// `--to` of `--to <FORMAT>`, `INPUT` of `[INPUT]...`; what was typed, shortened.

@@ -4,14 +4,16 @@ use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
     AttributeChoice, BatchesSettings, BintreeSettings, DarkColours, Duplicates, Encoding, Filter, OnFault,
-    OriginPoints, Outliers, Plan, Potree2Settings, Report, RgbDepth, Sampling, ScaleChoice, Target,
+    OriginPoints, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, RgbDepth, Sampling,
+    ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
 use super::report_file::ReportFile;
 use crate::args::{
     Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg,
-    FaultArg, LayoutArg, OriginPointsArg, OutliersArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    FaultArg, LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg, SplitArg,
+    TargetArg,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
@@ -85,43 +87,61 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
             TargetArg::Potree2 => potree2_settings(args).into(),
             TargetArg::Bintree => bintree_settings(&args.bintree).into(),
             TargetArg::Batches => batches_settings(&args.batches).into(),
-            TargetArg::Potree1 => {
-                let line =
-                    "--to potree1 is not supported by this version; the formats are potree2, bintree and batches";
-                return Err(Failure::Unsupported(line.to_owned()));
-            }
+            TargetArg::Potree1 => potree1_settings(args).into(),
         };
         targets.push(target);
     }
     let (tree, batches) = (&args.bintree, &args.batches);
-    let given = [
-        ("--sampling", TargetArg::Potree2, args.sampling.is_some()),
-        ("--encoding", TargetArg::Potree2, args.encoding.is_some()),
-        ("--spacing", TargetArg::Potree2, args.spacing.is_some()),
-        ("--leaf-capacity", TargetArg::Potree2, args.leaf_capacity.is_some()),
-        ("--dark-colours", TargetArg::Potree2, args.dark_colours.is_some()),
-        ("--capacity", TargetArg::Bintree, tree.capacity.is_some()),
-        ("--split", TargetArg::Bintree, tree.split.is_some()),
-        ("--layout", TargetArg::Bintree, tree.layout.is_some()),
-        ("--lod-cell", TargetArg::Batches, batches.lod_cell.is_some()),
-        ("--planes", TargetArg::Batches, batches.planes.is_some()),
-        ("--compress", TargetArg::Batches, batches.compress.is_some()),
-        ("--no-originals", TargetArg::Batches, batches.no_originals),
+    let octrees: &[TargetArg] = &[TargetArg::Potree2, TargetArg::Potree1];
+    let given: &[(&str, &[TargetArg], bool)] = &[
+        ("--sampling", octrees, args.sampling.is_some()),
+        ("--spacing", octrees, args.spacing.is_some()),
+        ("--leaf-capacity", octrees, args.leaf_capacity.is_some()),
+        ("--encoding", &[TargetArg::Potree2], args.encoding.is_some()),
+        ("--dark-colours", &[TargetArg::Potree2], args.dark_colours.is_some()),
+        ("--potree1-version", &[TargetArg::Potree1], args.potree1.potree1_version.is_some()),
+        ("--capacity", &[TargetArg::Bintree], tree.capacity.is_some()),
+        ("--split", &[TargetArg::Bintree], tree.split.is_some()),
+        ("--layout", &[TargetArg::Bintree], tree.layout.is_some()),
+        ("--lod-cell", &[TargetArg::Batches], batches.lod_cell.is_some()),
+        ("--planes", &[TargetArg::Batches], batches.planes.is_some()),
+        ("--compress", &[TargetArg::Batches], batches.compress.is_some()),
+        ("--no-originals", &[TargetArg::Batches], batches.no_originals),
     ];
-    if let Some((option, to, _)) = given.iter().find(|(_, to, given)| *given && !args.to.contains(to)) {
-        return Err(Failure::Usage(format!("{option} requires --to {}", to.name())));
+    let is_useless = |of: &[TargetArg]| !of.iter().any(|to| args.to.contains(to));
+    if let Some((option, of, _)) = given.iter().find(|(_, of, given)| *given && is_useless(of)) {
+        let names: Vec<&str> = of.iter().map(|to| to.name()).collect();
+        return Err(Failure::Usage(format!("{option} requires --to {}", names.join(" or "))));
     }
     Ok(targets)
+}
+
+/// How inner nodes of octrees choose their points.
+fn sampling(args: &ConvertArgs) -> Option<Sampling> {
+    args.sampling.map(|s| match s {
+        SamplingArg::Random => Sampling::Random { seed: args.seed.unwrap_or(SEED) },
+        SamplingArg::Poisson => Sampling::Poisson,
+        SamplingArg::Grid => Sampling::Grid,
+    })
+}
+
+fn potree1_settings(args: &ConvertArgs) -> Potree1Settings {
+    let default = Potree1Settings::default();
+    Potree1Settings {
+        sampling: sampling(args).unwrap_or(default.sampling),
+        spacing: args.spacing.and_then(|s| s.0),
+        leaf_capacity: args.leaf_capacity.unwrap_or(default.leaf_capacity),
+        version: args.potree1.potree1_version.map_or(default.version, |v| match v {
+            Potree1VersionArg::V1_7 => Potree1Version::V1_7,
+            Potree1VersionArg::V1_8 => Potree1Version::V1_8,
+        }),
+    }
 }
 
 fn potree2_settings(args: &ConvertArgs) -> Potree2Settings {
     let default = Potree2Settings::default();
     Potree2Settings {
-        sampling: args.sampling.map_or(default.sampling, |s| match s {
-            SamplingArg::Random => Sampling::Random { seed: args.seed.unwrap_or(SEED) },
-            SamplingArg::Poisson => Sampling::Poisson,
-            SamplingArg::Grid => Sampling::Grid,
-        }),
+        sampling: sampling(args).unwrap_or(default.sampling),
         encoding: args.encoding.map_or(default.encoding, |e| match e {
             EncodingArg::Brotli => Encoding::Brotli { quality: args.brotli_quality.unwrap_or(BROTLI_QUALITY) },
             EncodingArg::Default => Encoding::Default,

@@ -51,10 +51,10 @@ fn output_line(output: &OutputReport, plan: &Plan) -> String {
     format!("{}: {} in {parts}, {}", place.display(), plural(output.points, "point"), bytes(output.bytes))
 }
 
-/// Colours that are not stored as they were read. Batches have 8 bits in any case.
+/// Colours that are not stored as they were read. Some formats have 8 bits in any case.
 fn colours_line(report: &Report) -> Option<String> {
-    let has_wide =
-        |o: &OutputReport| o.format != DatasetKind::Batches.name() && o.attributes.iter().any(|a| a == "rgb");
+    let is_wide = |format: &str| ![DatasetKind::Batches, DatasetKind::Potree1].map(DatasetKind::name).contains(&format);
+    let has_wide = |o: &OutputReport| is_wide(&o.format) && o.attributes.iter().any(|a| a == "rgb");
     let depths: Vec<u8> = report.inputs.iter().filter_map(|input| input.rgb_depth).collect();
     let narrow = depths.iter().filter(|depth| **depth == 8).count() as u64;
     let of = plural(depths.len() as u64, "scan");
@@ -176,7 +176,7 @@ fn points_not_written(report: &Report) -> u64 {
         + p.unreadable
 }
 
-/// Only octrees drop duplicates, and there is one octree at most.
+/// Only octrees drop duplicates, all of them the same.
 fn duplicates_dropped(report: &Report) -> u64 {
     report.outputs.iter().map(|o| o.duplicates_dropped).max().unwrap_or(0)
 }

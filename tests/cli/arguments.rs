@@ -40,14 +40,6 @@ fn mistakes_end_with_code_2_and_leave_nothing_behind() {
 }
 
 #[test]
-fn formats_to_come_are_not_supported_yet() {
-    let dir = Dir::new();
-    dir.write("a.las", &Las::terrain(10, 1).bytes());
-    dir.run(["convert", "a.las", "-o", "out", "--to", "potree1"]).failed_with(4, &["potree1", "potree2", "bintree"]);
-    dir.succeed(["convert", "a.las", "-o", "out", "--to", "potree2"]);
-}
-
-#[test]
 fn a_dry_run_reports_and_writes_nothing() {
     let dir = Dir::new();
     dir.write("a.las", &Las::terrain(12_345, 1).bytes());

@@ -21,6 +21,7 @@ mod mounted;
 mod odd_places;
 mod overwriting;
 mod placing;
+mod potree1;
 mod precision;
 mod reporting;
 

@@ -55,6 +55,7 @@ pub use estimate::estimate;
 pub use octree::Sampling;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
+pub use outputs::potree1::{Potree1Settings, Potree1Version};
 pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
 pub use outputs::{StagedFiles, Target, resolve_path};
 pub use plan::{
@@ -69,4 +70,4 @@ pub use report::{
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
 pub use sources::{ResolvedCrs, resolve_crs};
-pub use warning::{CrsNote, NameFault, Proj4Fault, RenamedAttribute, ViewerNote, Warning};
+pub use warning::{ColourNote, CrsNote, NameFault, Proj4Fault, RenamedAttribute, ViewerNote, Warning};

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill_converter::{
     AttributeChoice, BatchesSettings, BintreeSettings, ConvertError, Disk, DiskOperation, Encoding, Plan,
-    Potree2Settings, Replacing, Silent, Target, convert_on,
+    Potree1Settings, Potree2Settings, Replacing, Silent, Target, convert_on,
 };
 use pointmill_format::bintree::Layout;
 
@@ -120,6 +120,10 @@ fn potree2() -> Target {
     Potree2Settings { leaf_capacity: 500, ..Potree2Settings::default() }.into()
 }
 
+fn potree1() -> Target {
+    Potree1Settings { leaf_capacity: 2000, ..Potree1Settings::default() }.into()
+}
+
 fn bintree(layout: Layout) -> Target {
     BintreeSettings { capacity: 1000, layout, ..BintreeSettings::default() }.into()
 }
@@ -129,6 +133,12 @@ fn an_octree() {
     check("octree", &[potree2()], |_| ());
     let brotli = Potree2Settings { encoding: Encoding::Brotli { quality: 1 }, ..Potree2Settings::default() };
     check("octree, Brotli", &[brotli.into()], |_| ());
+}
+
+#[test]
+fn an_octree_with_a_file_for_each_node() {
+    check("files of nodes", &[potree1()], |_| ());
+    check("files of nodes beside others", &[potree2(), potree1()], |_| ());
 }
 
 /// A PLY whose points are so wide that few of them exceed the memory.

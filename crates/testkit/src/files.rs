@@ -43,12 +43,25 @@ pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap().to_str().unwrap().to_owned()
 }
 
-/// Every file of a dataset with its bytes, except the report of the run: what must be the same for the same points.
+/// Every file of a dataset with its bytes, by its name below `folder`, except the report of the run: what must be the same for
+/// the same points.
 pub fn dataset(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let files = entries(folder).into_iter().map(|path| (file_name(&path), path));
-    let files: BTreeMap<_, _> = files.filter(|(name, _)| name != "report.json").map(|(n, p)| (n, read(&p))).collect();
+    let mut files = BTreeMap::new();
+    add_files(folder, "", &mut files);
+    files.remove("report.json");
     assert!(!files.is_empty(), "no dataset in {}", folder.display());
     files
+}
+
+fn add_files(folder: &Path, prefix: &str, files: &mut BTreeMap<String, Vec<u8>>) {
+    for path in entries(folder) {
+        let name = format!("{prefix}{}", file_name(&path));
+        if path.is_dir() {
+            add_files(&path, &format!("{name}/"), files);
+        } else {
+            files.insert(name, read(&path));
+        }
+    }
 }
 
 /// Asserts that two datasets are the same byte for byte; names the first file that is not, and where.

@@ -161,11 +161,10 @@ impl<'a, S: NodeSink> Committer<'a, S> {
         self.lists.each(points, |records| {
             bytes.clear();
             encoder.encode(node.key, records.chunks_exact(self.lists.stride), &mut written, &mut bytes)?;
-            self.sink.write(&[], &bytes, node.byte_offset + size)?;
+            self.sink.write_part(&node, &bytes, size)?;
             size += bytes.len() as u64;
             Ok(true)
         })?;
-        self.sink.write(&[node], &[], node.byte_offset)?;
         Ok(written)
     }
 

@@ -25,11 +25,18 @@ pub(crate) trait NodeSink: Sync {
     fn encoder(&self) -> Self::Encoder;
 
     /// Takes the bytes of `nodes`, which begin at `offset` among the bytes of the whole tree. Called from several threads,
-    /// in any order; every byte comes once. Bytes of a large node come in parts before the node comes itself.
+    /// in any order; every node comes once, here or in parts.
     ///
     /// # Errors
     /// Whatever writing them meets.
     fn write(&self, nodes: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError>;
+
+    /// Takes a part of the bytes of a node that has too many to have them in memory together: those from `at` on. The parts
+    /// of a node come in order.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError>;
 }
 
 /// Makes the bytes of nodes.

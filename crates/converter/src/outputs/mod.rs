@@ -3,9 +3,12 @@
 mod attributes;
 pub(crate) mod batches;
 pub(crate) mod bintree;
+mod colour;
 mod number;
+mod octrees;
 mod origin;
 mod output;
+pub(crate) mod potree1;
 pub(crate) mod potree2;
 mod recovery;
 mod staging;

@@ -133,6 +133,12 @@ impl PositionErrors {
         Self { max, max_3d: length(max), rms: max, rms_3d: length(max), mean: max, how: How::Rounding }
     }
 
+    /// No error on an axis is above `max`.
+    pub(crate) fn bound(max: [f64; 3]) -> Self {
+        let errors = Self::rounding(max);
+        if errors.is_zero() { errors } else { Self { how: How::Bound, ..errors } }
+    }
+
     /// True if no position differs.
     pub fn is_zero(&self) -> bool {
         self.max == [0.0; 3]

@@ -283,8 +283,10 @@ pub enum DropReason {
     NotRequested,
     /// The format does not store it unless it is requested.
     NotUsual,
-    /// Batches show it as grey of 8 bits.
+    /// It is shown as grey of 8 bits.
     ShownAsGrey,
+    /// This version of the format has no place for it.
+    NoPlace(&'static str),
 }
 
 impl DropReason {
@@ -307,6 +309,7 @@ impl std::fmt::Display for DropReason {
             Self::NotRequested => f.write_str("not requested"),
             Self::NotUsual => f.write_str("not part of the usual record"),
             Self::ShownAsGrey => f.write_str("shown as grey of 8 bits"),
+            Self::NoPlace(version) => write!(f, "version {version} has no place for it"),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What the user should know of a run that goes on, as data.
 
+mod colours;
 mod crs;
 mod numbers;
 mod skipped;
@@ -15,6 +16,7 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 use crate::advice::Advice;
 use crate::reason::LatticeReason;
 
+pub use colours::ColourNote;
 pub use crs::{CrsNote, Proj4Fault};
 pub(crate) use skipped::reason_of;
 pub use viewers::{NameFault, RenamedAttribute, ViewerNote};
@@ -173,7 +175,12 @@ pub enum Warning {
     /// The coordinate reference system could not be resolved in full.
     Crs(CrsNote),
     /// What viewers of octrees make of a dataset, or what was done so that they show it.
-    Viewers(ViewerNote),
+    Viewers {
+        /// The format.
+        format: DatasetKind,
+        /// What there is to say.
+        note: ViewerNote,
+    },
     /// The inputs have different coordinate reference systems.
     DifferentCrs {
         /// What each of them says.
@@ -184,24 +191,13 @@ pub enum Warning {
         /// Number of leaves.
         leaves: usize,
     },
-    /// Batches: 16-bit colours are stored in 8 bits.
-    ColoursNarrowed,
-    /// Batches: some inputs have no colour and are black.
-    InputsWithoutColour {
-        /// How many.
-        without: usize,
-        /// Of how many inputs.
-        inputs: usize,
+    /// Colours of a format that has 8 bits for them.
+    Colours {
+        /// The format.
+        format: DatasetKind,
+        /// What there is to say.
+        note: ColourNote,
     },
-    /// Batches: no input has colour; grey shows the intensity.
-    GreyIntensity {
-        /// The intensity shown as black.
-        least: f64,
-        /// The intensity shown as white.
-        greatest: f64,
-    },
-    /// Batches: no input has colour or intensity.
-    NoColour,
 }
 
 impl Warning {
@@ -228,13 +224,10 @@ impl Warning {
             Self::ValuesMissing { .. } => "values_missing",
             Self::MixedRgbDepth { .. } => "mixed_rgb_depth",
             Self::Crs(_) => "crs",
-            Self::Viewers(note) => note.kind(),
+            Self::Viewers { note, .. } => note.kind(),
             Self::DifferentCrs { .. } => "different_crs",
             Self::ManyFiles { .. } => "many_files",
-            Self::ColoursNarrowed => "colours_narrowed",
-            Self::InputsWithoutColour { .. } => "inputs_without_colour",
-            Self::GreyIntensity { .. } => "grey_intensity",
-            Self::NoColour => "no_colour",
+            Self::Colours { note, .. } => note.kind(),
         }
     }
 
@@ -248,7 +241,7 @@ impl Warning {
             Self::Crs(CrsNote::NoCode { .. } | CrsNote::UserDefined { .. }) => Some(Advice::NameEpsg),
             Self::Crs(CrsNote::NotInTable { .. } | CrsNote::FalseEasting { .. }) => Some(Advice::GiveProj4),
             Self::DifferentCrs { .. } => Some(Advice::Reproject),
-            Self::Viewers(note) => note.advice(),
+            Self::Viewers { note, .. } => note.advice(),
             Self::ManyFiles { .. } => Some(Advice::PackLeaves),
             _ => None,
         }

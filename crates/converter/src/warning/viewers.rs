@@ -30,6 +30,13 @@ pub enum ViewerNote {
     },
     /// Some viewers do not read the encoding.
     Brotli,
+    /// Some viewers do not read attributes that are objects.
+    Objects,
+    /// A viewer does not know how long these attributes are.
+    BehindColour {
+        /// Their words.
+        words: Vec<String>,
+    },
     /// Coordinates are geocentric: z is the axis of the Earth.
     Geocentric {
         /// The system, for people.
@@ -83,6 +90,8 @@ impl ViewerNote {
             Self::ManyReturns { .. } => "many_returns",
             Self::DarkColours { .. } => "dark_colours",
             Self::Brotli => "brotli_readers",
+            Self::Objects => "object_readers",
+            Self::BehindColour { .. } => "behind_colour",
             Self::Geocentric { .. } => "geocentric",
             Self::Degrees { .. } => "degrees",
         }
@@ -99,7 +108,6 @@ impl ViewerNote {
 
 impl fmt::Display for ViewerNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("potree2: ")?;
         match self {
             Self::Renamed(RenamedAttribute { name, stored_as, why }) => {
                 write!(f, "the attribute {name:?} is called {stored_as:?}: {why}")
@@ -120,6 +128,14 @@ impl fmt::Display for ViewerNote {
                 percent(*points, *of)
             ),
             Self::Brotli => f.write_str("three-loader, BA_PointCloud and compute_rasterizer do not read BROTLI"),
+            Self::Objects => {
+                f.write_str("three-loader, potree-core, loaders.gl, iTowns and Giro3D do not read version 1.8")
+            }
+            Self::BehindColour { words } => write!(
+                f,
+                "BA_PointCloud does not know the number of bytes of {}, and would show nonsense",
+                words.join(", ")
+            ),
             Self::Geocentric { system } => write!(
                 f,
                 "coordinates are geocentric ({system}): viewers take z, the axis of the Earth, for up, and show the \

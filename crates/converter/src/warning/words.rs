@@ -68,16 +68,9 @@ impl Warning {
                  the projection stays empty",
                 labels.join("; ")
             ),
-            Self::Viewers(note) => note.to_string(),
+            Self::Viewers { format, note } => format!("{}: {note}", format.name()),
             Self::ManyFiles { leaves } => format!("{leaves} files, one per leaf"),
-            Self::ColoursNarrowed => "batches: colours of 16 bits are stored in 8".to_owned(),
-            Self::InputsWithoutColour { without, inputs } => {
-                format!("batches: {without} of {inputs} inputs have no colour and are black")
-            }
-            Self::GreyIntensity { least, greatest } => {
-                format!("batches: no input has colour; grey shows the intensity, {least} to {greatest}")
-            }
-            Self::NoColour => "batches: no input has colour or intensity; all points are white".to_owned(),
+            Self::Colours { format, note } => format!("{}: {note}", format.name()),
         }
     }
 }

@@ -117,6 +117,24 @@ impl Cube {
         }))
     }
 
+    /// The same, rounded to the nearest that is in the cube.
+    #[inline]
+    pub(crate) fn nearest_tree(&self, q: JobPoint) -> [u64; 3] {
+        std::array::from_fn(|a| {
+            let steps = (q[a].wrapping_sub(self.min[a]) as u64) << self.shift[a];
+            let product = u128::from(steps) * u128::from(self.factor[a]);
+            (((product + (1 << (u64::BITS - 1))) >> u64::BITS) as u64).min(LONGEST)
+        })
+    }
+
+    /// Where all steps are the finest one times a power of two: the side in steps of the finest axis, odd and below `2^31`,
+    /// and by axis that power.
+    pub(crate) fn whole_steps(&self) -> Option<(u64, [u32; 3])> {
+        let steps = self.steps?;
+        let (finest, _) = fraction(steps);
+        Some((steps, self.shift.map(|shift| shift - finest)))
+    }
+
     /// By axis, what `q - min` is multiplied by so that the upper 64 bits of the product are the cell of a level, the same
     /// as `t >> (31 - level)`; `None` where there is no such factor.
     pub(crate) fn cell_factors(&self, level: u32) -> Option<[u64; 3]> {

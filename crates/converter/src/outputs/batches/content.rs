@@ -1,12 +1,11 @@
 //! What stands beside the positions: the colour, and the extra attributes.
 
-use pointmill_format::batches::{ColourSource, colour_word, eight_bit, grey};
-use pointmill_format::{Attribute, AttributeType};
+use pointmill_format::batches::{ColourSource, colour_word, eight_bit};
+use pointmill_format::{Attribute, AttributeType, DatasetKind};
 
-use super::settings::colour_of;
 use crate::cloud::{Cloud, Widening};
 use crate::outputs::attributes::{choose, left_out};
-use crate::outputs::number::number;
+use crate::outputs::colour::{colour_notes, colour_of, extremes, grey_of};
 use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
 use crate::warning::Warning;
@@ -79,8 +78,7 @@ impl Content {
         let colour = match colour_index {
             Some(i) if is_rgb => Colour::Rgb { at: schema.offsets[i], widening: facts.widening.clone() },
             Some(i) => {
-                let range = &facts.ranges[i];
-                let (least, greatest) = if range.is_empty() { (0.0, 0.0) } else { (range.min[0], range.max[0]) };
+                let [least, greatest] = extremes(cloud, i);
                 Colour::Intensity { at: schema.offsets[i], ty: schema.attributes[i].ty, least, greatest }
             }
             None => Colour::None,
@@ -91,29 +89,7 @@ impl Content {
             Extra { attribute, index, from, to }
         };
         let extras = extras.into_iter().map(extra).collect();
-        let mut content = Self { colour, extras, kept, dropped, warnings: Vec::new() };
-        content.warnings = content.warnings(cloud);
-        content
-    }
-
-    fn warnings(&self, cloud: &Cloud<'_>) -> Vec<Warning> {
-        match &self.colour {
-            Colour::Rgb { widening, .. } => {
-                let rgb = cloud.schema().rgb();
-                let used = |i: &usize| cloud.stats.sources[*i].kept > 0;
-                let coloured = |i: &usize| cloud.intake.of(&cloud.sources.all[*i]).has(rgb);
-                let sources: Vec<usize> = (0..cloud.sources.all.len()).filter(used).collect();
-                let is_narrowed = sources.iter().any(|i| coloured(i) && !widening.is_narrow(*i));
-                let (without, inputs) = (sources.iter().filter(|i| !coloured(i)).count(), sources.len());
-                let narrowed = is_narrowed.then_some(Warning::ColoursNarrowed);
-                let black = (without > 0).then_some(Warning::InputsWithoutColour { without, inputs });
-                narrowed.into_iter().chain(black).collect()
-            }
-            Colour::Intensity { least, greatest, .. } => {
-                vec![Warning::GreyIntensity { least: *least, greatest: *greatest }]
-            }
-            Colour::None => vec![Warning::NoColour],
-        }
+        Self { colour, extras, kept, dropped, warnings: colour_notes(cloud, DatasetKind::Batches) }
     }
 
     pub(super) fn source(&self) -> ColourSource {
@@ -155,19 +131,6 @@ impl Content {
             }
             Colour::None => out.extend(records.map(|_| colour_word([255; 3], 0))),
         }
-    }
-}
-
-/// The grey of one intensity, given as stored bytes.
-fn grey_of(bytes: &[u8], ty: AttributeType, least: f64, greatest: f64) -> u8 {
-    match (ty, bytes) {
-        (AttributeType::UInt8, [v, ..]) => grey(u16::from(*v), least as u16, greatest as u16),
-        (AttributeType::UInt16, [a, b, ..]) => grey(u16::from_le_bytes([*a, *b]), least as u16, greatest as u16),
-        _ => match number(bytes, ty) {
-            v if v.is_nan() => 0,
-            v if greatest > least => ((v - least) / (greatest - least) * 255.0 + 0.5) as u8,
-            _ => 255,
-        },
     }
 }
 

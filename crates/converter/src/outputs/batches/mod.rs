@@ -23,6 +23,7 @@ use serde_json::{Map, Value};
 
 pub use settings::BatchesSettings;
 
+use super::colour::colour_of;
 use super::output::{DiskSize, Output, Target, Wants};
 use super::recovery::Recovery;
 use super::staging::StagedDataset;
@@ -38,7 +39,6 @@ use finish::finish;
 use frame::{Frame, refused};
 use large::WORD_BYTES;
 use output::{BatchFile, ORIGINAL_BYTES};
-use settings::colour_of;
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
 
 /// Tasks per thread, so that threads end together; their sizes. Small ones share too much with each other, large ones

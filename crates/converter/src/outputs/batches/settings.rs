@@ -1,7 +1,5 @@
 //! What can be chosen of quantised batches.
 
-use crate::sources::Schema;
-
 /// Settings of quantised batches (`docs/formats/batches.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchesSettings {
@@ -20,10 +18,4 @@ impl Default for BatchesSettings {
     fn default() -> Self {
         Self { lod_cell: None, planes: None, zstd_level: None, originals: true }
     }
-}
-
-/// What batches are coloured by: the colour, else the intensity.
-pub(super) fn colour_of(schema: &Schema) -> Option<usize> {
-    let intensity = || schema.find("intensity").filter(|&i| schema.attributes[i].elements == 1);
-    schema.rgb().or_else(intensity)
 }

@@ -8,7 +8,7 @@ use pointmill_format::batches::{
     AlignedBytes, Batches, Cloud, ColourSource, Description, Header, WriteOptions, Written, colour_word, compress,
     eight_bit, write,
 };
-use pointmill_format::{Attribute, AttributeType, Lattice};
+use pointmill_format::{Attribute, AttributeType, DatasetKind, Lattice};
 use pointmill_testkit::Random;
 use pointmill_testkit::files::assert_same_bytes;
 use pointmill_testkit::las::{self, Las};
@@ -17,8 +17,12 @@ use super::BatchesSettings;
 use crate::plan::{AttributeChoice, Plan, Setting};
 use crate::report::Report;
 use crate::runtime::Silent;
-use crate::warning::Warning;
+use crate::warning::{ColourNote, Warning};
 use crate::{ConvertError, convert};
+
+fn colours(note: ColourNote) -> Warning {
+    Warning::Colours { format: DatasetKind::Batches, note }
+}
 
 /// A scan in memory.
 #[derive(Clone)]
@@ -259,9 +263,9 @@ fn colours_of_eight_bits_keep_their_values_also_beside_others() {
         bench.convert(&bench.plan(), cell(1.0)).unwrap()
     };
     let (narrow, report) = ours(&eight);
-    assert!(!report.warnings.contains(&Warning::ColoursNarrowed), "{:?}", report.warnings);
+    assert!(!report.warnings.contains(&colours(ColourNote::Narrowed)), "{:?}", report.warnings);
     let (widened, report) = ours(&wide);
-    assert!(report.warnings.contains(&Warning::ColoursNarrowed), "{:?}", report.warnings);
+    assert!(report.warnings.contains(&colours(ColourNote::Narrowed)), "{:?}", report.warnings);
     assert_same_bytes(&narrow, &widened, "the same colours");
 }
 
@@ -278,7 +282,7 @@ fn without_colour_grey_shows_the_intensity_and_its_range_is_reported() {
     let description = ours.description();
     assert_eq!(description.colour, ColourSource::Intensity);
     assert_eq!(description.extra["intensityRange"], serde_json::json!([1000, 1299]));
-    assert!(report.warnings.contains(&Warning::GreyIntensity { least: 1000.0, greatest: 1299.0 }));
+    assert!(report.warnings.contains(&colours(ColourNote::Grey { least: 1000.0, greatest: 1299.0 })));
     assert_eq!(report.outputs[0].attributes, ["position"]);
     let words = ours.colour().unwrap();
     let of_lod_3: Vec<u32> = words.iter().filter(|w| **w >> 24 == 3).map(|w| w & 0xff).collect();

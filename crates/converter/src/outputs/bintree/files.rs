@@ -9,10 +9,6 @@ use crate::error::ConvertError;
 use crate::outputs::staging::StagedDataset;
 use crate::runtime::{DiskFile, Runtime};
 
-/// More files are not synced one by one: the file system is asked to sync all it has. That takes a tenth of the time, but
-/// it waits for what others write, too, and cannot be interrupted.
-const FEW_FILES: usize = 50_000;
-
 /// The leaves of a dataset; any number of threads put them.
 pub(super) struct Leaves<'a> {
     staged: &'a StagedDataset,
@@ -70,11 +66,7 @@ impl<'a> Leaves<'a> {
             file.sync("syncing the leaves")?;
         }
         let written = self.written.into_inner().unwrap_or_default();
-        if written.len() > FEW_FILES && self.staged.sync_file_system()? {
-            return Ok(self.bytes.into_inner());
-        }
-        let sync = |(): &mut (), leaf: usize| self.staged.sync_file(&written[leaf]);
-        rt.in_parallel(written.len(), || (), sync, |()| ())?;
+        self.staged.sync_all(rt, written.len(), |leaf| written[leaf].clone(), &[])?;
         Ok(self.bytes.into_inner())
     }
 }

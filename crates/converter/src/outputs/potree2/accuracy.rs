@@ -67,7 +67,7 @@ impl Axis {
 }
 
 /// Half of the distance from `v` to the next double.
-fn half_ulp(v: f64) -> f64 {
+pub(in crate::outputs) fn half_ulp(v: f64) -> f64 {
     (v.abs().next_up() - v.abs()) / 2.0
 }
 

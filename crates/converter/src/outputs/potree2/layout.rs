@@ -32,7 +32,7 @@ struct Doubled {
 }
 
 /// The type that Potree viewers can read: they fail on every node that has a 64-bit integer.
-pub(super) const fn viewable(ty: AttributeType) -> AttributeType {
+pub(in crate::outputs) const fn viewable(ty: AttributeType) -> AttributeType {
     match ty {
         AttributeType::Int64 | AttributeType::UInt64 => AttributeType::Float64,
         other => other,

@@ -1,7 +1,6 @@
-//! The metadata of an octree, and its part of the report.
+//! The metadata of an octree.
 
 use std::borrow::Cow;
-use std::collections::HashSet;
 
 use pointmill_format::potree2::{AttributeStats, Encoding as StoredEncoding, HierarchyBytes, Metadata};
 use pointmill_format::{Aabb, Attribute, AttributeType, Lattice};
@@ -10,13 +9,11 @@ use serde_json::Map;
 use super::layout::viewable;
 use super::names::Names;
 use super::settings::{DarkColours, Encoding, Potree2Settings};
-use super::spacing::ChosenSpacing;
 use super::watch::rounded_range;
 use crate::cloud::{Cloud, JobPoint, Ledger, Range};
-use crate::octree::Octree;
 use crate::outputs::attributes::Choice;
+use crate::outputs::octrees::ChosenSpacing;
 use crate::outputs::origin::own_key;
-use crate::report::TreeReport;
 
 /// The metadata of the dataset.
 pub(super) fn metadata(
@@ -84,26 +81,4 @@ fn stored_range<'a>(settings: &Potree2Settings, attribute: &Attribute, range: &'
         DarkColours::Round if attribute.name == "rgb" => Cow::Owned(rounded_range(range)),
         _ => Cow::Borrowed(range),
     }
-}
-
-pub(super) fn tree_report(tree: &Octree) -> TreeReport {
-    let nodes = &tree.nodes;
-    let depth = nodes.iter().map(|n| usize::from(n.key.level)).max().unwrap_or(0);
-    let mut report = TreeReport {
-        nodes: nodes.len() as u64,
-        depth: depth as u32,
-        points_per_level: vec![0; depth + 1],
-        nodes_per_level: vec![0; depth + 1],
-        overfull_leaves: tree.overfull_leaves,
-        largest_leaf: 0,
-    };
-    let parents: HashSet<_> = nodes.iter().filter_map(|n| n.key.parent()).collect();
-    for n in nodes {
-        report.points_per_level[usize::from(n.key.level)] += u64::from(n.points);
-        report.nodes_per_level[usize::from(n.key.level)] += 1;
-        if !parents.contains(&n.key) {
-            report.largest_leaf = report.largest_leaf.max(u64::from(n.points));
-        }
-    }
-    report
 }

@@ -7,27 +7,27 @@ mod names;
 mod notes;
 mod payload;
 mod settings;
-mod spacing;
 mod watch;
 
 use pointmill_format::DatasetKind;
 use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
 use serde_json::{Map, Value};
 
+pub(super) use accuracy::half_ulp;
 pub(crate) use layout::OutputLayout;
+pub(super) use layout::viewable;
+pub(super) use names::Names;
 pub(crate) use payload::PayloadEncoder;
 pub use settings::{DarkColours, Encoding, Potree2Settings};
 
-use self::layout::viewable;
-use self::names::Names;
-use self::spacing::ChosenSpacing;
 use self::watch::{AllSeen, Watch};
 use super::attributes::{changed, choose};
+use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings, Sampling};
+use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Events, Runtime};
@@ -35,14 +35,7 @@ use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
 use crate::warning::Warning;
 
 /// Elements of an attribute that readers of the format accept.
-const MAX_ELEMENTS: usize = 16;
-
-/// Bytes of the payloads of a subtree that one thread builds. Part of the result, and the same whatever else is written in
-/// the same run.
-const UNIT_BYTES: u64 = 10_000_000;
-
-/// Points of such a subtree: larger ones leave the caches and the threads uneven.
-const UNIT_POINTS: std::ops::RangeInclusive<u64> = 20_000..=300_000;
+pub(super) const MAX_ELEMENTS: usize = 16;
 
 /// Bytes of a hierarchy record.
 const NODE_BYTES: u64 = 22;
@@ -59,16 +52,10 @@ impl Output for Potree2Settings {
     }
 
     fn check(&self, _: &Plan) -> Result<(), ConvertError> {
-        let refuse = |setting, fault| Err(PlanError::new(setting, fault).into());
-        if self.leaf_capacity == 0 {
-            return refuse(Setting::LeafCapacity, PlanFault::Zero);
-        }
-        if self.spacing.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
-            return refuse(Setting::Spacing, PlanFault::NotPositive);
-        }
+        self.tree().check()?;
         match self.encoding {
             Encoding::Brotli { quality } if quality > 11 => {
-                refuse(Setting::BrotliQuality, PlanFault::NotOneOf("0 to 11"))
+                Err(PlanError::new(Setting::BrotliQuality, PlanFault::NotOneOf("0 to 11")).into())
             }
             _ => Ok(()),
         }
@@ -92,13 +79,7 @@ impl Output for Potree2Settings {
     }
 
     fn describe_settings(&self, settings: &mut Map<String, Value>) {
-        settings.insert("sampling".into(), self.sampling.name().into());
-        if let Sampling::Random { seed } = self.sampling {
-            settings.insert("seed".into(), seed.into());
-        }
-        if let Some(spacing) = self.spacing {
-            settings.insert("spacing".into(), spacing.into());
-        }
+        self.tree().describe(settings);
         let encoding = match self.encoding {
             Encoding::Default => "default",
             Encoding::Brotli { quality } => {
@@ -107,7 +88,6 @@ impl Output for Potree2Settings {
             }
         };
         settings.insert("encoding".into(), encoding.into());
-        settings.insert("leaf-capacity".into(), self.leaf_capacity.into());
         settings.insert("dark-colours".into(), self.dark_colours.name().into());
     }
 
@@ -132,12 +112,12 @@ impl Output for Potree2Settings {
             watch: self.watch(cloud, &choice.kept),
             seen: &seen,
         };
-        let spacing = ChosenSpacing::of(self, cloud)?;
+        let spacing = ChosenSpacing::of(self.sampling, self.spacing, cloud)?;
         let settings = OctreeSettings {
             sampling: self.sampling,
             spacing: spacing.spacing,
             leaf_capacity: self.leaf_capacity,
-            unit_points: self.unit_points(payloads.layout.stride),
+            unit_points: self.tree().unit_points(cloud),
         };
         let tree = octree::build(cloud, rt, settings, &payloads)?;
         payloads.file.sync("syncing the payloads")?;
@@ -173,7 +153,7 @@ impl Output for Potree2Settings {
             warnings,
             bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
             checksum: tree.ledger.unaltered().to_string(),
-            tree: metadata::tree_report(&tree),
+            tree: tree_report(&tree),
             details: [("spacing".to_owned(), spacing.describe())].into_iter().chain(notes::details(&seen)).collect(),
             ..OutputReport::default()
         })
@@ -189,10 +169,9 @@ impl Potree2Settings {
         Watch::new(attributes, is_deep, self.dark_colours)
     }
 
-    /// Points of a subtree that one thread builds, for records of `stride` bytes.
-    fn unit_points(&self, stride: usize) -> u64 {
-        let (least, most) = UNIT_POINTS.into_inner();
-        (UNIT_BYTES / stride as u64).clamp(least, most).max(self.leaf_capacity.into())
+    fn tree(&self) -> TreeSettings {
+        let Self { sampling, spacing, leaf_capacity, .. } = *self;
+        TreeSettings { sampling, spacing, leaf_capacity }
     }
 }
 
@@ -222,5 +201,9 @@ impl<'a> NodeSink for Payloads<'a> {
         self.file.write_at(bytes, offset, "writing node payloads")?;
         self.file.start_write_back(offset, bytes.len());
         Ok(())
+    }
+
+    fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
+        self.write(&[], bytes, node.byte_offset + at)
     }
 }

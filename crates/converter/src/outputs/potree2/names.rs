@@ -77,16 +77,16 @@ const MEANT: [&str; 5] = ["gps-time", "number of returns", "point source id", "r
 
 /// The names of the attributes of a dataset beside the position.
 #[derive(Debug, Default)]
-pub(super) struct Names {
+pub(in crate::outputs) struct Names {
     /// In order.
-    pub(super) stored: Vec<String>,
-    pub(super) renamed: Vec<RenamedAttribute>,
+    pub(in crate::outputs) stored: Vec<String>,
+    pub(in crate::outputs) renamed: Vec<RenamedAttribute>,
 }
 
 impl Names {
     /// `attributes`: in order, of different names. An underscore behind a name makes it another, and a number if that is
     /// taken.
-    pub(super) fn of(attributes: &[&Attribute]) -> Self {
+    pub(in crate::outputs) fn of(attributes: &[&Attribute]) -> Self {
         let mut names = Self::default();
         let mut taken: HashSet<String> = attributes.iter().map(|a| a.name.clone()).collect();
         // where the numbers of a name go on: there may be very many names

@@ -1,11 +1,12 @@
 //! What clients stumble over, and what is said of it.
 
-use pointmill_format::Attribute;
+use pointmill_format::{Attribute, DatasetKind};
 use serde_json::{Map, Value};
 
 use super::names::Names;
 use super::settings::{DarkColours, Encoding, Potree2Settings};
 use super::watch::Seen;
+use crate::outputs::octrees::system_note;
 use crate::sources::{ResolvedCrs, Schema};
 use crate::warning::{ViewerNote, Warning};
 
@@ -13,16 +14,11 @@ use crate::warning::{ViewerNote, Warning};
 pub(super) fn foresee(settings: &Potree2Settings, schema: &Schema, kept: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {
     let mut notes: Vec<ViewerNote> =
         Names::of(&attributes(schema, kept)).renamed.into_iter().map(ViewerNote::Renamed).collect();
-    let system = || crs.label.clone();
-    if crs.is_geocentric {
-        notes.push(ViewerNote::Geocentric { system: system() });
-    } else if crs.is_geographic() {
-        notes.push(ViewerNote::Degrees { system: system() });
-    }
+    notes.extend(system_note(crs));
     if matches!(settings.encoding, Encoding::Brotli { .. }) {
         notes.push(ViewerNote::Brotli);
     }
-    notes.into_iter().map(Warning::Viewers).collect()
+    notes.into_iter().map(|note| Warning::Viewers { format: DatasetKind::Potree2, note }).collect()
 }
 
 /// Points of a hundred that are too few to be seen.
@@ -38,7 +34,7 @@ pub(super) fn seen(settings: &Potree2Settings, seen: &Seen, of: u64) -> Vec<Warn
     if settings.dark_colours == DarkColours::Keep && share >= TOO_FEW {
         notes.push(ViewerNote::DarkColours { points: seen.dark_points, of });
     }
-    notes.into_iter().map(Warning::Viewers).collect()
+    notes.into_iter().map(|note| Warning::Viewers { format: DatasetKind::Potree2, note }).collect()
 }
 
 /// The same for the report.

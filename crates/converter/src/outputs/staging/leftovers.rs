@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::hidden::{Found, HiddenFolder, Side};
+use super::nodes;
 use super::ours::Standing;
 use super::replace::{When, undo};
 use crate::error::{ConvertError, OutputFault};
@@ -114,6 +115,7 @@ fn remove_one(path: &Path, events: &dyn Events) -> io::Result<()> {
         return Err(io::Error::other("the run was asked to stop; the next one removes it"));
     }
     match fs::symlink_metadata(path)?.is_dir() {
+        true if nodes::is_octree(path) => nodes::remove(path, events),
         true => fs::remove_dir(path),
         false => fs::remove_file(path),
     }

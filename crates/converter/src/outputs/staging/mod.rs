@@ -5,6 +5,7 @@ mod dataset;
 mod files;
 mod hidden;
 mod leftovers;
+mod nodes;
 mod ours;
 mod place;
 mod replace;

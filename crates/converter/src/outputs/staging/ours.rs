@@ -8,6 +8,8 @@ use pointmill_format::DatasetKind;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
+use super::nodes;
+
 /// The account of a run, beside the datasets or in the one that there is.
 pub(crate) const REPORT_FILE: &str = "report.json";
 
@@ -23,7 +25,8 @@ pub(super) enum Standing {
     Nothing,
     /// A folder with nothing in it.
     Empty,
-    /// A dataset, or several and the report: the files, each named before the folder that holds it.
+    /// A dataset, or several and the report: the files, each named before the folder that holds it, and folders of octrees,
+    /// whose files are not named.
     Ours(Vec<PathBuf>),
     /// Something in it is not ours.
     Foreign(PathBuf),
@@ -54,6 +57,11 @@ impl Standing {
         let (mut files, mut foreign, mut inside) = (Vec::new(), None, 0);
         for path in entries {
             if datasets.iter().any(|dataset| dataset.owns(&path)) || is_report(&path) {
+                files.push(path);
+                continue;
+            }
+            if nodes::is_octree(&path) && datasets.iter().any(|dataset| dataset.kind == DatasetKind::Potree1) {
+                foreign = foreign.or(nodes::foreign_in(&path)?);
                 files.push(path);
                 continue;
             }
@@ -105,6 +113,7 @@ impl Own {
                 let has = |key: &str, value: &str| has_pair(&head, key, value);
                 (has("format", "pointmill-bintree\"") && has("generator", "pointmill "), has("layout", "packed\""))
             }
+            DatasetKind::Potree1 => (is_cloud(&marker), false),
             DatasetKind::Batches => (head(&marker, 8).is_some_and(|h| h == kind.mark().as_bytes()), false),
             _ => (false, false),
         };
@@ -159,6 +168,20 @@ fn is_metadata(path: &Path) -> bool {
         _pointmill: Object,
     }
     is_json::<Metadata>(path)
+}
+
+/// True if the file is the metadata of a Potree 1 octree of ours.
+fn is_cloud(path: &Path) -> bool {
+    #[derive(Deserialize)]
+    struct Object {}
+    #[derive(Deserialize)]
+    struct Cloud {
+        #[serde(rename = "octreeDir")]
+        _octree_dir: String,
+        #[serde(rename = "pointmill")]
+        _pointmill: Object,
+    }
+    is_json::<Cloud>(path)
 }
 
 /// True if a JSON file has this shape; what does not matter is not kept in memory.
@@ -239,7 +262,16 @@ mod tests {
         let several = [("report.json", REPORT), ("batches/points.qbatch", "QBATCHES"), ("bintree/index.json", packed)];
         assert_eq!(standing(&folder(&several)), "ours 5");
 
+        let cloud = ("cloud.js", r#"{"version": "1.7", "octreeDir": "data", "pointmill": {"version": "0.1.0"}}"#);
+        let potree1 = [cloud, ("data/r/r.bin", ""), ("data/r/01234/r01234.hrc", ""), ("report.json", REPORT)];
+        assert_eq!(standing(&folder(&potree1)), "ours 3", "its nodes are not listed");
+        assert_eq!(standing(&folder(&[cloud, ("data/r/x", "")])), "foreign data/r/x");
+        assert_eq!(standing(&folder(&[cloud, ("data", "")])), "foreign data");
+        let inner = [("report.json", REPORT), ("potree1/cloud.js", cloud.1), ("potree1/data/r/r.bin", "")];
+        assert_eq!(standing(&folder(&inner)), "ours 4");
+
         let other = [
+            ("cloud.js", r#"{"version": "1.7", "octreeDir": "data"}"#.to_owned()),
             ("index.json", packed.replace("pointmill 0", "tree 0")),
             ("metadata.json", r#"{"hierarchy": {}, "author": "me"}"#.to_owned()),
             ("points.qbatch", "see QBATCHES".to_owned()),

@@ -3,7 +3,6 @@
 use pointmill_format::NodeKey;
 use serde_json::{Value, json};
 
-use super::Potree2Settings;
 use crate::cloud::{CensusCell, Cloud};
 use crate::error::ConvertError;
 use crate::octree::{Sampling, Spacing};
@@ -35,10 +34,10 @@ const COUNTED_LEVEL: u8 = 6;
 
 /// A spacing, and why it was chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ChosenSpacing {
-    pub(super) spacing: Spacing,
+pub(in crate::outputs) struct ChosenSpacing {
+    pub(in crate::outputs) spacing: Spacing,
     /// World units, in the root.
-    pub(super) root: f64,
+    pub(in crate::outputs) root: f64,
     why: Why,
 }
 
@@ -52,17 +51,21 @@ enum Why {
 }
 
 impl ChosenSpacing {
-    /// As it is requested, or chosen for the root to hold [`ROOT_POINTS`].
+    /// As it is `requested` (world units), or chosen for the root to hold [`ROOT_POINTS`].
     ///
     /// # Errors
     /// A request that the tree cannot keep.
-    pub(super) fn of(settings: &Potree2Settings, cloud: &Cloud<'_>) -> Result<Self, ConvertError> {
+    pub(in crate::outputs) fn of(
+        sampling: Sampling,
+        requested: Option<f64>,
+        cloud: &Cloud<'_>,
+    ) -> Result<Self, ConvertError> {
         let side = cloud.frame.cube.side;
-        let has_cells = match settings.sampling {
+        let has_cells = match sampling {
             Sampling::Poisson => false,
             Sampling::Grid | Sampling::Random { .. } => true,
         };
-        let Some(requested) = settings.spacing else {
+        let Some(requested) = requested else {
             if has_cells {
                 return Ok(Self::new(USUAL_CELLS, side, Why::Cells));
             }
@@ -86,7 +89,7 @@ impl ChosenSpacing {
     }
 
     /// For the report.
-    pub(super) fn describe(&self) -> Value {
+    pub(in crate::outputs) fn describe(&self) -> Value {
         let reason = match self.why {
             Why::Requested => "requested".to_owned(),
             Why::Cells => "usual for cells of a grid".to_owned(),

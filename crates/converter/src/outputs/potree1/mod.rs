@@ -1,0 +1,188 @@
+//! The Potree 1 octree: a file for each node in nested folders, index files beside them, and `cloud.js`.
+//!
+//! [`content`] decides what a record is made of, [`column`] fills what follows the colour; [`steps`] turns positions into
+//! integers of the box of their node, [`errors`] says how far these are from the lattice. [`files`] is a `NodeSink`.
+
+mod column;
+mod content;
+mod encoder;
+mod errors;
+mod files;
+mod metadata;
+mod notes;
+mod settings;
+mod steps;
+
+use std::sync::PoisonError;
+
+use pointmill_format::DatasetKind;
+use pointmill_format::potree1::{METADATA_FILE, Metadata, NodeCount, encode_index};
+use serde_json::{Map, Value};
+
+pub use settings::{Potree1Settings, Potree1Version};
+
+use self::content::{COLOUR_BYTES, Content};
+use self::encoder::{Encoding, Tally};
+use self::errors::Meter;
+use self::files::NodeFiles;
+use self::steps::Steps;
+use super::attributes::changed;
+use super::colour::colour_of;
+use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
+use super::output::{DiskSize, Output, Target, Wants};
+use super::staging::StagedDataset;
+use crate::cloud::Cloud;
+use crate::error::ConvertError;
+use crate::octree::{self, Octree, OctreeSettings};
+use crate::plan::{AttributeChoice, Plan};
+use crate::report::{self, ChangedAttribute, OutputReport};
+use crate::runtime::Runtime;
+use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
+use crate::warning::Warning;
+
+/// Bytes that a file takes on a disk beside its contents, on average, and its record in an index.
+const NODE_BYTES: u64 = 2048 + 5;
+
+impl From<Potree1Settings> for Target {
+    fn from(settings: Potree1Settings) -> Self {
+        Self::new(settings)
+    }
+}
+
+impl Output for Potree1Settings {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Potree1
+    }
+
+    fn check(&self, _: &Plan) -> Result<(), ConvertError> {
+        self.tree().check()
+    }
+
+    fn wants(&self, plan: &Plan, all: &Schema) -> Wants {
+        let mut wants = Wants::chosen(plan, all, false);
+        wants.add(colour_of(all));
+        wants
+    }
+
+    fn least_points(&self) -> u64 {
+        u64::from(self.leaf_capacity)
+    }
+
+    fn least_bytes(&self) -> u64 {
+        UNIT_BYTES
+    }
+
+    fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize {
+        let nodes = 3000 / u64::from(self.leaf_capacity).max(1) + 1;
+        let colour = schema.rgb().map_or(0, |i| schema.attributes[i].size() as u64);
+        let others = if plan.attributes == AttributeChoice::Usual { 0 } else { kept.saturating_sub(colour) };
+        let per_point = (POSITION_BYTES + COLOUR_BYTES) as u64 + others;
+        DiskSize { per_point, per_1000_points: nodes * NODE_BYTES }
+    }
+
+    fn describe_settings(&self, settings: &mut Map<String, Value>) {
+        self.tree().describe(settings);
+        settings.insert("potree1-version".into(), self.version.name().into());
+    }
+
+    fn foresee(&self, _: &Schema, _: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {
+        notes::foresee(self.version, crs)
+    }
+
+    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let content = Content::choose(cloud, self.version)?;
+        let steps = Steps::new(&cloud.frame, &cloud.lattice.lattice);
+        let spacing = ChosenSpacing::of(self.sampling, self.spacing, cloud)?;
+        let mut metadata = metadata::metadata(cloud, self, &spacing, &content, &steps);
+        let meter = Meter::new(cloud, &steps);
+        let encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
+        let settings = OctreeSettings {
+            sampling: self.sampling,
+            spacing: spacing.spacing,
+            leaf_capacity: self.leaf_capacity,
+            unit_points: self.tree().unit_points(cloud),
+        };
+        let files = NodeFiles::new(&encoding, &metadata, to, rt)?;
+        let tree = octree::build(cloud, rt, settings, &files)?;
+        let index_bytes = write_index(&tree, &metadata, to, &files, rt)?;
+        drop(files);
+        metadata.points = Some(tree.ledger.points());
+        let json = metadata.to_json();
+        to.write(METADATA_FILE, json.as_bytes())?;
+
+        let Encoding { content, steps, tally, .. } = encoding;
+        let tally = tally.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let (attributes_changed, changes) = self.changes(cloud, &content, &tally);
+        let mut warnings = self.foresee(cloud.schema(), &content.kept, &cloud.facts.crs);
+        warnings.extend(content.warnings);
+        warnings.extend(changes);
+        let errors = errors::errors(cloud, &steps, &tree.nodes, &tally.positions);
+        Ok(OutputReport {
+            points: tree.ledger.points(),
+            duplicates_dropped: tree.ledger.duplicates_dropped(),
+            accuracy: report::accuracy(cloud, tree.ledger.points(), errors),
+            attributes: cloud.names(content.kept.iter().copied()),
+            attributes_dropped: content.dropped,
+            attributes_changed,
+            attributes_renamed: content.renamed,
+            warnings,
+            bytes: tree.bytes + index_bytes + json.len() as u64,
+            checksum: tree.ledger.unaltered().to_string(),
+            tree: tree_report(&tree),
+            details: self.details(&spacing, &metadata),
+            ..OutputReport::default()
+        })
+    }
+}
+
+impl Potree1Settings {
+    fn tree(&self) -> TreeSettings {
+        let Self { sampling, spacing, leaf_capacity, .. } = *self;
+        TreeSettings { sampling, spacing, leaf_capacity }
+    }
+
+    /// Attributes whose values the dataset cannot hold as they were read.
+    fn changes(&self, cloud: &Cloud<'_>, content: &Content, tally: &Tally) -> (Vec<ChangedAttribute>, Vec<Warning>) {
+        let schema = cloud.schema();
+        let columns = content.columns.iter().zip(&tally.changes);
+        let each = columns.flat_map(|(column, of_column)| {
+            column.indices.iter().filter_map(move |&i| {
+                let doubled = cloud.stats.doubled.get(i).filter(|_| column.source.doubles());
+                changed(self.kind(), &schema.attributes[i], column.stored_as, doubled.unwrap_or(of_column))
+            })
+        });
+        each.unzip()
+    }
+
+    /// What is particular to the format, for the report.
+    fn details(&self, spacing: &ChosenSpacing, metadata: &Metadata) -> Map<String, Value> {
+        let mut details = Map::new();
+        details.insert("spacing".into(), spacing.describe());
+        details.insert("step".into(), metadata.scale.into());
+        details.insert("version".into(), self.version.name().into());
+        details
+    }
+}
+
+/// Writes the index files, and syncs all that was written; returns the bytes of the index.
+fn write_index(
+    tree: &Octree,
+    metadata: &Metadata,
+    to: &StagedDataset,
+    files: &NodeFiles<'_>,
+    rt: &Runtime<'_>,
+) -> Result<u64, ConvertError> {
+    let mut counts: Vec<NodeCount> =
+        tree.nodes.iter().map(|node| NodeCount { key: node.key, points: node.points }).collect();
+    let indexes = encode_index(&mut counts, metadata.step)
+        .map_err(|e| ConvertError::Internal(format!("the index of the octree: {e}")))?;
+    let mut bytes = 0;
+    for index in &indexes {
+        rt.check_stop()?;
+        to.create(&metadata.index_file(index.root))?.write_at(&index.bytes, 0, "writing the index")?;
+        bytes += index.bytes.len() as u64;
+    }
+    let roots: Vec<_> = indexes.iter().map(|index| index.root).collect();
+    files.sync(&tree.nodes, &roots, rt)?;
+    Ok(bytes)
+}
