@@ -306,7 +306,7 @@ fn without_colour_points_are_grey_by_intensity() {
 
     let xyz = bench.dir.path().join("scan.xyz");
     fs::write(&xyz, "1 2 3\n4 5 6\n").unwrap();
-    let plan = Plan { inputs: vec![xyz], ..bench.plan.clone() };
+    let plan = Plan { inputs: vec![xyz], ..bench.plan };
     let report = convert(&plan, &[Potree1Settings::default().into()], &Silent).unwrap();
     assert!(report.warnings.iter().any(|w| w.to_string().contains("all points are white")));
     assert_eq!(own(&plan.output), "white");
