@@ -3,7 +3,7 @@
 
 use super::grouping::Grouping;
 use super::segments::Segment;
-use super::store::Store;
+use super::store::{BLOCK_BYTES, Store};
 use crate::error::ConvertError;
 
 /// Records looked at together: many, so that the groups come in long segments.
@@ -20,7 +20,8 @@ pub(crate) enum Sifted<'r> {
     Loose { segment: Segment, codes: &'r [(u64, u32)] },
 }
 
-/// Regroups records; keeps its memory from one use to the next.
+/// Regroups records; keeps its memory from one use to the next, and that of emptied blocks in the store
+/// ([`Store::drop_spare`] once all is regrouped).
 pub(crate) struct Regrouper<'a> {
     store: &'a Store,
     stride: usize,
@@ -31,7 +32,12 @@ pub(crate) struct Regrouper<'a> {
     grouping: Grouping,
     records: Vec<u8>,
     codes: Vec<u64>,
+    /// The block that is filled, and its source.
+    open: Option<(u32, u32)>,
+    /// Its records.
     sorted: Vec<u8>,
+    /// Bytes that a block grows to.
+    block_bytes: usize,
 }
 
 impl<'a> Regrouper<'a> {
@@ -39,12 +45,13 @@ impl<'a> Regrouper<'a> {
     pub(crate) fn new(store: &'a Store, stride: usize) -> Self {
         let (records, codes, sorted) = (Vec::new(), Vec::new(), Vec::new());
         let points = (BYTES / stride).clamp(1, POINTS);
-        Self { store, stride, points, is_for_all: false, grouping: Grouping::default(), records, codes, sorted }
+        let (is_for_all, block_bytes, open, grouping) = (false, 0, None, Grouping::default());
+        Self { store, stride, points, is_for_all, grouping, records, codes, open, sorted, block_bytes }
     }
 
     /// For all outputs, before the first of them takes a record.
     pub(crate) fn for_all(store: &'a Store, stride: usize) -> Self {
-        Self { is_for_all: true, ..Self::new(store, stride) }
+        Self { is_for_all: true, block_bytes: BLOCK_BYTES, ..Self::new(store, stride) }
     }
 
     /// Takes the records of `segments` and puts them back grouped by `code` (a Morton code: groups that are near in space
@@ -80,10 +87,7 @@ impl<'a> Regrouper<'a> {
                 let count = (segment.count - start).min(room as u32);
                 let part = Segment { block: segment.block, start: segment.start + start, count };
                 start += count;
-                let from = match self.is_for_all {
-                    true => self.store.take_for_all(part, &mut self.records)?,
-                    false => self.store.take(part, &mut self.records)?,
-                };
+                let from = self.store.take_to_put_back(part, self.is_for_all, &mut self.records)?;
                 if let Some(source) = source.filter(|s| *s != from) {
                     // A block holds records of one source.
                     let rest = self.records.split_off(before);
@@ -96,20 +100,11 @@ impl<'a> Regrouper<'a> {
                 }
             }
         }
-        source.map_or(Ok(()), |source| self.put_back(source, least, &mut code, &mut found))
+        source.map_or(Ok(()), |source| self.put_back(source, least, &mut code, &mut found))?;
+        self.close()
     }
 
-    /// Copies the counted records group by group.
-    fn arrange(&mut self) {
-        self.grouping.arrange(|code| code);
-        self.sorted.clear();
-        self.sorted.reserve_exact(self.records.len());
-        for &i in &self.grouping.order {
-            self.sorted.extend_from_slice(&self.records[i as usize * self.stride..][..self.stride]);
-        }
-    }
-
-    /// Puts the records of one source into a new block.
+    /// Puts the records of one source behind those of the open block, or into a new one.
     fn put_back(
         &mut self,
         source: u32,
@@ -124,15 +119,19 @@ impl<'a> Regrouper<'a> {
         self.codes.clear();
         self.codes.extend(self.records.chunks_exact(stride).map(code));
         self.grouping.count(&self.codes);
-        let block = self.store.open(source)?;
+        let block = self.room_for(source)?;
+        let first = (self.sorted.len() / stride) as u32;
         if self.grouping.groups.len() * least > self.codes.len() {
             self.grouping.leave();
-            std::mem::swap(&mut self.records, &mut self.sorted);
-            let segment = Segment { block, start: 0, count: self.codes.len() as u32 };
+            self.sorted.extend_from_slice(&self.records);
+            let segment = Segment { block, start: first, count: self.codes.len() as u32 };
             found(Sifted::Loose { segment, codes: &self.grouping.groups });
         } else {
-            self.arrange();
-            let mut start = 0;
+            self.grouping.arrange(|code| code);
+            for &i in &self.grouping.order {
+                self.sorted.extend_from_slice(&self.records[i as usize * stride..][..stride]);
+            }
+            let mut start = first;
             for &(code, count) in &self.grouping.groups {
                 let records = &self.sorted[start as usize * stride..][..count as usize * stride];
                 found(Sifted::Group { code, segment: Segment { block, start, count }, records });
@@ -140,9 +139,32 @@ impl<'a> Regrouper<'a> {
             }
         }
         self.records.clear();
-        match self.is_for_all {
-            true => self.store.fill(block, &mut self.sorted),
-            false => self.store.refill(block, &mut self.sorted),
+        Ok(())
+    }
+
+    /// The block that takes the records that are looked at.
+    fn room_for(&mut self, source: u32) -> Result<u32, ConvertError> {
+        let bytes = self.records.len();
+        let is_full = self.sorted.len() + bytes > self.block_bytes;
+        if is_full || self.open.is_some_and(|(_, of)| of != source) {
+            self.close()?;
+        }
+        if let Some((block, _)) = self.open {
+            return Ok(block);
+        }
+        if self.sorted.capacity() < bytes.max(self.block_bytes) {
+            self.sorted = self.store.buffer(bytes.max(self.block_bytes))?;
+        }
+        let block = self.store.open(source)?;
+        self.open = Some((block, source));
+        Ok(block)
+    }
+
+    fn close(&mut self) -> Result<(), ConvertError> {
+        match self.open.take() {
+            Some((block, _)) if self.is_for_all => self.store.fill(block, &mut self.sorted),
+            Some((block, _)) => self.store.refill(block, &mut self.sorted),
+            None => Ok(()),
         }
     }
 }

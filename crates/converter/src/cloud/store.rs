@@ -18,6 +18,9 @@ pub(crate) struct Store {
     memory: Arc<Pool>,
     in_memory: AtomicU64,
     blocks: Mutex<Vec<Block>>,
+    /// Buffers of blocks that were taken to be put back in another order: they hold the next ones, so that their memory is
+    /// touched once. They count as records in memory.
+    spare: Mutex<Vec<Vec<u8>>>,
     temp: TempFiles,
     spill: Mutex<Option<Arc<DiskFile>>>,
     spilled: AtomicU64,
@@ -47,6 +50,7 @@ impl Store {
             memory: Arc::clone(memory),
             in_memory: AtomicU64::new(0),
             blocks: Mutex::default(),
+            spare: Mutex::default(),
             temp,
             spill: Mutex::default(),
             spilled: AtomicU64::new(0),
@@ -80,7 +84,8 @@ impl Store {
         let bytes = records.len() as u64;
         let keeps_buffer = records.len() * 2 > records.capacity();
         let cost = if keeps_buffer { records.capacity() as u64 } else { bytes };
-        let place = if self.memory.try_take(Consumer::Records, cost) {
+        let has_room = || self.memory.try_take(Consumer::Records, cost);
+        let place = if has_room() || (self.drop_spare(cost)? > 0 && has_room()) {
             self.in_memory.fetch_add(cost, Ordering::Relaxed);
             let kept = if keeps_buffer { std::mem::take(records) } else { records.as_slice().to_vec() };
             Place::Memory(Arc::new(kept))
@@ -97,10 +102,18 @@ impl Store {
 
     /// Appends the records of a segment to `out` and returns its source. Each output may take each record once.
     pub(crate) fn take(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
-        self.take_uses(segment, 1, out)
+        let (source, emptied) = self.take_uses(segment, 1, out)?;
+        emptied.inspect(|bytes| self.give(bytes.capacity() as u64));
+        Ok(source)
     }
 
-    fn take_uses(&self, segment: Segment, uses: u32, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
+    /// Also returns the bytes of a block all of which was taken; they still count.
+    fn take_uses(
+        &self,
+        segment: Segment,
+        uses: u32,
+        out: &mut Vec<u8>,
+    ) -> Result<(u32, Option<Arc<Vec<u8>>>), ConvertError> {
         let source = self.read(segment, out)?;
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let block = &mut blocks[segment.block as usize];
@@ -108,14 +121,61 @@ impl Store {
         if block.remaining == 0
             && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
         {
-            self.give(bytes.capacity() as u64);
+            return Ok((source, Some(bytes)));
+        }
+        Ok((source, None))
+    }
+
+    /// [`Self::take`] of records that are put back in another order: by [`Self::fill`] if `uses` are those of all outputs, by
+    /// [`Self::refill`] if it is one. Buffers that become empty are kept for [`Self::buffer`], up to
+    /// [`Self::drop_spare`].
+    pub(crate) fn take_to_put_back(
+        &self,
+        segment: Segment,
+        is_for_all: bool,
+        out: &mut Vec<u8>,
+    ) -> Result<u32, ConvertError> {
+        let (source, emptied) = self.take_uses(segment, if is_for_all { self.uses } else { 1 }, out)?;
+        if let Some(bytes) = emptied {
+            self.keep(bytes)?;
         }
         Ok(source)
     }
 
-    /// [`Self::take`] for all outputs at once: the records must be put back by [`Self::fill`].
-    pub(crate) fn take_for_all(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
-        self.take_uses(segment, self.uses, out)
+    /// An empty buffer for so many bytes of records that are put back, touched before if there is such a one.
+    pub(crate) fn buffer(&self, bytes: usize) -> Result<Vec<u8>, ConvertError> {
+        let mut spare = self.spare.lock().map_err(|_| poisoned())?;
+        let fits = |buffer: &Vec<u8>| (bytes..bytes.saturating_mul(2)).contains(&buffer.capacity());
+        let Some(at) = spare.iter().rposition(fits) else { return Ok(os_hints::buffer(bytes)) };
+        let buffer = spare.swap_remove(at);
+        drop(spare);
+        self.give(buffer.capacity() as u64);
+        Ok(buffer)
+    }
+
+    /// Keeps the buffer of a block for the next, unless it is being written to the disk.
+    fn keep(&self, bytes: Arc<Vec<u8>>) -> Result<(), ConvertError> {
+        let size = bytes.capacity() as u64;
+        match Arc::try_unwrap(bytes) {
+            Ok(mut buffer) => {
+                buffer.clear();
+                self.spare.lock().map_err(|_| poisoned())?.push(buffer);
+            }
+            Err(_) => self.give(size),
+        }
+        Ok(())
+    }
+
+    /// Gives back spare buffers of at least so many bytes, as far as there are; returns how many.
+    pub(crate) fn drop_spare(&self, bytes: u64) -> Result<u64, ConvertError> {
+        let (mut spare, mut freed) = (self.spare.lock().map_err(|_| poisoned())?, 0);
+        while freed < bytes
+            && let Some(buffer) = spare.pop()
+        {
+            freed += buffer.capacity() as u64;
+        }
+        self.give(freed);
+        Ok(freed)
     }
 
     /// [`Self::take`], but the records can be taken still.
@@ -163,9 +223,9 @@ impl Store {
 }
 
 impl Evict for Store {
-    /// The last blocks go first: they are needed last.
+    /// Spare buffers go first, then the last blocks: they are needed last.
     fn evict(&self, bytes: u64) -> Result<(), ConvertError> {
-        let (mut freed, mut next) = (0, usize::MAX);
+        let (mut freed, mut next) = (self.drop_spare(bytes)?, usize::MAX);
         while freed < bytes {
             let found = {
                 let blocks = self.blocks.lock().map_err(|_| poisoned())?;
@@ -271,5 +331,31 @@ mod tests {
         store.take(all, &mut out).unwrap();
         assert_eq!((store.in_memory.load(Ordering::Relaxed), out.len()), (0, 120));
         assert!(store.take(all, &mut out).is_err());
+    }
+
+    #[test]
+    fn emptied_blocks_hold_what_is_put_back_and_give_way_to_others() {
+        let (_dir, store) = store(1);
+        let a = store.open(0).unwrap();
+        store.fill(a, &mut vec![1; 20]).unwrap();
+        let mut out = Vec::new();
+        store.take_to_put_back(Segment { block: a, start: 0, count: 2 }, true, &mut out).unwrap();
+        assert_eq!(store.buffer(8).unwrap().capacity(), 8); // records of the block are still to be taken
+        store.take_to_put_back(Segment { block: a, start: 2, count: 3 }, true, &mut out).unwrap();
+        assert_eq!((out.len(), store.memory.free()), (20, 20));
+        assert_eq!(store.buffer(9).unwrap().capacity(), 9); // twice as large as that: `fill` would copy
+        let mut buffer = store.buffer(16).unwrap();
+        assert_eq!((buffer.len(), buffer.capacity(), store.memory.free()), (0, 20, 40));
+        buffer.extend_from_slice(&[2; 16]);
+        let b = store.open(0).unwrap();
+        store.fill(b, &mut buffer).unwrap();
+        store.take_to_put_back(Segment { block: b, start: 0, count: 4 }, true, &mut out).unwrap();
+        assert_eq!((store.memory.free(), store.spilled_bytes()), (20, 0));
+        let c = store.open(0).unwrap();
+        store.fill(c, &mut vec![3; 40]).unwrap(); // has the room of the spare buffer
+        assert_eq!((store.memory.free(), store.spilled_bytes()), (0, 0));
+        store.take_to_put_back(Segment { block: c, start: 0, count: 10 }, true, &mut out).unwrap();
+        store.evict(1).unwrap();
+        assert_eq!((store.memory.free(), store.spilled_bytes()), (40, 0));
     }
 }

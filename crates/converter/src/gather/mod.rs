@@ -86,7 +86,7 @@ pub(crate) fn gather<'a>(
             PassEnd::Complete(mut gathered) => {
                 // a step that was requested may put points together that the sources have apart
                 if gathered.is_lossless || !matches!(plan.scale, ScaleChoice::Fixed(_)) {
-                    gathered.shared_places = places::find(&mut gathered)?;
+                    gathered.shared_places = places::find(&mut gathered, rt)?;
                 }
                 (None, Some(gathered))
             }

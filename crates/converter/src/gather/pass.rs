@@ -105,6 +105,7 @@ impl<'a> Pass<'a> {
             nodes = widened(nodes, level);
             nodes.extend(grouper.group(&loose, u32::from(level))?);
         }
+        store.drop_spare(u64::MAX)?;
         let cells = finished(nodes);
         let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
         room.resize(of_cells + (census.cells.capacity() * size_of::<CensusCell>()) as u64)?;

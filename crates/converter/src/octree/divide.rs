@@ -55,6 +55,7 @@ pub(super) fn divide(
             stack.extend(parts.into_iter().rev());
         }
     }
+    cloud.store.drop_spare(u64::MAX)?;
     let mut subtrees = Vec::new();
     choose(NodeKey::ROOT, &mut cells, unit_points, &mut |key, cells| {
         let mut chunks = Vec::new();

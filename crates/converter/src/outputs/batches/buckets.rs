@@ -180,7 +180,7 @@ fn divide(
     frame: &Frame,
     pieces: &[(Segments, u32)],
 ) -> Result<Vec<Buckets>, ConvertError> {
-    rt.in_parallel(
+    let divided = rt.in_parallel(
         pieces.len(),
         || (Regrouper::new(&cloud.store, cloud.frame.stride), Buckets::new()),
         |(regrouper, buckets), piece| {
@@ -191,7 +191,9 @@ fn divide(
             })
         },
         |(_, buckets)| buckets,
-    )
+    );
+    cloud.store.drop_spare(u64::MAX)?;
+    divided
 }
 
 #[cfg(test)]

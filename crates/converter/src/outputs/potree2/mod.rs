@@ -9,6 +9,8 @@ mod payload;
 mod settings;
 mod watch;
 
+use std::sync::{Mutex, PoisonError};
+
 use pointmill_format::DatasetKind;
 use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
 use serde_json::{Map, Value};
@@ -106,6 +108,7 @@ impl Output for Potree2Settings {
         let seen = AllSeen::default();
         let payloads = Payloads {
             file: to.create("octree.bin")?,
+            turn: Mutex::default(),
             layout,
             encoding: self.encoding,
             events: rt.events(),
@@ -184,6 +187,8 @@ fn entry(node: &FinishedNode) -> NodeEntry {
 /// `octree.bin` while it is written.
 struct Payloads<'a> {
     file: DiskFile,
+    /// Whose turn it is to write: threads that wait for the lock of a file in the kernel do not sleep.
+    turn: Mutex<()>,
     layout: OutputLayout,
     encoding: Encoding,
     events: &'a dyn Events,
@@ -199,7 +204,9 @@ impl<'a> NodeSink for Payloads<'a> {
     }
 
     fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
+        let turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
         self.file.write_at(bytes, offset, "writing node payloads")?;
+        drop(turn);
         self.file.start_write_back(offset, bytes.len());
         Ok(())
     }

@@ -20,8 +20,9 @@ use crate::runtime::Events;
 /// many scattered records at once, and what is done with them then happens in the first-level cache.
 const TILE_RECORDS: usize = 128;
 
-/// From this quality on the library may work for many seconds without asking whether to go on.
-const LONG_QUALITY: u8 = 9;
+/// From this quality on the library may work for many seconds without asking whether to go on (11 s were seen on random
+/// bytes). Up to the one below it asks several times a second, whatever the bytes: a third of a second was the longest.
+const LONG_QUALITY: u8 = 10;
 
 /// Nodes up to this size take less than half a second at any quality.
 const SHORT_BYTES: usize = 64 << 10;
