@@ -8,6 +8,7 @@ fn option(setting: Setting) -> &'static str {
     match setting {
         Setting::Outputs => "--to",
         Setting::LeafCapacity => "--leaf-capacity",
+        Setting::MaxNodePoints => "--max-node-points",
         Setting::Spacing => "--spacing",
         Setting::BrotliQuality => "--brotli-quality",
         Setting::Capacity => "--capacity",
@@ -54,6 +55,9 @@ fn advice(advice: &Advice) -> String {
             "bring the inputs to one system with --reproject, or name the system of all with --crs".to_owned()
         }
         Advice::NameAttributes => "name the attributes to keep with --attributes".to_owned(),
+        Advice::LimitNodes => {
+            "--max-node-points limits all but those whose points share one place (--duplicates drop)".to_owned()
+        }
         Advice::PackLeaves => "--layout packed puts them into one".to_owned(),
         other => other.to_string(),
     }

@@ -9,6 +9,7 @@ fn main() -> io::Result<()> {
     let fixtures = fuzz.join("../fixtures");
     for (target, folder, endings) in [
         ("las", "las", &["las", "laz"][..]),
+        ("copc", "copc", &["laz"]),
         ("e57", "e57", &["e57"]),
         ("ply", "rows", &["ply"]),
         ("pcd", "rows", &["pcd"]),

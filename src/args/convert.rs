@@ -150,6 +150,11 @@ pub(crate) struct Potree1Args {
     /// attribute, and Potree and BA_PointCloud alone read it [default: 1.7]
     #[arg(long, value_enum, value_name = "VERSION", help_heading = "Output: potree1")]
     pub(crate) potree1_version: Option<Potree1VersionArg>,
+    /// Maximum points of any node, such as 65000, which one mesh of an engine holds; what is too much for an inner node goes to
+    /// its children [default: none but for leaves]
+    #[arg(long, value_name = "POINTS", value_parser = whole::<u32>(100..=u64::from(u32::MAX)),
+          allow_negative_numbers = true, help_heading = "Output: potree1")]
+    pub(crate) max_node_points: Option<u32>,
 }
 
 /// Settings of a mean-split binary tree.

@@ -100,6 +100,7 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
         ("--encoding", &[TargetArg::Potree2], args.encoding.is_some()),
         ("--dark-colours", &[TargetArg::Potree2], args.dark_colours.is_some()),
         ("--potree1-version", &[TargetArg::Potree1], args.potree1.potree1_version.is_some()),
+        ("--max-node-points", &[TargetArg::Potree1], args.potree1.max_node_points.is_some()),
         ("--capacity", &[TargetArg::Bintree], tree.capacity.is_some()),
         ("--split", &[TargetArg::Bintree], tree.split.is_some()),
         ("--layout", &[TargetArg::Bintree], tree.layout.is_some()),
@@ -131,6 +132,7 @@ fn potree1_settings(args: &ConvertArgs) -> Potree1Settings {
         sampling: sampling(args).unwrap_or(default.sampling),
         spacing: args.spacing.and_then(|s| s.0),
         leaf_capacity: args.leaf_capacity.unwrap_or(default.leaf_capacity),
+        max_node_points: args.potree1.max_node_points,
         version: args.potree1.potree1_version.map_or(default.version, |v| match v {
             Potree1VersionArg::V1_7 => Potree1Version::V1_7,
             Potree1VersionArg::V1_8 => Potree1Version::V1_8,

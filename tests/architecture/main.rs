@@ -36,7 +36,7 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
             &["error", "write_error", "bytes", "geometry", "names"],
             &["json", "points"],
             &["scan", "octree"],
-            &["potree1", "potree2", "bintree", "batches"],
+            &["copc", "potree1", "potree2", "bintree", "batches"],
             &["dataset_kind"],
             &["open_octree"],
         ],

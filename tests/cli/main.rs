@@ -6,6 +6,7 @@ mod attributes;
 mod bad_input;
 mod bad_output;
 mod batches;
+mod copc;
 mod cut_short;
 mod extract;
 mod folders;

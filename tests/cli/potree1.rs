@@ -95,10 +95,17 @@ fn options_are_for_the_octrees_that_have_them() {
     let dir = with_scans();
     let line = ["--potree1-version", "--to potree1"];
     dir.run(["convert", "a.las", "-o", "out", "--potree1-version", "1.8"]).failed_with(2, &line);
+    let most = ["convert", "a.las", "-o", "out", "--max-node-points", "65000"];
+    dir.run(most).failed_with(2, &["--max-node-points", "--to potree1"]);
+    dir.run(most.iter().take(5).chain(&["9", "--to", "potree1"]))
+        .failed_with(2, &["--max-node-points '9'", "from 100"]);
     let grid = ["convert", "a.las", "-o", "out", "--to", "bintree", "--sampling", "grid"];
     dir.run(grid).failed_with(2, &["--sampling", "--to potree2 or potree1"]);
     dir.succeed(["convert", "a.las", "-o", "out", "-q", "--to", "potree1", "--sampling", "grid", "--spacing", "0.5"]);
     assert_eq!(dir.report("out")["options"]["sampling"], "grid");
+    dir.succeed(["convert", "a.las", "-o", "out", "-q", "--overwrite", "--to", "potree1", "--max-node-points", "150"]);
+    let octree = Dataset::open(dir.path("out")).unwrap();
+    assert!(octree.read_hierarchy().unwrap().iter().all(|node| node.declared <= 150));
     let ended = dir.run(["convert", "a.las", "-o", "out2", "--to", "potree1", "--potree1-version", "1.6"]);
     ended.failed_with(2, &["--potree1-version '1.6'", "1.7, 1.8"]);
 }

@@ -63,6 +63,8 @@ pub enum Advice {
     LeaveOutAttribute,
     /// Put all leaves into one file.
     PackLeaves,
+    /// Limit the points of nodes, and drop duplicates that share one place.
+    LimitNodes,
     /// Leave out the input whose offset or scale is wrong, or convert the inputs separately.
     ConvertApart,
     /// Move the file away, or choose another output.
@@ -104,6 +106,7 @@ impl fmt::Display for Advice {
             Self::Reproject => "reproject the inputs, or name one system for all",
             Self::NameAttributes => "name the attributes to keep",
             Self::LeaveOutAttribute => "leave it out",
+            Self::LimitNodes => "limit the points of nodes; points that share one place stay together",
             Self::PackLeaves => "the packed layout puts all leaves into one file",
             Self::ConvertApart => {
                 "leave out the input whose offset or scale is wrong, or convert the inputs separately"

@@ -123,6 +123,31 @@ fn every_node_has_its_file_and_every_count_is_true() {
 }
 
 #[test]
+fn no_node_has_more_points_than_were_asked_for_whatever_the_memory() {
+    // a cube that is full, so that inner nodes have very many points, and more than one thread builds alone
+    let las = box_of([400; 3], [0.01; 3], 500_000);
+    let bench = Bench::new(&las);
+    let settings = Potree1Settings { max_node_points: Some(3000), ..Potree1Settings::default() };
+    let without = bench.convert(Potree1Settings::default());
+    assert!(without.outputs[0].tree.points_per_level[0] > 20_000);
+    let [plenty, scarce] = [(2, 4 << 30), (1, 100 << 20)].map(|(threads, memory_bytes)| {
+        let plan = Plan { threads, memory_bytes, ..bench.plan.clone() };
+        let report = convert(&plan, &[settings.into()], &Silent).unwrap();
+        assert!(!report.warnings.iter().any(|w| w.kind() == "crowded_nodes"), "{:?}", report.warnings);
+        dataset(&plan.output)
+    });
+    assert_same_dataset(&scarce, &plenty, "with other memory and threads");
+    let found = points_of_nodes(&bench.out(), &las);
+    assert!(found.values().all(|points| (1..=3000).contains(&points.len())));
+    assert!(found[&NodeKey::ROOT].len() == 3000);
+    let mut all: Vec<_> = found.into_values().flatten().collect();
+    let mut meant: Vec<_> = las.points.iter().map(|p| (p.xyz.map(i64::from), p.rgb.map(eight_bit))).collect();
+    all.sort_unstable();
+    meant.sort_unstable();
+    assert!(all == meant);
+}
+
+#[test]
 fn threads_and_memory_do_not_show() {
     let bench = Bench::new(&Las::terrain(400_000, 3));
     let [plenty, scarce] = [(2, 4 << 30), (1, 100 << 20)].map(|(threads, memory_bytes)| {

@@ -36,7 +36,8 @@
 //! * [`potree1`]: Potree 1.4 to 1.8 octrees (`cloud.js`), read lazily from a folder or (feature `zip`) an uncompressed
 //!   archive, and what a writer of them needs.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
-//! * [`octree`]: what the two have in common, for renderers that do not care which one it is.
+//! * `copc` (feature `las`): COPC 1.0, LAZ files that are octrees, read range by range.
+//! * [`octree`]: what these have in common, for renderers that do not care which one it is.
 //! * [`bintree`]: mean-split binary trees of tight boxes, read leaf by leaf with what renderers ask, and written
 //!   (feature `rstar`: nearest points too).
 //! * [`batches`]: quantised batches with levels of detail, mapped as they stand (features `mmap`, `zstd`), and written.
@@ -67,6 +68,8 @@ mod write_error;
 pub mod batches;
 pub mod bintree;
 pub mod bytes;
+#[cfg(feature = "las")]
+pub mod copc;
 pub mod octree;
 pub mod potree1;
 pub mod potree2;
@@ -96,6 +99,8 @@ pub use rstar;
 /// What threads share stays shareable: this compiles, or the types have lost it.
 const _: () = {
     const fn shared<T: Send + Sync>() {}
+    #[cfg(feature = "las")]
+    shared::<copc::Dataset>();
     shared::<potree1::Dataset>();
     shared::<potree2::Dataset>();
     shared::<potree2::Hierarchy>();

@@ -2,6 +2,7 @@
 
 mod batches;
 mod bintree;
+mod copc;
 mod description;
 mod measure;
 mod parts;

@@ -5,6 +5,7 @@ use std::path::Path;
 use pointmill_format::{AxisGrid, OpenOptions, Resolution, Scan, ScanInfo, Unit};
 use serde_json::{Map, Value, json};
 
+use super::copc::{self, Octree};
 use super::description::{Description, attribute_json, corners};
 use super::measure::{Measured, measure};
 use super::parts;
@@ -22,11 +23,13 @@ pub(super) fn describe(file: &Path, options: &OpenOptions, deep: bool) -> Result
         Some((measured, fault)) => (Some(measured), fault.map(Failure::from)),
         None => (None, None),
     };
-    let measured = measured.as_ref();
-    Ok(Description { text: text(&*scan, measured), json: json(&*scan, measured), fault })
+    let (octree, broken) = copc::octree(file);
+    let (measured, octree) = (measured.as_ref(), octree.as_ref());
+    let (text, json) = (text(&*scan, measured, octree), json(&*scan, measured, octree));
+    Ok(Description { text, json, fault: fault.or(broken) })
 }
 
-fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
+fn text(scan: &dyn Scan, measured: Option<&Measured>, octree: Option<&Octree>) -> String {
     let info = scan.info();
     let mut t = Table::about(&info.path);
     t.row("format", &info.format);
@@ -53,6 +56,7 @@ fn text(scan: &dyn Scan, measured: Option<&Measured>) -> String {
     }
     let pieces = plural(scan.pieces().len() as u64, "piece");
     t.row("size", format!("{}, {pieces} to decode in parallel", bytes(info.file_bytes)));
+    octree.into_iter().for_each(|octree| octree.rows(&mut t));
     list(&mut t, "scan", info.parts.iter().map(parts::part_line), info.parts.len());
     list(&mut t, "image", info.images.iter().map(parts::image_line), info.images.len());
     for (i, attribute) in info.attributes.iter().enumerate() {
@@ -108,7 +112,7 @@ fn single_step(v: f64) -> f64 {
     f64::from(v.next_up()) - f64::from(v)
 }
 
-fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
+fn json(scan: &dyn Scan, measured: Option<&Measured>, octree: Option<&Octree>) -> Value {
     let info = scan.info();
     let of_axis = |resolution: Resolution| match resolution {
         Resolution::Grid(grid) => json!({ "stored": "steps", "step": grid.step, "offset": grid.offset }),
@@ -145,6 +149,9 @@ fn json(scan: &dyn Scan, measured: Option<&Measured>) -> Value {
             "bounds": (!measured.bounds.is_empty()).then(|| corners(&measured.bounds)),
             "ranges": names.zip(ranges).collect::<Map<_, _>>(),
         });
+    }
+    if let Some(octree) = octree {
+        object["octree"] = octree.json();
     }
     object
 }

@@ -9,7 +9,7 @@ use super::divide::Chunk;
 use super::finished::Finished;
 use super::list::List;
 use super::order::{OrderScratch, Point, order};
-use super::raise::{Nodes, Pairs, Pending, Points};
+use super::raise::{Nodes, Pairs, Pending, Points, stays};
 use super::sample::Sampler;
 use super::sink::NodeEncoder;
 use crate::cloud::{Cloud, Ledger, morton};
@@ -21,6 +21,8 @@ use crate::runtime::os_hints;
 pub(super) struct ChunkPlan<'a> {
     pub(super) cloud: &'a Cloud<'a>,
     pub(super) leaf_capacity: u32,
+    /// The most points of an inner node.
+    pub(super) most_points: u32,
     /// Points of a unit, at most; buffers are made for as many at once: what is not touched costs nothing.
     pub(super) unit_points: u64,
     /// The same of a chunk.
@@ -68,7 +70,8 @@ impl ChunkMemory {
     ) -> Result<(Pending<List>, u64), ConvertError> {
         let stride = plan.cloud.frame.stride;
         let (points, records) = (&self.points[..], &self.records[..]);
-        let mut nodes = ChunkNodes { points, records, stride, sampler, encoder, borders, finished };
+        let most_points = u64::from(plan.most_points);
+        let mut nodes = ChunkNodes { points, records, stride, most_points, sampler, encoder, borders, finished };
         let mut subtree = Subtree { capacity: plan.leaf_capacity as usize, overfull_leaves: 0 };
         let root = subtree.node(key, 0..self.points.len(), &mut nodes)?;
         Ok((self.detach(root, stride), subtree.overfull_leaves))
@@ -107,6 +110,7 @@ struct ChunkNodes<'a, 'b, E> {
     points: &'a [Point],
     records: &'a [u8],
     stride: usize,
+    most_points: u64,
     sampler: &'a mut Sampler,
     encoder: &'a mut E,
     borders: &'a mut UnitBorders<'b>,
@@ -142,6 +146,29 @@ impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, '_, E> {
         }
         self.borders.note(key, self.sampler.border());
         Ok(points)
+    }
+
+    fn most_points(&self) -> u64 {
+        self.most_points
+    }
+
+    fn give_back(
+        &mut self,
+        key: NodeKey,
+        points: Vec<u32>,
+        children: &mut [Pending<Vec<u32>>],
+    ) -> Result<Vec<u32>, ConvertError> {
+        let (all, mut kept) = (points.count(), Vec::with_capacity(self.most_points as usize));
+        for (i, point) in points.into_iter().enumerate() {
+            let child = morton::child_index(self.points[point as usize].t, key.level);
+            match children.iter_mut().find(|c| c.key.child_index() == child) {
+                Some(child) if !stays(i as u64, all, self.most_points) => child.points.push(point),
+                _ => kept.push(point),
+            }
+        }
+        // points are numbered in Morton order
+        children.iter_mut().for_each(|child| child.points.sort_unstable());
+        Ok(kept)
     }
 
     fn join(&mut self, lists: Vec<Vec<u32>>) -> Result<Vec<u32>, ConvertError> {

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use super::raise::Points;
+use crate::cloud::{RecordFrame, morton};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, DiskFile, Pool, Reservation, TempFiles};
 
@@ -201,6 +202,28 @@ impl Lists {
         }
     }
 
+    /// The records of two lists in one, in Morton order; those that share a place by their bytes. `b`: of the place of `a`, if
+    /// that has one only.
+    pub(super) fn merge(&self, a: &List, b: &List, frame: &RecordFrame) -> Result<List, ConvertError> {
+        let (mut all, is_one_place) = (Writer::new(a.count + b.count), a.is_one_place);
+        let (mut a, mut b) = (Cursor::new(a), Cursor::new(b));
+        loop {
+            let is_first = match (a.record(self)?, b.record(self)?) {
+                (Some(a), Some(b)) => {
+                    morton::compare(frame.tree(a).0, frame.tree(b).0).then_with(|| a.cmp(b)) == std::cmp::Ordering::Less
+                }
+                (None, None) => break,
+                (a, _) => a.is_some(),
+            };
+            let from = if is_first { &mut a } else { &mut b };
+            if let Some(record) = from.record(self)? {
+                all.push(record, self)?;
+            }
+            from.next(self);
+        }
+        Ok(List { is_one_place, ..all.finish(self)? })
+    }
+
     /// Moves one record into a list of its own.
     pub(super) fn take_one(&self, list: &mut List, index: u64) -> Result<List, ConvertError> {
         let from = std::mem::replace(list, List::empty());
@@ -216,6 +239,40 @@ impl Lists {
         *list = rest.finish(self)?;
         list.is_one_place = from.is_one_place;
         one.finish(self)
+    }
+}
+
+/// Reads a list from front to back, a record at a time.
+struct Cursor<'l> {
+    list: &'l List,
+    /// Records before the piece, and bytes of the piece that were read.
+    before: u64,
+    at: usize,
+    piece: Vec<u8>,
+    buffer: Vec<u8>,
+}
+
+impl<'l> Cursor<'l> {
+    fn new(list: &'l List) -> Self {
+        Self { list, before: 0, at: 0, piece: Vec::new(), buffer: Vec::new() }
+    }
+
+    /// The record that it stands at; `None` at the end.
+    fn record(&mut self, lists: &Lists) -> Result<Option<&[u8]>, ConvertError> {
+        if self.at == self.piece.len() {
+            self.before += (self.piece.len() / lists.stride) as u64;
+            self.at = 0;
+            self.piece.clear();
+            if let Some(piece) = lists.piece(self.list, self.before, &mut self.buffer)? {
+                self.piece.extend_from_slice(piece);
+            }
+        }
+        Ok(self.piece.get(self.at..self.at + lists.stride))
+    }
+
+    /// Goes to the next record.
+    fn next(&mut self, lists: &Lists) {
+        self.at += lists.stride;
     }
 }
 
@@ -296,6 +353,9 @@ impl Writer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pointmill_format::Lattice;
+
+    use crate::cloud::{Cube, JobBounds, JobPoint, StoredOrigin};
     use crate::runtime::SystemDisk;
 
     fn numbers(lists: &Lists, list: &List) -> Vec<u32> {
@@ -377,5 +437,30 @@ mod tests {
         let mut list = counted(&lists, 5);
         assert_eq!(list.thin(4, |_| Err("no")), Err("no"));
         assert_eq!((numbers(&lists, &list), list.count()), (vec![0, 1, 2, 3, 4], 5));
+    }
+
+    #[test]
+    fn two_lists_become_one_in_morton_order() {
+        let cube =
+            Cube::around(&JobBounds::new([0; 3], [99; 3]), &Lattice { scale: [1.0; 3], offset: [0.0; 3] }).unwrap();
+        let frame = RecordFrame { stride: 13, cube, origin: StoredOrigin(JobPoint([0; 3])) };
+        let record = |[x, y, z]: [i32; 3], tag: u8| {
+            [x.to_le_bytes(), y.to_le_bytes(), z.to_le_bytes()].concat().into_iter().chain([tag]).collect::<Vec<u8>>()
+        };
+        let memory = Arc::new(Pool::new(1 << 20, 1 << 20));
+        let lists = Lists::new(13, &memory, &TempFiles::new(std::env::temp_dir(), Arc::new(SystemDisk)));
+        let list = |records: &[Vec<u8>]| List::of_chunk(records.concat(), 13);
+        let (a, b) =
+            ([record([0; 3], 1), record([9; 3], 1)], [record([0; 3], 0), record([0; 3], 2), record([90; 3], 0)]);
+        let merged = lists.merge(&list(&a), &list(&b), &frame).unwrap();
+        let mut found = Vec::new();
+        let add = |records: &[u8]| {
+            found.extend_from_slice(records);
+            Ok(true)
+        };
+        lists.each(&merged, add).unwrap();
+        let [a, b] = [&a[..], &b[..]];
+        assert_eq!(found, [&b[0], &a[0], &b[1], &a[1], &b[2]].map(|r| r.clone()).concat());
+        assert_eq!(merged.count(), 5);
     }
 }

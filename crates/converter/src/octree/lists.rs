@@ -7,10 +7,10 @@ use pointmill_format::NodeKey;
 use super::borders::UnitBorders;
 use super::finished::Finished;
 use super::list::{List, Lists, Writer};
-use super::raise::{Nodes, Pairs, Pending, Points};
+use super::raise::{Nodes, Pairs, Pending, Points, stays};
 use super::sample::Sampler;
 use super::sink::NodeEncoder;
-use crate::cloud::{RecordFrame, TreePoint, copy_record};
+use crate::cloud::{RecordFrame, TreePoint, copy_record, morton};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Pool, Reservation};
 
@@ -40,6 +40,7 @@ const USUAL_SAMPLE_BYTES: u64 = 1 << 20;
 /// Nodes while they are made from lists.
 pub(super) struct ListNodes<'n, 'a, E> {
     pub(super) frame: &'n RecordFrame,
+    pub(super) most_points: u64,
     pub(super) pool: &'n Arc<Pool>,
     pub(super) lists: &'n Lists,
     pub(super) sampler: &'n mut Sampler,
@@ -194,6 +195,33 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
         }
         self.memory.sampled.resize(0)?;
         taken.finish(self.lists)
+    }
+
+    fn most_points(&self) -> u64 {
+        self.most_points
+    }
+
+    fn give_back(&mut self, key: NodeKey, points: List, children: &mut [Pending<List>]) -> Result<List, ConvertError> {
+        let (all, most, stride) = (points.count(), self.most_points, self.lists.stride);
+        let mut kept = Writer::new(most);
+        let mut back: Vec<Writer> = children.iter().map(|_| Writer::new(all)).collect();
+        let mut i = 0;
+        self.lists.each(&points, |records| {
+            for record in records.chunks_exact(stride) {
+                let child = morton::child_index(self.frame.tree(record), key.level);
+                match children.iter().position(|c| c.key.child_index() == child) {
+                    Some(child) if !stays(i, all, most) => back[child].push(record, self.lists)?,
+                    _ => kept.push(record, self.lists)?,
+                }
+                i += 1;
+            }
+            Ok(true)
+        })?;
+        for (child, back) in children.iter_mut().zip(back) {
+            let (back, rest) = (back.finish(self.lists)?, std::mem::replace(&mut child.points, List::empty()));
+            child.points = if back.count() == 0 { rest } else { self.lists.merge(&rest, &back, self.frame)? };
+        }
+        kept.finish(self.lists)
     }
 
     fn join(&mut self, lists: Vec<List>) -> Result<List, ConvertError> {

@@ -50,6 +50,8 @@ pub(crate) struct OctreeSettings {
     pub(crate) spacing: Spacing,
     /// A node with more points is divided, unless all of them share one place.
     pub(crate) leaf_capacity: u32,
+    /// An inner node keeps no more points than this; the others go to its children.
+    pub(crate) most_points: u32,
     /// A subtree of so many points is built by one thread: part of the result.
     pub(crate) unit_points: u64,
 }
@@ -61,13 +63,19 @@ pub(crate) fn build<S: NodeSink>(
     settings: OctreeSettings,
     sink: &S,
 ) -> Result<Octree, ConvertError> {
-    let OctreeSettings { sampling, spacing, leaf_capacity, unit_points } = settings;
+    let OctreeSettings { sampling, spacing, leaf_capacity, most_points, unit_points } = settings;
     let (chunk_points, window) = rt.budget.units(unit_points.min(cloud.points()), cloud.frame.stride);
     let (subtrees, _room) = divide::divide(cloud, rt, unit_points, chunk_points)?;
     let units = units::in_order(subtrees);
     let usual_points = chunk_points.min(cloud.points());
     let shared = Shared {
-        plan: ChunkPlan { cloud, leaf_capacity, unit_points: unit_points.min(cloud.points()), usual_points },
+        plan: ChunkPlan {
+            cloud,
+            leaf_capacity,
+            most_points,
+            unit_points: unit_points.min(cloud.points()),
+            usual_points,
+        },
         rt,
         lists: Lists::new(cloud.frame.stride, &rt.memory, &rt.temp),
         borders: Borders::new(spacing, &rt.memory, &rt.temp),

@@ -38,6 +38,12 @@ pub(super) trait Nodes<L: Points> {
     /// Chooses the points of the node above `children`; these keep the rest.
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<L>]) -> Result<L, ConvertError>;
 
+    /// The most points that an inner node keeps.
+    fn most_points(&self) -> u64;
+
+    /// Gives points back to `children`, of whom they were taken, evenly: [`Self::most_points`] stay.
+    fn give_back(&mut self, key: NodeKey, points: L, children: &mut [Pending<L>]) -> Result<L, ConvertError>;
+
     /// The points of lists that follow one another, in one.
     fn join(&mut self, lists: Vec<L>) -> Result<L, ConvertError>;
 
@@ -49,6 +55,12 @@ pub(super) trait Nodes<L: Points> {
 
     /// Writes a final node.
     fn write(&mut self, key: NodeKey, points: L) -> Result<(), ConvertError>;
+}
+
+/// Whether the `i`th of `all` points is among `most` that are spread evenly over them.
+pub(super) fn stays(i: u64, all: u64, most: u64) -> bool {
+    let before = |i: u64| u128::from(i) * u128::from(most) / u128::from(all.max(1));
+    before(i + 1) > before(i)
 }
 
 impl<L: Points> Pending<L> {
@@ -63,7 +75,10 @@ impl<L: Points> Pending<L> {
         mut children: Vec<Self>,
         nodes: &mut impl Nodes<L>,
     ) -> Result<Self, ConvertError> {
-        let points = nodes.sample(key, &mut children)?;
+        let mut points = nodes.sample(key, &mut children)?;
+        if points.count() > nodes.most_points() {
+            points = nodes.give_back(key, points, &mut children)?;
+        }
         for child in &mut children {
             child.refill(nodes)?;
         }

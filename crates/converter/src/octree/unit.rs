@@ -149,6 +149,7 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
     fn nodes<'n>(&'n mut self, borders: &'n mut UnitBorders<'a>, finished: &'n mut Finished) -> ListNodes<'n, 'a, E> {
         ListNodes {
             frame: &self.shared.plan.cloud.frame,
+            most_points: self.shared.plan.most_points.into(),
             pool: &self.shared.rt.memory,
             lists: &self.shared.lists,
             sampler: &mut self.sampler,

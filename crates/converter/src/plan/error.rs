@@ -15,6 +15,8 @@ pub enum Setting {
     Outputs,
     /// Maximum points of an octree leaf.
     LeafCapacity,
+    /// Maximum points of any node of an octree.
+    MaxNodePoints,
     /// Distance between points in the root of an octree.
     Spacing,
     /// Quality of Brotli compression.
@@ -44,6 +46,7 @@ impl Setting {
             Self::Inputs => "inputs",
             Self::Outputs => "outputs",
             Self::LeafCapacity => "leaf capacity",
+            Self::MaxNodePoints => "points of a node",
             Self::Spacing => "spacing",
             Self::BrotliQuality => "Brotli quality",
             Self::Capacity => "capacity",

@@ -32,6 +32,15 @@ pub enum ViewerNote {
     Brotli,
     /// Some viewers do not read attributes that are objects.
     Objects,
+    /// Nodes have more points than a mesh of an engine, or than was allowed where not all of them share a place.
+    CrowdedNodes {
+        /// Such nodes.
+        nodes: u64,
+        /// Points of the fullest.
+        points: u32,
+        /// Points that there should be at most.
+        most: u32,
+    },
     /// A viewer does not know how long these attributes are.
     BehindColour {
         /// Their words.
@@ -92,6 +101,7 @@ impl ViewerNote {
             Self::Brotli => "brotli_readers",
             Self::Objects => "object_readers",
             Self::BehindColour { .. } => "behind_colour",
+            Self::CrowdedNodes { .. } => "crowded_nodes",
             Self::Geocentric { .. } => "geocentric",
             Self::Degrees { .. } => "degrees",
         }
@@ -100,6 +110,7 @@ impl ViewerNote {
     pub(super) const fn advice(&self) -> Option<Advice> {
         match self {
             Self::DarkColours { .. } => Some(Advice::RoundDarkColours),
+            Self::CrowdedNodes { .. } => Some(Advice::LimitNodes),
             Self::Geocentric { .. } | Self::Degrees { .. } => Some(Advice::Project),
             _ => None,
         }
@@ -131,6 +142,13 @@ impl fmt::Display for ViewerNote {
             Self::Objects => {
                 f.write_str("three-loader, potree-core, loaders.gl, iTowns and Giro3D do not read version 1.8")
             }
+            Self::CrowdedNodes { nodes, points, most } => write!(
+                f,
+                "{} of the nodes have more than {} points, the fullest {}: meshes of engines do not hold them",
+                grouped(*nodes),
+                grouped(u64::from(*most)),
+                grouped(u64::from(*points))
+            ),
             Self::BehindColour { words } => write!(
                 f,
                 "BA_PointCloud does not know the number of bytes of {}, and would show nonsense",

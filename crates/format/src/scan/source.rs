@@ -4,15 +4,41 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::bytes::read_exact_at;
+use crate::bytes::{ByteSource, read_exact_at};
 use crate::{Advice, Fault, ReadError};
 
 /// An open file of known length.
 #[derive(Debug)]
 pub(crate) struct Source {
-    file: File,
+    bytes: Bytes,
     path: PathBuf,
     len: u64,
+}
+
+/// Where the bytes are.
+enum Bytes {
+    File(File),
+    /// The file of that name, wherever it is.
+    #[cfg_attr(not(feature = "las"), allow(dead_code))]
+    Elsewhere(Box<dyn ByteSource>, String),
+}
+
+impl Bytes {
+    fn read_at(&self, buf: &mut [u8], offset: u64) -> io::Result<()> {
+        match self {
+            Self::File(file) => read_exact_at(file, buf, offset),
+            Self::Elsewhere(source, file) => source.read_at(file, offset, buf),
+        }
+    }
+}
+
+impl std::fmt::Debug for Bytes {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::File(file) => file.fmt(f),
+            Self::Elsewhere(source, file) => source.locate(file).fmt(f),
+        }
+    }
 }
 
 impl Source {
@@ -29,7 +55,15 @@ impl Source {
         }
         let file = File::open(path).map_err(io)?;
         let meta = file.metadata().map_err(io)?;
-        Ok(Self { file, path: path.to_path_buf(), len: meta.len() })
+        Ok(Self { bytes: Bytes::File(file), path: path.to_path_buf(), len: meta.len() })
+    }
+
+    /// The file `file` of any source.
+    #[cfg(feature = "las")]
+    pub(crate) fn elsewhere(source: impl ByteSource + 'static, file: &str) -> Result<Self, ReadError> {
+        let path = source.locate(file);
+        let len = source.size(file).map_err(|e| ReadError::io(&path, "opening", e))?;
+        Ok(Self { bytes: Bytes::Elsewhere(Box::new(source), file.to_owned()), path, len })
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -43,7 +77,7 @@ impl Source {
 
     /// Fills `buf` from `offset`.
     pub(crate) fn read_at(&self, offset: u64, buf: &mut [u8]) -> Result<(), ReadError> {
-        read_exact_at(&self.file, buf, offset).map_err(|e| match e.kind() {
+        self.bytes.read_at(buf, offset).map_err(|e| match e.kind() {
             io::ErrorKind::UnexpectedEof => self.cut_short(offset, buf.len() as u64).advise(Advice::CutShort),
             _ => ReadError::io(&self.path, "reading", e),
         })

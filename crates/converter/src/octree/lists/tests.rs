@@ -72,6 +72,7 @@ fn sample(children: &[Vec<([i32; 3], u32)>], stride: usize, is_on_disk: bool) ->
     let (frame, spacing) = (frame(stride), Spacing::default());
     let borders = Borders::new(spacing, &memory, &temp);
     let mut nodes = ListNodes {
+        most_points: u64::MAX,
         frame: &frame,
         pool: &memory,
         lists: &lists,

@@ -45,6 +45,7 @@ pub(super) fn metadata(
     }
     own.insert("sampling".into(), settings.sampling.name().into());
     own.insert("leafCapacity".into(), settings.leaf_capacity.into());
+    own.extend(settings.max_node_points.map(|most| ("maxNodePoints".to_owned(), most.into())));
     metadata.extra = Map::from_iter([("pointmill".to_owned(), own.into())]);
     metadata
 }

@@ -34,7 +34,7 @@ use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::octree::{self, Octree, OctreeSettings};
-use crate::plan::{AttributeChoice, Plan};
+use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, ChangedAttribute, OutputReport};
 use crate::runtime::Runtime;
 use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
@@ -55,6 +55,9 @@ impl Output for Potree1Settings {
     }
 
     fn check(&self, _: &Plan) -> Result<(), ConvertError> {
+        if self.max_node_points == Some(0) {
+            return Err(PlanError::new(Setting::MaxNodePoints, PlanFault::Zero).into());
+        }
         self.tree().check()
     }
 
@@ -65,7 +68,7 @@ impl Output for Potree1Settings {
     }
 
     fn least_points(&self) -> u64 {
-        u64::from(self.leaf_capacity)
+        u64::from(self.capacity())
     }
 
     fn least_bytes(&self) -> u64 {
@@ -73,7 +76,7 @@ impl Output for Potree1Settings {
     }
 
     fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize {
-        let nodes = 3000 / u64::from(self.leaf_capacity).max(1) + 1;
+        let nodes = 3000 / u64::from(self.capacity()).max(1) + 1;
         let colour = schema.rgb().map_or(0, |i| schema.attributes[i].size() as u64);
         let others = if plan.attributes == AttributeChoice::Usual { 0 } else { kept.saturating_sub(colour) };
         let per_point = (POSITION_BYTES + COLOUR_BYTES) as u64 + others;
@@ -83,6 +86,9 @@ impl Output for Potree1Settings {
     fn describe_settings(&self, settings: &mut Map<String, Value>) {
         self.tree().describe(settings);
         settings.insert("potree1-version".into(), self.version.name().into());
+        if let Some(most) = self.max_node_points {
+            settings.insert("max-node-points".into(), most.into());
+        }
     }
 
     fn foresee(&self, _: &Schema, _: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {
@@ -99,7 +105,8 @@ impl Output for Potree1Settings {
         let settings = OctreeSettings {
             sampling: self.sampling,
             spacing: spacing.spacing,
-            leaf_capacity: self.leaf_capacity,
+            leaf_capacity: self.capacity(),
+            most_points: self.max_node_points.unwrap_or(u32::MAX),
             unit_points: self.tree().unit_points(cloud),
         };
         let files = NodeFiles::new(&encoding, &metadata, to, rt)?;
@@ -116,6 +123,7 @@ impl Output for Potree1Settings {
         let mut warnings = self.foresee(cloud.schema(), &content.kept, &cloud.facts.crs);
         warnings.extend(content.warnings);
         warnings.extend(changes);
+        warnings.extend(notes::crowded(&tree.nodes, self.max_node_points));
         let errors = errors::errors(cloud, &steps, &tree.nodes, &tally.positions);
         Ok(OutputReport {
             points: tree.ledger.points(),
@@ -137,8 +145,13 @@ impl Output for Potree1Settings {
 
 impl Potree1Settings {
     fn tree(&self) -> TreeSettings {
-        let Self { sampling, spacing, leaf_capacity, .. } = *self;
-        TreeSettings { sampling, spacing, leaf_capacity }
+        let Self { sampling, spacing, .. } = *self;
+        TreeSettings { sampling, spacing, leaf_capacity: self.capacity() }
+    }
+
+    /// Points of a leaf, at most.
+    fn capacity(&self) -> u32 {
+        self.leaf_capacity.min(self.max_node_points.unwrap_or(u32::MAX))
     }
 
     /// Attributes whose values the dataset cannot hold as they were read.

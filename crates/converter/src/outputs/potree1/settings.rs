@@ -11,13 +11,22 @@ pub struct Potree1Settings {
     pub spacing: Option<f64>,
     /// A node with more points than this is divided, unless all of them share one position.
     pub leaf_capacity: u32,
+    /// No node has more points than this, unless all of them share one position; what is too much for an inner node goes to
+    /// its children.
+    pub max_node_points: Option<u32>,
     /// How attributes are described, and so which there can be.
     pub version: Potree1Version,
 }
 
 impl Default for Potree1Settings {
     fn default() -> Self {
-        Self { sampling: Sampling::Poisson, spacing: None, leaf_capacity: 20_000, version: Potree1Version::V1_7 }
+        Self {
+            sampling: Sampling::Poisson,
+            spacing: None,
+            leaf_capacity: 20_000,
+            max_node_points: None,
+            version: Potree1Version::V1_7,
+        }
     }
 }
 

@@ -120,6 +120,7 @@ impl Output for Potree2Settings {
             sampling: self.sampling,
             spacing: spacing.spacing,
             leaf_capacity: self.leaf_capacity,
+            most_points: u32::MAX,
             unit_points: self.tree().unit_points(cloud),
         };
         let tree = octree::build(cloud, rt, settings, &payloads)?;

@@ -35,6 +35,7 @@
 mod ahead;
 mod bytes;
 mod chunk_table;
+mod chunks;
 mod compatible;
 mod compressed;
 mod crs;
@@ -43,6 +44,7 @@ mod decompress;
 mod emitter;
 mod extra_bytes;
 mod file;
+mod front;
 mod geotiff;
 mod header;
 mod kernels;
@@ -58,15 +60,14 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::scan::source::Source;
-use crate::{Advice, Fault, Piece, ReadError, Scan, ScanInfo, ScanWarning, Scratch, Sink, Wanted};
+use crate::{Piece, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
 use chunk_table::Layout;
 use file::LasScan;
-use header::Header;
-use laszip::{Arrangement, LaszipFault, LaszipRecord};
+use front::Front;
+use laszip::LaszipRecord;
 use pieces::Planner;
-use records::Records;
-use schema::Schema;
 
+pub(crate) use chunks::{ChunkFile, ChunkPlace};
 pub use header::is_las;
 
 /// Scans opened so far: each has a number of its own.
@@ -84,17 +85,9 @@ pub fn open(path: impl AsRef<Path>) -> Result<Box<dyn Scan>, ReadError> {
 impl LasScan {
     fn open(path: &Path) -> Result<Self, ReadError> {
         let source = Source::open(path)?;
-        let mut warnings = Vec::new();
-        let mut header = Header::read(&source, &mut warnings)?;
-        let records = Records::read(&source, &header, &mut warnings)?;
-        let schema = Schema::new(&header, &records, &mut warnings);
-        if schema.compatible.is_some() {
-            header.take_point_count(compatible::point_count(&records), &mut warnings);
-        }
-        let laszip = find_laszip(&source, &header, &records, &mut warnings)?;
-        // compatibility mode has cleared the bit: the points were of a format that has WKT alone
-        let wkt_counts = header.wkt_counts || schema.compatible.is_some();
-        let crs = crs::read(&records, wkt_counts, &mut warnings);
+        let front = Front::read(&source)?;
+        let format = front.format_name();
+        let Front { header, records, schema, laszip, crs, mut warnings } = front;
         let mut planner = Planner { source: &source, header: &header, records: &records, warnings: &mut warnings };
         let plan = match &laszip {
             Some(laszip) => planner.laz(laszip)?,
@@ -102,7 +95,7 @@ impl LasScan {
         };
         let info = ScanInfo {
             path: path.to_path_buf(),
-            format: format_name(&header, &records, &schema, laszip.is_some()),
+            format,
             points_declared: header.point_count,
             bounds_declared: header.bounds,
             lattice: header.lattice.is_valid().then_some(header.lattice),
@@ -152,47 +145,4 @@ impl Scan for LasScan {
     ) -> Result<(), ReadError> {
         decode::piece(self, piece, wanted, scratch, sink)
     }
-}
-
-/// The LASzip record of a compressed file.
-///
-/// Some tools unpack a LAZ file and keep its record. Such a file lacks the compression bits in its point format and is
-/// long enough for plain records.
-fn find_laszip(
-    source: &Source,
-    header: &Header,
-    records: &Records,
-    warnings: &mut Vec<ScanWarning>,
-) -> Result<Option<LaszipRecord>, ReadError> {
-    let broken = |offset: u64, what: String| {
-        ReadError::broken(source.path(), offset, Fault::Header(what)).advise(Advice::ExportAgain)
-    };
-    let Some(record) = records.find("laszip encoded", 22204) else {
-        let what = "the points are marked as compressed but there is no LASzip record";
-        return if header.compressed_bit { Err(broken(104, what.to_owned())) } else { Ok(None) };
-    };
-    let plain_len = header.point_count.saturating_mul(header.record_len as u64).saturating_add(header.points_start);
-    if !header.compressed_bit && plain_len <= source.len() {
-        warnings.push(ScanWarning::LaszipIgnored);
-        return Ok(None);
-    }
-    let laszip = LaszipRecord::parse(record, header).map_err(|fault| match fault {
-        LaszipFault::Broken(what) => broken(record.data_offset, what),
-        LaszipFault::Unknown(what) => ReadError::unsupported(source.path(), what),
-    })?;
-    Ok((laszip.arrangement != Arrangement::Plain).then_some(laszip))
-}
-
-fn format_name(header: &Header, records: &Records, schema: &Schema, compressed: bool) -> String {
-    let kind = match (compressed, records.find("copc", 1)) {
-        (true, Some(_)) => "COPC, LAZ",
-        (true, None) => "LAZ",
-        (false, _) => "LAS",
-    };
-    let (Header { version, point_format: stored, .. }, compatible) = (header, schema.compatible);
-    let points = match compatible.map(|c| c.point_format(*stored)) {
-        Some(format) => format!("{format}, stored as {stored} in LASzip's compatibility mode"),
-        None => stored.to_string(),
-    };
-    format!("{kind} {}.{}, point format {points}", version.0, version.1)
 }

@@ -1,0 +1,54 @@
+//! COPC files: scans that are octrees, too.
+
+use pointmill_testkit::damage::put;
+use pointmill_testkit::files::{fixture, fixture_bytes};
+use serde_json::{Value, json};
+
+use crate::support::Dir;
+
+#[test]
+fn info_tells_the_octree_of_a_copc_file_beside_the_scan() {
+    let dir = Dir::new();
+    let path = fixture("copc/pages.copc.laz");
+    let text = dir.succeed(["info", path.to_str().unwrap()]).stdout();
+    for words in [
+        "COPC, LAZ 1.4, point format 7",
+        "octree        7 nodes\n",
+        "spacing       0.5 at the root, halved per level",
+        "levels        0: 7 points in 1 node\n",
+        "1: 4 points in 3 nodes\n",
+        "4: 2 points in 1 node\n",
+    ] {
+        assert!(text.contains(words), "{words} is not in {text}");
+    }
+    let ended = dir.succeed(["info", "--json", path.to_str().unwrap()]);
+    let octree = serde_json::from_str::<Value>(&ended.stdout()).unwrap()[0]["octree"].take();
+    assert_eq!((&octree["nodes"], &octree["points"]), (&json!(7), &json!(22)));
+    assert_eq!(octree["points_per_level"], json!([7, 4, 4, 5, 2]));
+    assert_eq!(octree["nodes_per_level"], json!([1, 3, 1, 1, 1]));
+    assert_eq!((&octree["spacing"], &octree["levels"]), (&json!(0.5), &json!(5)));
+    assert_eq!(octree["cube"]["max"], json!([500_016.0, 4_000_016.0, -16.0]));
+    let plain = fixture("las/format7.laz");
+    let text = dir.succeed(["info", plain.to_str().unwrap()]).stdout();
+    assert!(!text.contains("octree"), "{text}");
+}
+
+#[test]
+fn a_broken_hierarchy_is_an_error_of_info_and_no_obstacle_to_reading_the_scan() {
+    let dir = Dir::new();
+    let mut bytes = fixture_bytes("copc/pages.copc.laz");
+    // the page of r0 is beyond the end
+    put(&mut bytes, 2870 + 64 + 16, &1_000_000u64.to_le_bytes());
+    dir.write("broken.copc.laz", &bytes);
+    let ended = dir.run(["info", "broken.copc.laz"]);
+    assert_eq!(ended.code(), 3);
+    assert!(ended.stdout().contains("COPC, LAZ 1.4, point format 7") && !ended.stdout().contains("octree"));
+    let line = ended.stderr();
+    assert!(
+        line.contains("the hierarchy page of node r0 is said to have 64 bytes that are not in the file")
+            && line.trim_end().lines().count() == 1,
+        "{line}"
+    );
+    dir.succeed(["convert", "broken.copc.laz", "-o", "out", "-q"]);
+    assert_eq!(dir.report("out")["outputs"][0]["points"], 22);
+}
