@@ -40,6 +40,9 @@ enum Place {
     Gone,
 }
 
+/// The bytes of a block all of which was taken.
+type Emptied = Option<Arc<Vec<u8>>>;
+
 impl Store {
     /// An empty store for `uses` outputs that each take every record once. What finds no room in `memory` goes into a
     /// temporary file.
@@ -108,12 +111,7 @@ impl Store {
     }
 
     /// Also returns the bytes of a block all of which was taken; they still count.
-    fn take_uses(
-        &self,
-        segment: Segment,
-        uses: u32,
-        out: &mut Vec<u8>,
-    ) -> Result<(u32, Option<Arc<Vec<u8>>>), ConvertError> {
+    fn take_uses(&self, segment: Segment, uses: u32, out: &mut Vec<u8>) -> Result<(u32, Emptied), ConvertError> {
         let source = self.read(segment, out)?;
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let block = &mut blocks[segment.block as usize];
