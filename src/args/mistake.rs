@@ -136,7 +136,10 @@ mod tests {
             (&["convert", "a", "-o"], "--output needs a value"),
             (&["convert", "a", "-o", "b", "--memry", "2"], "there is no option --memry; did you mean --memory?"),
             (&["validate", "a", "b"], "'b' is one argument too many; see 'pointmill validate --help'"),
-            (&["convert", "a", "-o", "b", "--to", "potree"], "expected one of potree2, bintree, batches; did you mean"),
+            (
+                &["convert", "a", "-o", "b", "--to", "potree"],
+                "one of potree2, potree1, bintree, batches; did you mean potree2?",
+            ),
             (&["convert", "a", "-o", "b", "--threads", "x"], "--threads 'x': expected a whole number from 1 to 1024"),
             (&["convert", "a", "-o", "b", "--memory", "-5"], "--memory '-5': expected a size such as"),
             (&["convert", "a", "-o", "b", "-v", "-q"], "--verbose and --quiet exclude each other"),
