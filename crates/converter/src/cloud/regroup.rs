@@ -49,9 +49,10 @@ impl<'a> Regrouper<'a> {
         Self { store, stride, points, is_for_all, grouping, records, codes, open, sorted, block_bytes }
     }
 
-    /// For all outputs, before the first of them takes a record.
-    pub(crate) fn for_all(store: &'a Store, stride: usize) -> Self {
-        Self { is_for_all: true, block_bytes: BLOCK_BYTES, ..Self::new(store, stride) }
+    /// For all outputs, before the first of them takes a record; `points`: of all that are regrouped.
+    pub(crate) fn for_all(store: &'a Store, stride: usize, points: u64) -> Self {
+        let block_bytes = (points * stride as u64).min(BLOCK_BYTES as u64) as usize;
+        Self { is_for_all: true, block_bytes, ..Self::new(store, stride) }
     }
 
     /// Takes the records of `segments` and puts them back grouped by `code` (a Morton code: groups that are near in space

@@ -34,7 +34,7 @@ impl Grouper<'_> {
             pieces.len(),
             || {
                 let room = Reservation::new(&self.rt.memory, Consumer::Cells);
-                (Regrouper::for_all(self.store, self.frame.stride), Collected::default(), room)
+                (Regrouper::for_all(self.store, self.frame.stride, records.points()), Collected::default(), room)
             },
             |(regrouper, found, room), piece| {
                 let code = |record: &[u8]| morton::path(self.frame.tree(record), TREE_BITS - level, level);
@@ -73,9 +73,10 @@ impl Grouper<'_> {
         let mut parts: Vec<(u64, CellPart)> = parts.into_iter().collect();
         parts.sort_unstable_by_key(|(code, _)| *code);
         let pieces = pieces(parts.iter().map(|(_, part)| &part.segments));
+        let points = parts.iter().map(|(_, part)| part.segments.points()).sum();
         let each = self.rt.in_parallel(
             pieces.len(),
-            || (Regrouper::for_all(self.store, self.frame.stride), CellParts::default()),
+            || (Regrouper::for_all(self.store, self.frame.stride, points), CellParts::default()),
             |(regrouper, found), piece| {
                 let code = |record: &[u8]| morton::path(self.frame.tree(record), TREE_BITS - level, level);
                 regrouper.sift(&pieces[piece], 0, code, |sifted| {
