@@ -33,7 +33,7 @@ fn advice(advice: &Advice) -> String {
             "free some space there, or put temporary files elsewhere with --temp-dir".to_owned()
         }
         Advice::DropDuplicates => "pass --duplicates drop".to_owned(),
-        Advice::KeepDuplicates => "leave out --duplicates drop, or convert to potree2".to_owned(),
+        Advice::KeepDuplicates => "leave out --duplicates drop, or convert to octrees alone".to_owned(),
         Advice::CutBounds { bounds: Some(b) } => format!("--bounds {} keeps all others", bounds_value(b)),
         Advice::CutBounds { bounds: None } => "leave them out with --bounds, or correct the input".to_owned(),
         Advice::CutOutliers { bounds } => format!(
@@ -58,6 +58,7 @@ fn advice(advice: &Advice) -> String {
         Advice::LimitNodes => {
             "--max-node-points limits all but those whose points share one place (--duplicates drop)".to_owned()
         }
+        Advice::CoarserStep { least } => format!("choose a step of at least {least} with --scale"),
         Advice::PackLeaves => "--layout packed puts them into one".to_owned(),
         other => other.to_string(),
     }

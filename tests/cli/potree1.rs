@@ -104,6 +104,7 @@ fn options_are_for_the_octrees_that_have_them() {
     dir.succeed(["convert", "a.las", "-o", "out", "-q", "--to", "potree1", "--sampling", "grid", "--spacing", "0.5"]);
     assert_eq!(dir.report("out")["options"]["sampling"], "grid");
     dir.succeed(["convert", "a.las", "-o", "out", "-q", "--overwrite", "--to", "potree1", "--max-node-points", "150"]);
+    dir.validate("out", &["a.las"]);
     let octree = Dataset::open(dir.path("out")).unwrap();
     assert!(octree.read_hierarchy().unwrap().iter().all(|node| node.declared <= 150));
     let ended = dir.run(["convert", "a.las", "-o", "out2", "--to", "potree1", "--potree1-version", "1.6"]);

@@ -23,7 +23,7 @@ pub enum Advice {
     AllowLargerFiles,
     /// Drop duplicates.
     DropDuplicates,
-    /// Keep the duplicates, or convert to the octree alone.
+    /// Keep the duplicates, or convert to octrees alone.
     KeepDuplicates,
     /// Keep only the points inside a box that leaves out the far ones.
     CutBounds {
@@ -65,6 +65,11 @@ pub enum Advice {
     PackLeaves,
     /// Limit the points of nodes, and drop duplicates that share one place.
     LimitNodes,
+    /// Choose a step that is not shorter for the axis.
+    CoarserStep {
+        /// The shortest, world units.
+        least: f64,
+    },
     /// Leave out the input whose offset or scale is wrong, or convert the inputs separately.
     ConvertApart,
     /// Move the file away, or choose another output.
@@ -82,6 +87,7 @@ impl fmt::Display for Advice {
             Self::CutBounds { bounds: Some(b) } => {
                 return write!(f, "keep only the points from {:?} to {:?} to leave them out", b.min, b.max);
             }
+            Self::CoarserStep { least } => return write!(f, "choose a step of at least {least}"),
             Self::CutOutliers { bounds: b } => {
                 let (min, max) = (b.min, b.max);
                 return write!(f, "keep only the points from {min:?} to {max:?}, drop outliers, or keep them");
@@ -91,7 +97,7 @@ impl fmt::Display for Advice {
             Self::FreeTemporaryDisk => "free some space there, or put temporary files elsewhere",
             Self::AllowLargerFiles => "raise the limit on the size of files, or choose another file system",
             Self::DropDuplicates => "drop duplicates",
-            Self::KeepDuplicates => "keep duplicates, or convert to potree2",
+            Self::KeepDuplicates => "keep duplicates, or convert to octrees",
             Self::CutBounds { bounds: None } => "limit the bounds to leave them out, or correct the input",
             Self::SkipInvalid => "skip invalid points to leave such points out",
             Self::SkipOriginPoints => "skip points at the origin of their scan to leave them out",

@@ -79,6 +79,17 @@ pub enum Unsupported {
     },
     /// The inputs are too far apart for one lattice of 31 bits.
     TooFarApart,
+    /// One step serves all axes of the format, and is longer than that of one of them.
+    FineAxis {
+        /// The format.
+        kind: DatasetKind,
+        /// The axis: 0, 1 or 2.
+        axis: usize,
+        /// Its step, world units.
+        step: f64,
+        /// The shortest step that the cube allows, world units.
+        least: f64,
+    },
     /// The format cannot hold this cloud.
     Format {
         /// The format.
@@ -308,6 +319,7 @@ impl Unsupported {
             Self::LeafColumns(_) => Some(Advice::LeaveOutAttribute),
             Self::CrowdedNode { .. } => Some(Advice::DropDuplicates),
             Self::TooFarApart => Some(Advice::ConvertApart),
+            Self::FineAxis { least, .. } => Some(Advice::CoarserStep { least: *least }),
             Self::Format { .. } => None,
         }
     }
@@ -316,7 +328,7 @@ impl Unsupported {
 impl fmt::Display for Unsupported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::DropDuplicates(kind) => write!(f, "{kind}: duplicates can be dropped for potree2 only"),
+            Self::DropDuplicates(kind) => write!(f, "{kind}: duplicates can be dropped for octrees only"),
             Self::WideAttribute { kind, name, elements, max } => {
                 write!(f, "{kind}: \"{name}\" has {elements} elements per point, viewers read at most {max}")
             }
@@ -325,6 +337,13 @@ impl fmt::Display for Unsupported {
                 write!(f, "{points} points share one place; a node holds at most {max}")
             }
             Self::TooFarApart => f.write_str("the inputs are too far apart for one lattice of 31 bits"),
+            Self::FineAxis { kind, axis, step, least } => {
+                let axis = ['x', 'y', 'z'][*axis];
+                write!(
+                    f,
+                    "{kind}: positions have one step for all axes, at least {least} here; that of {axis} is {step}"
+                )
+            }
             Self::Format { kind, what } => write!(f, "{kind}: {what}"),
         }
     }

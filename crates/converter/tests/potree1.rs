@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use pointmill_converter::{
-    AttributeChoice, Duplicates, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, Silent,
-    convert,
+    Advice, AttributeChoice, Duplicates, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report,
+    ScaleChoice, Silent, convert,
 };
 use pointmill_format::batches::eight_bit;
 use pointmill_format::octree::OctreeNodes;
@@ -208,6 +208,18 @@ fn integers_come_back_from_every_lattice_and_extent_and_errors_are_those_of_the_
             }
         }
     }
+}
+
+#[test]
+fn an_axis_finer_than_the_step_of_all_is_refused() {
+    let bench = Bench::new(&box_of([2_000_000_000, 2000, 1_000_000], [1.0, 1.0, 1e-9], 50));
+    let error = convert(&bench.plan, &[Potree1Settings::default().into()], &Silent).unwrap_err();
+    let text = error.to_string();
+    assert!(text.contains("one step for all axes") && text.contains("that of z is 0.000000001"), "{text}");
+    assert!(matches!(error.advice(), Some(Advice::CoarserStep { least }) if (0.9..1.0).contains(&least)));
+    assert!(!bench.out().exists());
+    let equal = Plan { scale: ScaleChoice::Fixed(1.0), ..bench.plan };
+    assert!(convert(&equal, &[Potree1Settings::default().into()], &Silent).is_ok());
 }
 
 #[test]

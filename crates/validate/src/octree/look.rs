@@ -25,6 +25,8 @@ pub(crate) struct Look<'a> {
     pub(crate) tree: &'a Tree,
     pub(crate) geometry: Geometry,
     pub(crate) sampling: Sampling,
+    /// Why coverage is measured, but not judged: nodes that may not hold the whole sample leave holes.
+    pub(crate) no_coverage: Option<&'static str>,
     /// Of the largest node in memory.
     pub(crate) node_bytes: u64,
     pub(crate) options: &'a Options,
@@ -49,6 +51,7 @@ impl Look<'_> {
             findings: self.findings,
             neighbourhoods,
             sampling: self.sampling,
+            promises_coverage: self.no_coverage.is_none(),
             progress: self.progress,
             cache_bytes: usize::try_from((budget.left() / 2).min(MAX_CACHE_BYTES)).unwrap_or(usize::MAX),
             max_problems: self.options.max_problems,
@@ -79,6 +82,9 @@ impl Look<'_> {
             return;
         }
         seams::check(&walked.tallies, self.sampling, self.findings);
+        if let Some(why) = self.no_coverage {
+            self.findings.skip(Check::Coverage, why);
+        }
         if walked.unreadable > 0 {
             let why = format!("the points of {} nodes could not be read", walked.unreadable);
             self.findings.skip(Check::Coverage, why);

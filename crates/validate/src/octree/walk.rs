@@ -47,6 +47,8 @@ pub(crate) struct Task<'a> {
     /// Check spacing and coverage, and measure quality.
     pub(crate) neighbourhoods: bool,
     pub(crate) sampling: Sampling,
+    /// Points far from all that is drawn are a fault.
+    pub(crate) promises_coverage: bool,
     pub(crate) progress: &'a ProgressFn<'a>,
     pub(crate) cache_bytes: usize,
     pub(crate) max_problems: usize,
@@ -224,7 +226,10 @@ impl Walk<'_> {
         let mut next = above;
         while let Some(Above { level, grid, up }) = next {
             let tally = &self.tallies[usize::from(*level)];
-            let limit = coverage::limit(&self.task.geometry, self.task.sampling, *level, of);
+            let limit = match self.task.promises_coverage {
+                true => coverage::limit(&self.task.geometry, self.task.sampling, *level, of),
+                false => f64::INFINITY,
+            };
             let drawn = coverage::Drawn { level: *level, limit, grid };
             coverage::check(node.key, positions, &drawn, &self.task.geometry, tally, self.task.findings);
             next = *up;

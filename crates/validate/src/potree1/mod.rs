@@ -81,8 +81,10 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let tree = tree(folder, &dataset, &mut budget, &findings)?;
     dataset.set_max_node_bytes(budget.left());
     let metadata = dataset.metadata();
+    let most_points = own["maxNodePoints"].as_u64();
     let nodes = Nodes {
         dataset: &dataset,
+        most_points,
         geometry,
         steps: &steps,
         sums: against.as_ref().map(|a| (&a.sums, &columns)),
@@ -96,6 +98,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         tree: &tree,
         geometry,
         sampling: Sampling::from_word(own["sampling"].as_str()),
+        no_coverage: most_points.map(|_| "nodes hold so many points at most: what finds no room is drawn further down"),
         node_bytes: largest_node(&tree, &dataset),
         options,
         progress,

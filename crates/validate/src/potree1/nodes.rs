@@ -20,6 +20,8 @@ use crate::octree::walk;
 /// What the walk needs, and what was seen so far.
 pub(crate) struct Nodes<'a> {
     pub(crate) dataset: &'a Dataset,
+    /// Of a node, where the dataset promises it.
+    pub(crate) most_points: Option<u64>,
     pub(crate) geometry: Geometry,
     pub(crate) steps: &'a Steps,
     /// Where records are summed for the comparison with the sources, and the columns that are compared.
@@ -97,6 +99,12 @@ impl walk::Nodes for Nodes<'_> {
         }
         let mut seen = Aabb::EMPTY;
         (0..points.len()).filter_map(|i| points.world(i)).for_each(|p| seen.grow(p));
+        let is_one_place = node.record.child_mask == 0 && seen.min == seen.max;
+        if let Some(most) = self.most_points.filter(|most| points.len() as u64 > *most && !is_one_place) {
+            let finding =
+                Finding::new(Check::NodeCounts, "points of the node", format!("at most {most}"), points.len());
+            findings.push(finding.at(key));
+        }
         let mut all = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         *all = all.union(&seen);
         drop(all);

@@ -102,6 +102,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         tree: &tree,
         geometry,
         sampling: Sampling::from_word(own["sampling"].as_str()),
+        no_coverage: None,
         node_bytes: largest_node(&tree, metadata),
         options,
         progress,

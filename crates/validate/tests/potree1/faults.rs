@@ -23,6 +23,21 @@ fn a_good_dataset_has_no_findings() {
 }
 
 #[test]
+fn more_points_than_a_node_may_hold() {
+    let mut files = good();
+    let most = good().validate().quality[0].points;
+    assert!((1..6000).contains(&most));
+    files.cloud["pointmill"]["maxNodePoints"] = json!(6000);
+    let outcome = files.validate();
+    assert!(outcome.ok && outcome.check(Check::Coverage).unwrap().skipped.is_some());
+    assert!(outcome.quality.iter().any(|level| level.largest_hole.is_some()), "measured all the same");
+    files.cloud["pointmill"]["maxNodePoints"] = json!(most - 1);
+    let outcome = files.validate();
+    assert_eq!(broken(&outcome), [Check::NodeCounts]);
+    assert!(outcome.check(Check::NodeCounts).unwrap().found >= 1);
+}
+
+#[test]
 fn a_description_out_of_range() {
     for (key, value) in [
         ("scale", json!([0.0025, 0.0025, 0.0025])),

@@ -32,7 +32,7 @@ use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
 use super::output::{DiskSize, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
-use crate::error::ConvertError;
+use crate::error::{ConvertError, Unsupported};
 use crate::octree::{self, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, ChangedAttribute, OutputReport};
@@ -98,6 +98,10 @@ impl Output for Potree1Settings {
     fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
         let content = Content::choose(cloud, self.version)?;
         let steps = Steps::new(&cloud.frame, &cloud.lattice.lattice);
+        if let Some((axis, step)) = steps.finer_axis(&cloud.lattice.lattice) {
+            let (kind, least) = (self.kind(), steps.scale);
+            return Err(Unsupported::FineAxis { kind, axis, step, least }.into());
+        }
         let spacing = ChosenSpacing::of(self.sampling, self.spacing, cloud)?;
         let mut metadata = metadata::metadata(cloud, self, &spacing, &content, &steps);
         let meter = Meter::new(cloud, &steps);

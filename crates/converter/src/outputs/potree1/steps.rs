@@ -71,6 +71,11 @@ impl Steps {
         Self { scale, cube, origin, stored_stride: frame.stride, kind }
     }
 
+    /// An axis with a step shorter than that of the dataset, which would put points together, and that step.
+    pub(super) fn finer_axis(&self, lattice: &Lattice) -> Option<(usize, f64)> {
+        lattice.scale.into_iter().enumerate().find(|(_, step)| *step < self.scale)
+    }
+
     /// The deepest level all of whose corners are whole steps of exact positions; `None`: positions are rounded in any node.
     pub(super) fn exact_level(&self) -> Option<u32> {
         match self.kind {
