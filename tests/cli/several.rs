@@ -46,5 +46,5 @@ fn options_of_a_format_that_is_not_made_and_formats_named_twice_are_mistakes() {
     let twice = ["convert", "a.las", "-o", "out", "--to", "bintree", "--to", "bintree"];
     dir.run(twice).failed_with(2, &["--to", "twice"]);
     dir.run(["convert", "a.las", "-o", "out", "--to", "bintree", "--duplicates", "drop"])
-        .failed_with(4, &["--duplicates drop", "potree2"]);
+        .failed_with(4, &["--duplicates drop", "for octrees only"]);
 }
