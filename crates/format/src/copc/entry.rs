@@ -73,7 +73,7 @@ mod tests {
         assert_eq!(Entry::from_bytes(&bytes), entry);
         assert_eq!(bytes[16..24], 0x1_2345_6789_abcd_u64.to_le_bytes());
         let key = entry.node_key().unwrap();
-        assert_eq!(key.to_string(), "r535"); // x 7 = 111, y 0 = 000, z 5 = 101
+        assert_eq!(key.to_string(), "r545"); // x 7 = 111, y 0 = 000, z 5 = 101
         assert_eq!(Entry::key_of(key), entry.key);
         for key in [[-1, 0, 0, 0], [32, 0, 0, 0], [0, 1, 0, 0], [3, 8, 0, 0], [3, 0, -1, 0], [3, 0, 0, i32::MAX]] {
             assert_eq!(Entry { key, ..entry }.node_key(), None, "{key:?}");
