@@ -3,7 +3,7 @@
 use super::linked_tree::LinkedTree;
 
 /// The roots of the chunks, in breadth-first order, if a chunk should have at most `most` records.
-pub(super) fn chunk_roots(tree: &LinkedTree<'_>, most: usize) -> Vec<usize> {
+pub(crate) fn chunk_roots(tree: &LinkedTree<'_>, most: usize) -> Vec<usize> {
     let mut roots = Vec::new();
     let mut waiting = vec![0];
     while let Some(root) = waiting.pop() {

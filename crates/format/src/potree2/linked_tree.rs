@@ -7,8 +7,8 @@ use crate::NodeKey;
 use super::NodeEntry;
 
 /// Nodes in breadth-first order, linked. Nodes are named by their index.
-pub(super) struct LinkedTree<'a> {
-    pub(super) nodes: &'a [NodeEntry],
+pub(crate) struct LinkedTree<'a> {
+    pub(crate) nodes: &'a [NodeEntry],
     /// The children of node i are the nodes `first_child[i]..first_child[i + 1]`: in breadth-first order, children
     /// follow the children of the node before. So the descendants of a node in a level are one range, too.
     first_child: Vec<usize>,
@@ -16,7 +16,7 @@ pub(super) struct LinkedTree<'a> {
 
 impl<'a> LinkedTree<'a> {
     /// `None` if `nodes` is no tree: no root, a parent missing, a key twice.
-    pub(super) fn new(nodes: &'a [NodeEntry]) -> Option<Self> {
+    pub(crate) fn new(nodes: &'a [NodeEntry]) -> Option<Self> {
         nodes.first().filter(|n| n.key == NodeKey::ROOT)?;
         let mut first_child = Vec::with_capacity(nodes.len() + 1);
         let mut next = 1;
@@ -36,32 +36,32 @@ impl<'a> LinkedTree<'a> {
         (next == nodes.len()).then_some(Self { nodes, first_child })
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.nodes.len()
     }
 
     /// The deepest level that has a node.
-    pub(super) fn depth(&self) -> u32 {
+    pub(crate) fn depth(&self) -> u32 {
         self.nodes.last().map_or(0, |n| u32::from(n.key.level))
     }
 
-    pub(super) fn children(&self, node: usize) -> Range<usize> {
+    pub(crate) fn children(&self, node: usize) -> Range<usize> {
         self.first_child[node]..self.first_child[node + 1]
     }
 
     /// The subtree of a node, level by level, itself first.
-    pub(super) fn levels(&self, node: usize) -> impl Iterator<Item = Range<usize>> + '_ {
+    pub(crate) fn levels(&self, node: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let next = |r: &Range<usize>| Some(self.first_child[r.start]..self.first_child[r.end]);
         std::iter::successors(Some(node..node + 1), next).take_while(|r| !r.is_empty())
     }
 
     /// Nodes of the subtree of a node.
-    pub(super) fn size(&self, node: usize) -> usize {
+    pub(crate) fn size(&self, node: usize) -> usize {
         self.levels(node).map(|r| r.len()).sum()
     }
 
     /// The subtree of a node without what is below nodes that `stops`, breadth first.
-    pub(super) fn part(&self, root: usize, stops: impl Fn(usize) -> bool) -> Vec<usize> {
+    pub(crate) fn part(&self, root: usize, stops: impl Fn(usize) -> bool) -> Vec<usize> {
         let mut part = vec![root];
         let mut at = 0;
         while let Some(&node) = part.get(at) {
