@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::cloud::Intake;
+use crate::cloud::{Cloud, Intake};
 use crate::error::ConvertError;
 use crate::gather::{Demand, gather, is_coarse};
 use crate::memory::peak_resident_bytes;
-use crate::outputs::{self, StagedFolder, Target};
+use crate::outputs::{self, StagedDataset, StagedFolder, Target};
 use crate::plan::Plan;
-use crate::report::{self, Account, OtherFilesReport, Report};
+use crate::report::{self, Account, OtherFilesReport, OutputReport, Report};
 use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemDisk, TempFiles};
 use crate::sources::{Sources, resolve_crs_of_all};
 use crate::warning::Warning;
@@ -78,25 +78,21 @@ fn write(
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, disk), events)?;
 
-    let demand = Demand { moments: wants.moments, uses: targets.len() as u32 };
+    let groups = outputs::groups(targets);
+    let demand = Demand { moments: wants.moments, uses: groups.len() as u32 };
     let reading = rt.budget.reading(&rt.memory)?;
     let cloud = gather(plan, &sources, &intake, demand, warnings, &rt, clock)?;
     drop(reading);
 
     let mut outputs = Vec::new();
-    for target in targets {
+    for group in groups {
         clock.begin(Phase::Build, cloud.points());
-        let start = Instant::now();
-        let dataset = staged.dataset(target.kind(), targets.len() == 1)?;
-        let _building = rt.budget.building(&rt.memory, cloud.points())?;
-        let mut output = target.output().write(&cloud, &rt, &dataset)?;
-        dataset.sync()?;
-        output.warnings.iter().for_each(|w| events.warning(w));
-        output.format = target.kind().name().into();
-        output.folder = dataset.name().into();
-        output.seconds = start.elapsed().as_secs_f64();
-        outputs.push(output);
+        let together: Vec<&Target> = group.iter().map(|i| &targets[*i]).collect();
+        let built = build(&together, &cloud, &rt, staged, targets.len() == 1)?;
+        outputs.extend(group.into_iter().zip(built));
     }
+    outputs.sort_by_key(|(target, _)| *target);
+    let outputs = outputs.into_iter().map(|(_, output)| output).collect();
 
     clock.begin(Phase::Finish, 0);
     rt.check_stop()?;
@@ -118,14 +114,42 @@ fn write(
     Ok(report)
 }
 
+/// Builds the datasets of targets that are built together.
+fn build(
+    targets: &[&Target],
+    cloud: &Cloud<'_>,
+    rt: &Runtime<'_>,
+    staged: &StagedFolder,
+    is_only_one: bool,
+) -> Result<Vec<OutputReport>, ConvertError> {
+    let start = Instant::now();
+    let datasets: Vec<_> =
+        targets.iter().map(|target| staged.dataset(target.kind(), is_only_one)).collect::<Result<_, _>>()?;
+    let _building = rt.budget.building(&rt.memory, cloud.points())?;
+    let mut reports = outputs::write(targets, &datasets, cloud, rt)?;
+    datasets.iter().try_for_each(StagedDataset::sync)?;
+    for (i, (report, dataset)) in reports.iter_mut().zip(&datasets).enumerate() {
+        report.warnings.iter().for_each(|w| rt.events().warning(w));
+        report.format = targets[i].kind().name().into();
+        report.folder = dataset.name().into();
+        let others = targets.iter().filter(|target| target.kind() != targets[i].kind());
+        report.built_with = others.map(|target| target.kind().name().to_owned()).collect();
+        report.seconds = start.elapsed().as_secs_f64();
+    }
+    Ok(reports)
+}
+
 /// What the inputs and outputs need at least.
 ///
 /// # Errors
 /// A scan that had to be opened again cannot be.
 pub(crate) fn least(targets: &[Target], sources: &Sources, intake: &Intake) -> Result<Least, ConvertError> {
+    let groups = outputs::groups(targets);
     let decode_bytes = sources.decode_bytes(|source| &intake.of(source).wanted)?;
     let least = Least::of(targets.iter().map(|t| t.output().least_points()), decode_bytes, sources.bytes);
-    Ok(least.with_units(targets.iter().map(|t| t.output().least_bytes())))
+    let of_group = |group: &Vec<usize>| group.iter().map(|i| targets[*i].output().least_bytes()).sum();
+    let streams = groups.iter().map(Vec::len).max().unwrap_or(1);
+    Ok(least.with_units(groups.iter().map(of_group)).with_streams(streams as u64))
 }
 
 /// What there is to say if the process grew beyond the ceiling during this run.

@@ -11,7 +11,7 @@ use super::list::List;
 use super::order::{OrderScratch, Point, order};
 use super::raise::{Nodes, Pairs, Pending, Points, stays};
 use super::sample::Sampler;
-use super::sink::NodeEncoder;
+use super::sinks::Encoders;
 use crate::cloud::{Cloud, Ledger, morton};
 use crate::error::ConvertError;
 use crate::plan::Duplicates;
@@ -64,7 +64,7 @@ impl ChunkMemory {
         plan: &ChunkPlan<'_>,
         key: NodeKey,
         sampler: &mut Sampler,
-        encoder: &mut impl NodeEncoder,
+        encoder: &mut impl Encoders,
         borders: &mut UnitBorders<'_>,
         finished: &mut Finished,
     ) -> Result<(Pending<List>, u64), ConvertError> {
@@ -123,7 +123,7 @@ impl Points for Vec<u32> {
     }
 }
 
-impl<E: NodeEncoder> Nodes<Vec<u32>> for ChunkNodes<'_, '_, E> {
+impl<E: Encoders> Nodes<Vec<u32>> for ChunkNodes<'_, '_, E> {
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<Vec<u32>>]) -> Result<Vec<u32>, ConvertError> {
         self.sampler.begin(key, self.borders.around(key)?);
         for child in &*children {
@@ -207,7 +207,7 @@ impl Subtree {
         &mut self,
         key: NodeKey,
         range: Range<usize>,
-        nodes: &mut ChunkNodes<'_, '_, impl NodeEncoder>,
+        nodes: &mut ChunkNodes<'_, '_, impl Encoders>,
     ) -> Result<Pending<Vec<u32>>, ConvertError> {
         let points = &nodes.points[range.clone()];
         let is_one_place = points.first().map(|p| p.t) == points.last().map(|p| p.t);

@@ -5,16 +5,17 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use pointmill_format::NodeKey;
 
-use super::finished::Piece;
+use super::finished::{Piece, Run};
 use super::list::{List, Lists};
 use super::raise::{Pending, Points};
-use super::sink::{FinishedNode, NodeEncoder, NodeSink, points_of};
+use super::sink::{FinishedNode, points_of};
+use super::sinks::{Encoders, Sinks, Stream};
 use super::unit::BuiltUnit;
 use crate::cloud::{Checksum, Ledger};
 use crate::error::{ConvertError, Unsupported};
 use crate::runtime::{Consumer, Reservation, Runtime};
 
-/// A finished tree.
+/// A finished tree, as one format has it.
 pub(crate) struct Octree {
     pub(crate) nodes: Vec<FinishedNode>,
     /// Bytes of all nodes.
@@ -26,8 +27,8 @@ pub(crate) struct Octree {
 
 /// Where workers hand in their units. A worker may be a few units ahead of the oldest unfinished one, no more: that bounds
 /// the memory.
-pub(super) struct Committer<'a, S: NodeSink> {
-    sink: &'a S,
+pub(super) struct Committer<'a, S> {
+    sinks: &'a S,
     lists: &'a Lists,
     window: usize,
     units: usize,
@@ -41,47 +42,60 @@ struct State {
     waiting: HashMap<usize, BuiltUnit>,
     /// Roots of units that wait for the node above them.
     roots: HashMap<NodeKey, Pending<List>>,
-    /// Nodes that have their place.
-    nodes: Vec<FinishedNode>,
+    placed: Vec<PlacedStream>,
     known: Reservation,
-    /// Bytes of all of them.
-    bytes: u64,
+    /// But for what was written, which each stream has of its own.
     ledger: Ledger,
     overfull_leaves: u64,
-    /// Buffers of units that were written, for those to come: their memory was touched already.
-    spare: Vec<Vec<u8>>,
     /// Units above this one are not built any more.
     last: usize,
 }
 
-/// Nodes whose bytes have a place.
-enum Placed {
-    Nodes { nodes: Vec<FinishedNode>, bytes: Vec<u8>, offset: u64 },
-    Large { node: FinishedNode, points: List },
+/// What has its place in a stream.
+#[derive(Default)]
+struct PlacedStream {
+    nodes: Vec<FinishedNode>,
+    /// Bytes of all of them.
+    bytes: u64,
+    written: Checksum,
+    /// Buffers of units that were written, for those to come: their memory was touched already.
+    spare: Vec<Vec<u8>>,
 }
 
-impl<'a, S: NodeSink> Committer<'a, S> {
-    pub(super) fn new(units: usize, window: usize, sink: &'a S, lists: &'a Lists, rt: &Runtime<'_>) -> Self {
+/// Nodes whose bytes have a place.
+enum Placed {
+    Nodes {
+        stream: usize,
+        run: Run,
+        offset: u64,
+    },
+    /// In each stream.
+    Large {
+        nodes: Vec<FinishedNode>,
+        points: List,
+    },
+}
+
+impl<'a, S: Sinks> Committer<'a, S> {
+    pub(super) fn new(units: usize, window: usize, sinks: &'a S, lists: &'a Lists, rt: &Runtime<'_>) -> Self {
         let state = State {
             next: 0,
             waiting: HashMap::new(),
             roots: HashMap::new(),
-            nodes: Vec::new(),
+            placed: (0..sinks.count()).map(|_| PlacedStream::default()).collect(),
             known: Reservation::new(&rt.memory, Consumer::Nodes),
-            bytes: 0,
             ledger: Ledger::default(),
             overfull_leaves: 0,
-            spare: Vec::new(),
             last: usize::MAX,
         };
-        Self { sink, lists, window, units, state: Mutex::new(state), changed: Condvar::new() }
+        Self { sinks, lists, window, units, state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Waits until unit `index` may be begun and returns a buffer for its bytes, empty; `None` if it is not needed any more,
-    /// because one below it failed.
-    pub(super) fn admit(&self, index: usize) -> Option<Vec<u8>> {
+    /// Waits until unit `index` may be begun and returns a buffer for its bytes in each stream, empty; `None` if it is not
+    /// needed any more, because one below it failed.
+    pub(super) fn admit(&self, index: usize) -> Option<Vec<Vec<u8>>> {
         let mut state = self.wait(index, (index + 1).saturating_sub(self.window))?;
-        Some(state.spare.pop().unwrap_or_default())
+        Some(state.placed.iter_mut().map(|stream| stream.spare.pop().unwrap_or_default()).collect())
     }
 
     /// Waits until all units before `first` are done; false if unit `index` is not needed any more.
@@ -117,7 +131,7 @@ impl<'a, S: NodeSink> Committer<'a, S> {
         &self,
         index: usize,
         unit: BuiltUnit,
-        encoder: &mut impl NodeEncoder,
+        encoders: &mut impl Encoders,
     ) -> Result<(), ConvertError> {
         let mut ready: Vec<Placed> = Vec::new();
         {
@@ -126,56 +140,68 @@ impl<'a, S: NodeSink> Committer<'a, S> {
             loop {
                 let next = state.next;
                 let Some(unit) = state.waiting.remove(&next) else { break };
-                state.append(unit, encoder.row_bytes(), &mut ready)?;
+                state.append(unit, encoders, &mut ready)?;
                 state.next += 1;
             }
         }
         self.changed.notify_all();
         for placed in ready {
             match placed {
-                Placed::Nodes { nodes, mut bytes, offset } => {
-                    self.sink.write(&nodes, &bytes, offset)?;
+                Placed::Nodes { stream, run, offset } => {
+                    let Run { nodes, mut bytes } = run;
+                    self.sinks.write(stream, &nodes, &bytes, offset)?;
                     bytes.clear();
                     let mut state = self.lock();
-                    if state.spare.len() < self.window {
-                        state.spare.push(bytes);
+                    let spare = &mut state.placed[stream].spare;
+                    if spare.len() < self.window {
+                        spare.push(bytes);
                     }
                 }
-                Placed::Large { node, points } => {
-                    let written = self.write_large(node, &points, encoder)?;
-                    self.lock().ledger.written.merge(&written);
+                Placed::Large { nodes, points } => {
+                    let written = self.write_large(&nodes, &points, encoders)?;
+                    let placed = &mut self.lock().placed;
+                    placed.iter_mut().zip(&written).for_each(|(stream, sum)| stream.written.merge(sum));
                 }
             }
         }
         Ok(())
     }
 
-    /// Writes a node whose records are too many to have them in memory together.
+    /// Writes a node whose records are too many to have them in memory together; `nodes`: it in each stream.
     fn write_large(
         &self,
-        node: FinishedNode,
+        nodes: &[FinishedNode],
         points: &List,
-        encoder: &mut impl NodeEncoder,
-    ) -> Result<Checksum, ConvertError> {
-        let (mut written, mut bytes, mut size) = (Checksum::default(), Vec::new(), 0);
+        encoders: &mut impl Encoders,
+    ) -> Result<Vec<Checksum>, ConvertError> {
+        let mut streams: Vec<Stream> = nodes.iter().map(|_| Stream::default()).collect();
+        let mut sizes = vec![0; nodes.len()];
         self.lists.each(points, |records| {
-            bytes.clear();
-            encoder.encode(node.key, records.chunks_exact(self.lists.stride), &mut written, &mut bytes)?;
-            self.sink.write_part(&node, &bytes, size)?;
-            size += bytes.len() as u64;
+            streams.iter_mut().for_each(|stream| stream.bytes.clear());
+            let Some(key) = nodes.first().map(|node| node.key) else { return Ok(false) };
+            encoders.encode(key, records.chunks_exact(self.lists.stride), &mut streams)?;
+            for (i, (stream, size)) in streams.iter().zip(&mut sizes).enumerate() {
+                self.sinks.write_part(i, &nodes[i], &stream.bytes, *size)?;
+                *size += stream.bytes.len() as u64;
+            }
             Ok(true)
         })?;
-        Ok(written)
+        Ok(streams.iter().map(|stream| stream.written).collect())
     }
 
-    /// The tree, once all units were handed in.
-    pub(super) fn finish(self) -> Result<Octree, ConvertError> {
+    /// The tree as each format has it, once all units were handed in.
+    pub(super) fn finish(self) -> Result<Vec<Octree>, ConvertError> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if state.next != self.units || !state.roots.is_empty() {
             return Err(ConvertError::Internal("the tree was not finished".into()));
         }
-        let State { nodes, bytes, ledger, overfull_leaves, .. } = state;
-        Ok(Octree { nodes, bytes, ledger, overfull_leaves })
+        let State { placed, ledger, overfull_leaves, .. } = state;
+        let tree = |PlacedStream { nodes, bytes, written, .. }| {
+            let mut ledger = ledger.clone();
+            ledger.written = written;
+            Octree { nodes, bytes, ledger, overfull_leaves }
+        };
+        Ok(placed.into_iter().map(tree).collect())
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -184,33 +210,53 @@ impl<'a, S: NodeSink> Committer<'a, S> {
 }
 
 impl State {
-    fn append(&mut self, unit: BuiltUnit, row_bytes: Option<u64>, ready: &mut Vec<Placed>) -> Result<(), ConvertError> {
-        let BuiltUnit { pieces, root, ledger, overfull_leaves } = unit;
+    fn append(
+        &mut self,
+        unit: BuiltUnit,
+        encoders: &impl Encoders,
+        ready: &mut Vec<Placed>,
+    ) -> Result<(), ConvertError> {
+        let BuiltUnit { pieces, root, ledger, written, overfull_leaves } = unit;
         self.ledger.merge(&ledger);
+        self.placed.iter_mut().zip(&written).for_each(|(stream, sum)| stream.written.merge(sum));
         self.overfull_leaves += overfull_leaves;
         for piece in pieces {
-            let offset = self.bytes;
             match piece {
-                Piece::Nodes(mut nodes, bytes) => {
-                    nodes.iter_mut().for_each(|n| n.byte_offset += offset);
-                    self.nodes.extend_from_slice(&nodes);
-                    self.bytes += bytes.len() as u64;
-                    ready.push(Placed::Nodes { nodes, bytes, offset });
+                Piece::Nodes(runs) => {
+                    for (i, (stream, mut run)) in self.placed.iter_mut().zip(runs).enumerate() {
+                        let offset = stream.bytes;
+                        run.nodes.iter_mut().for_each(|n| n.byte_offset += offset);
+                        stream.nodes.extend_from_slice(&run.nodes);
+                        stream.bytes += run.bytes.len() as u64;
+                        ready.push(Placed::Nodes { stream: i, run, offset });
+                    }
                 }
                 Piece::Large(key, points) => {
-                    let too_many = || Unsupported::CrowdedNode { points: points.count(), max: u64::MAX };
-                    let byte_size = row_bytes.and_then(|b| points.count().checked_mul(b)).ok_or_else(too_many)?;
-                    let node = FinishedNode { key, points: points_of(points.count())?, byte_offset: offset, byte_size };
-                    self.nodes.push(node);
-                    self.bytes += byte_size;
-                    ready.push(Placed::Large { node, points });
+                    let place = |(i, stream): (usize, &mut PlacedStream)| {
+                        stream.place_large(key, points.count(), encoders.row_bytes(i))
+                    };
+                    let nodes = self.placed.iter_mut().enumerate().map(place).collect::<Result<_, _>>()?;
+                    ready.push(Placed::Large { nodes, points });
                 }
             }
         }
-        self.known.resize((self.nodes.capacity() * size_of::<FinishedNode>()) as u64)?;
+        let nodes: usize = self.placed.iter().map(|stream| stream.nodes.capacity()).sum();
+        self.known.resize((nodes * size_of::<FinishedNode>()) as u64)?;
         if let Some(root) = root {
             self.roots.insert(root.key, root);
         }
         Ok(())
+    }
+}
+
+impl PlacedStream {
+    /// The place of a node that is encoded later, `row_bytes` a point.
+    fn place_large(&mut self, key: NodeKey, points: u64, row_bytes: Option<u64>) -> Result<FinishedNode, ConvertError> {
+        let too_many = || Unsupported::CrowdedNode { points, max: u64::MAX };
+        let byte_size = row_bytes.and_then(|b| points.checked_mul(b)).ok_or_else(too_many)?;
+        let node = FinishedNode { key, points: points_of(points)?, byte_offset: self.bytes, byte_size };
+        self.nodes.push(node);
+        self.bytes += byte_size;
+        Ok(node)
     }
 }

@@ -3,51 +3,55 @@
 use pointmill_format::NodeKey;
 
 use super::list::List;
-use super::sink::{FinishedNode, NodeEncoder, points_of};
+use super::sink::{FinishedNode, points_of};
+use super::sinks::{Encoders, Stream};
 use crate::cloud::Checksum;
 use crate::error::ConvertError;
 
 /// Finished nodes that have no place in the tree yet.
 pub(super) enum Piece {
-    /// Nodes and their bytes; offsets count from the first of these.
-    Nodes(Vec<FinishedNode>, Vec<u8>),
+    /// Nodes and their bytes, for each stream.
+    Nodes(Vec<Run>),
     /// A node that is too large to be encoded in memory.
     Large(NodeKey, List),
 }
 
+/// Nodes that follow one another in a stream; offsets count from the first of the bytes.
+pub(super) struct Run {
+    pub(super) nodes: Vec<FinishedNode>,
+    pub(super) bytes: Vec<u8>,
+}
+
 /// The finished nodes of a unit while they are made.
-#[derive(Default)]
 pub(super) struct Finished {
     pieces: Vec<Piece>,
-    nodes: Vec<FinishedNode>,
-    bytes: Vec<u8>,
-    /// Of the records that were encoded.
-    pub(super) written: Checksum,
+    streams: Vec<Stream>,
 }
 
 impl Finished {
-    /// `bytes`: a buffer to use again.
-    pub(super) fn new(mut bytes: Vec<u8>) -> Self {
-        bytes.clear();
-        Self { bytes, ..Self::default() }
-    }
-
-    /// The buffer of bytes, to make room in it.
-    pub(super) fn bytes(&mut self) -> &mut Vec<u8> {
-        &mut self.bytes
+    /// For these streams.
+    pub(super) fn new(streams: Vec<Stream>) -> Self {
+        Self { pieces: Vec::new(), streams }
     }
 
     /// Encodes a node.
     pub(super) fn encode<'r>(
         &mut self,
-        encoder: &mut impl NodeEncoder,
+        encoders: &mut impl Encoders,
         key: NodeKey,
         records: impl ExactSizeIterator<Item = &'r [u8]>,
     ) -> Result<(), ConvertError> {
-        let (points, start) = (points_of(records.len() as u64)?, self.bytes.len());
-        encoder.encode(key, records, &mut self.written, &mut self.bytes)?;
-        let byte_size = (self.bytes.len() - start) as u64;
-        self.nodes.push(FinishedNode { key, points, byte_offset: start as u64, byte_size });
+        let points = points_of(records.len() as u64)?;
+        for stream in &mut self.streams {
+            let byte_offset = stream.bytes.len() as u64;
+            stream.nodes.push(FinishedNode { key, points, byte_offset, byte_size: 0 });
+        }
+        encoders.encode(key, records, &mut self.streams)?;
+        for stream in &mut self.streams {
+            if let Some(node) = stream.nodes.last_mut() {
+                node.byte_size = stream.bytes.len() as u64 - node.byte_offset;
+            }
+        }
         Ok(())
     }
 
@@ -58,15 +62,20 @@ impl Finished {
     }
 
     fn close(&mut self) {
-        if !self.nodes.is_empty() {
-            let (nodes, bytes) = (std::mem::take(&mut self.nodes), std::mem::take(&mut self.bytes));
-            self.pieces.push(Piece::Nodes(nodes, bytes));
+        if self.streams.iter().all(|stream| stream.nodes.is_empty()) {
+            return;
         }
+        let run = |stream: &mut Stream| Run {
+            nodes: std::mem::take(&mut stream.nodes),
+            bytes: std::mem::take(&mut stream.bytes),
+        };
+        self.pieces.push(Piece::Nodes(self.streams.iter_mut().map(run).collect()));
     }
 
-    /// All nodes, in order.
-    pub(super) fn into_pieces(mut self) -> Vec<Piece> {
+    /// All nodes, in order, and for each stream the sum of the records that were encoded.
+    pub(super) fn into_pieces(mut self) -> (Vec<Piece>, Vec<Checksum>) {
         self.close();
-        self.pieces
+        let written = self.streams.iter().map(|stream| stream.written).collect();
+        (self.pieces, written)
     }
 }

@@ -9,7 +9,7 @@ use super::finished::Finished;
 use super::list::{List, Lists, Writer};
 use super::raise::{Nodes, Pairs, Pending, Points, stays};
 use super::sample::Sampler;
-use super::sink::NodeEncoder;
+use super::sinks::Encoders;
 use crate::cloud::{RecordFrame, TreePoint, copy_record, morton};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Pool, Reservation};
@@ -57,7 +57,7 @@ struct Part {
     trees: Vec<TreePoint>,
 }
 
-impl<E: NodeEncoder> ListNodes<'_, '_, E> {
+impl<E: Encoders> ListNodes<'_, '_, E> {
     /// Samples one child; returns what it keeps.
     fn sample_child(
         &mut self,
@@ -167,7 +167,7 @@ impl<E: NodeEncoder> ListNodes<'_, '_, E> {
     }
 }
 
-impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
+impl<E: Encoders> Nodes<List> for ListNodes<'_, '_, E> {
     fn sample(&mut self, key: NodeKey, children: &mut [Pending<List>]) -> Result<List, ConvertError> {
         let candidates = children.iter().map(|c| c.points.count()).sum();
         let mut side_by_side = Some(self.lists.large.read().unwrap_or_else(PoisonError::into_inner));
@@ -256,7 +256,7 @@ impl<E: NodeEncoder> Nodes<List> for ListNodes<'_, '_, E> {
     fn write(&mut self, key: NodeKey, mut points: List) -> Result<(), ConvertError> {
         let (count, stride) = (points.count(), self.lists.stride);
         let is_large = count * stride as u64 > LARGE_BYTES;
-        if is_large && self.encoder.row_bytes().is_some() {
+        if is_large && self.encoder.takes_parts() {
             points.trim(); // it waits for its place in the tree
             self.finished.add_large(key, points);
             return Ok(());

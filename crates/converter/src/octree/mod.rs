@@ -8,7 +8,7 @@
 //!    on the disk.
 //! 4. [`commit`] puts the finished nodes of the units behind one another.
 //!
-//! Finished nodes go to a [`sink`], behind which a format stands. The order of nodes depends on the tree alone: within a
+//! Finished nodes go to a [`sink`], behind which a format stands, or to several ([`sinks`]), each with its own bytes. The order of nodes depends on the tree alone: within a
 //! unit, a node's children are written, in order, once the node can no longer be asked for a point; the root comes last.
 
 mod borders;
@@ -23,6 +23,7 @@ mod place;
 mod raise;
 mod sample;
 mod sink;
+mod sinks;
 mod unit;
 mod units;
 
@@ -32,6 +33,8 @@ pub(crate) use order::{OrderScratch, Point, order};
 pub use sample::Sampling;
 pub(crate) use sample::{Sampler, Spacing};
 pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
+pub(crate) use sinks::AnySink;
+use sinks::{Several, Sinks};
 
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
@@ -57,12 +60,32 @@ pub(crate) struct OctreeSettings {
 }
 
 /// Builds the tree of a cloud and hands its nodes to `sink`.
-pub(crate) fn build<S: NodeSink>(
+pub(crate) fn build(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
     settings: OctreeSettings,
-    sink: &S,
+    sink: &impl NodeSink,
 ) -> Result<Octree, ConvertError> {
+    let tree = build_for(cloud, rt, settings, sink)?.pop();
+    tree.ok_or_else(|| ConvertError::Internal("a tree for no format".into()))
+}
+
+/// Builds the tree of a cloud once and hands its nodes to each of `sinks`; returns the tree as each of them has it.
+pub(crate) fn build_all(
+    cloud: &Cloud<'_>,
+    rt: &Runtime<'_>,
+    settings: OctreeSettings,
+    sinks: &[&dyn AnySink],
+) -> Result<Vec<Octree>, ConvertError> {
+    build_for(cloud, rt, settings, &Several::new(sinks, cloud.frame.stride))
+}
+
+fn build_for<S: Sinks>(
+    cloud: &Cloud<'_>,
+    rt: &Runtime<'_>,
+    settings: OctreeSettings,
+    sinks: &S,
+) -> Result<Vec<Octree>, ConvertError> {
     let OctreeSettings { sampling, spacing, leaf_capacity, most_points, unit_points } = settings;
     let (chunk_points, window) = rt.budget.units(unit_points.min(cloud.points()), cloud.frame.stride);
     let (subtrees, _room) = divide::divide(cloud, rt, unit_points, chunk_points)?;
@@ -82,19 +105,19 @@ pub(crate) fn build<S: NodeSink>(
         chunk_points,
         chunk_bytes: rt.budget.chunk_bytes(),
     };
-    let committer = Committer::new(units.len(), window, sink, &shared.lists, rt);
+    let committer = Committer::new(units.len(), window, sinks, &shared.lists, rt);
     rt.in_parallel_or(
         units.len(),
-        || UnitBuilder::new(&shared, Sampler::new(sampling, spacing), sink.encoder()),
+        || UnitBuilder::new(&shared, Sampler::new(sampling, spacing), sinks.encoders()),
         |builder, index| {
             let unit = &units[index];
-            let Some(buffer) = committer.admit(index) else { return Ok(()) };
+            let Some(buffers) = committer.admit(index) else { return Ok(()) };
             rt.check_stop()?; // it may have waited long
             let wait = || committer.wait_for(index, unit.class_start);
             let built = match &unit.work {
-                Work::Subtree(chunks) => builder.subtree(unit.key, chunks, buffer, wait)?,
+                Work::Subtree(chunks) => builder.subtree(unit.key, chunks, buffers, wait)?,
                 Work::Above(children) => match wait() {
-                    true => Some(builder.above(unit.key, committer.take(children)?, buffer)?),
+                    true => Some(builder.above(unit.key, committer.take(children)?, buffers)?),
                     false => None,
                 },
             };
@@ -106,7 +129,7 @@ pub(crate) fn build<S: NodeSink>(
         |_| (),
         |index| committer.stop_above(index),
     )?;
-    let tree = committer.finish()?;
-    tree.ledger.check(&cloud.stats.checksum)?;
-    Ok(tree)
+    let trees = committer.finish()?;
+    trees.iter().try_for_each(|tree| tree.ledger.check(&cloud.stats.checksum))?;
+    Ok(trees)
 }

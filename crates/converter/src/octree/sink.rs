@@ -19,10 +19,12 @@ pub(crate) struct FinishedNode {
 /// depends on the tree alone.
 pub(crate) trait NodeSink: Sync {
     /// One thread's means to encode nodes.
-    type Encoder: NodeEncoder + Send;
+    type Encoder<'s>: NodeEncoder + Send
+    where
+        Self: 's;
 
     /// Means for one more thread.
-    fn encoder(&self) -> Self::Encoder;
+    fn encoder(&self) -> Self::Encoder<'_>;
 
     /// Takes the bytes of `nodes`, which begin at `offset` among the bytes of the whole tree. Called from several threads,
     /// in any order; every node comes once, here or in parts.

@@ -11,8 +11,8 @@ use super::lists::{ListMemory, ListNodes};
 use super::place;
 use super::raise::{Nodes, Pending};
 use super::sample::Sampler;
-use super::sink::NodeEncoder;
-use crate::cloud::Ledger;
+use super::sinks::{Encoders, Stream};
+use crate::cloud::{Checksum, Ledger};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Reservation, Runtime, os_hints};
 
@@ -23,6 +23,8 @@ pub(super) struct BuiltUnit {
     /// What the nodes above may still change; none of the root.
     pub(super) root: Option<Pending<List>>,
     pub(super) ledger: Ledger,
+    /// For each stream.
+    pub(super) written: Vec<Checksum>,
     /// Leaves above the capacity, because their points share one place.
     pub(super) overfull_leaves: u64,
 }
@@ -48,23 +50,23 @@ pub(super) struct UnitBuilder<'a, E> {
     lists: ListMemory,
 }
 
-impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
+impl<'a, E: Encoders> UnitBuilder<'a, E> {
     pub(super) fn new(shared: &'a Shared<'a>, sampler: Sampler, encoder: E) -> Self {
         let lists = ListMemory::new(Reservation::new(&shared.rt.memory, Consumer::Work));
         Self { shared, encoder, sampler, chunk: ChunkMemory::default(), lists }
     }
 
-    /// Builds a subtree in `buffer`, a buffer to use again. `wait` is called before the first sample is taken: it returns
+    /// Builds a subtree in `buffers`, one for each stream, to use again. `wait` is called before the first sample is taken: it returns
     /// when the units before are done, false if this one is not needed any more.
     pub(super) fn subtree(
         &mut self,
         key: NodeKey,
         chunks: &[Chunk],
-        buffer: Vec<u8>,
+        buffers: Vec<Vec<u8>>,
         wait: impl FnOnce() -> bool,
     ) -> Result<Option<BuiltUnit>, ConvertError> {
         let mut borders = UnitBorders::new(&self.shared.borders, key);
-        let (mut finished, mut ledger, mut overfull_leaves) = (self.finished(buffer), Ledger::default(), 0);
+        let (mut finished, mut ledger, mut overfull_leaves) = (self.finished(buffers), Ledger::default(), 0);
         let mut stack = Vec::new();
         let mut wait = Some(wait);
         for (i, chunk) in chunks.iter().enumerate() {
@@ -101,15 +103,15 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
         }
     }
 
-    /// Builds a node from its children, in `buffer` as [`Self::subtree`].
+    /// Builds a node from its children, in `buffers` as [`Self::subtree`].
     pub(super) fn above(
         &mut self,
         key: NodeKey,
         children: Vec<Pending<List>>,
-        buffer: Vec<u8>,
+        buffers: Vec<Vec<u8>>,
     ) -> Result<BuiltUnit, ConvertError> {
         let mut borders = UnitBorders::new(&self.shared.borders, key);
-        let mut finished = self.finished(buffer);
+        let mut finished = self.finished(buffers);
         let capacity = self.shared.plan.leaf_capacity;
         let root = Pending::above_or_leaf(key, children, capacity, &mut self.nodes(&mut borders, &mut finished))?;
         self.finish(root, borders, finished, Ledger::default(), 0)
@@ -117,11 +119,14 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
 
     /// For the nodes of a unit. Every buffer is made for the largest unit, so that any of them serves the next one: what is
     /// not touched costs nothing.
-    fn finished(&self, buffer: Vec<u8>) -> Finished {
-        let mut finished = Finished::new(buffer);
+    fn finished(&self, buffers: Vec<Vec<u8>>) -> Finished {
         let plan = &self.shared.plan;
-        os_hints::reserve(finished.bytes(), plan.unit_points as usize * plan.cloud.frame.stride);
-        finished
+        let stream = |buffer| {
+            let mut stream = Stream::new(buffer);
+            os_hints::reserve(&mut stream.bytes, plan.unit_points as usize * plan.cloud.frame.stride);
+            stream
+        };
+        Finished::new(buffers.into_iter().map(stream).collect())
     }
 
     fn finish(
@@ -129,7 +134,7 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
         mut root: Pending<List>,
         mut borders: UnitBorders<'a>,
         mut finished: Finished,
-        mut ledger: Ledger,
+        ledger: Ledger,
         overfull_leaves: u64,
     ) -> Result<BuiltUnit, ConvertError> {
         let root = if root.key == NodeKey::ROOT {
@@ -142,8 +147,8 @@ impl<'a, E: NodeEncoder> UnitBuilder<'a, E> {
             Some(root)
         };
         borders.publish()?;
-        ledger.written.merge(&finished.written);
-        Ok(BuiltUnit { pieces: finished.into_pieces(), root, ledger, overfull_leaves })
+        let (pieces, written) = finished.into_pieces();
+        Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves })
     }
 
     fn nodes<'n>(&'n mut self, borders: &'n mut UnitBorders<'a>, finished: &'n mut Finished) -> ListNodes<'n, 'a, E> {

@@ -12,9 +12,11 @@ pub(crate) mod potree1;
 pub(crate) mod potree2;
 mod recovery;
 mod staging;
+mod together;
 
 pub(crate) use attributes::choose as choose_attributes;
 pub use output::Target;
 pub(crate) use output::{DiskSize, check, wants};
-pub(crate) use staging::StagedFolder;
+pub(crate) use staging::{StagedDataset, StagedFolder};
 pub use staging::{StagedFiles, resolve_path};
+pub(crate) use together::{groups, write};

@@ -6,9 +6,11 @@ use std::sync::Arc;
 use pointmill_format::DatasetKind;
 use serde_json::{Map, Value};
 
+use super::octrees::{ChosenSpacing, TreeSettings};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
+use crate::octree::{AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
 use crate::report::OutputReport;
 use crate::runtime::Runtime;
@@ -47,8 +49,53 @@ pub(crate) trait Output: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// The octree that it is, if it is one: then it is built together with others that have the same nodes, and
+    /// [`Self::write`] is not called.
+    fn octree(&self) -> Option<&dyn OctreeOutput> {
+        None
+    }
+
     /// Builds and writes the dataset.
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError>;
+    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let _ = (cloud, rt, to);
+        Err(ConvertError::Internal(format!("{} has no writer of its own", self.kind())))
+    }
+}
+
+/// A format whose nodes are those of any octree format with the same settings.
+pub(crate) trait OctreeOutput: Output {
+    /// Those that shape the tree.
+    fn tree(&self) -> TreeSettings;
+
+    /// Prepares for the nodes of a tree with this spacing.
+    ///
+    /// # Errors
+    /// A cloud that the format cannot hold, a disk that cannot be written.
+    fn begin<'a>(
+        &'a self,
+        cloud: &'a Cloud<'a>,
+        rt: &'a Runtime<'a>,
+        spacing: ChosenSpacing,
+        to: &'a StagedDataset,
+    ) -> Result<Box<dyn OctreeWriter + 'a>, ConvertError>;
+}
+
+/// A dataset while its nodes are made.
+pub(crate) trait OctreeWriter {
+    /// Where nodes go.
+    fn sink(&self) -> &dyn AnySink;
+
+    /// Builds the tree for this format alone: compiled for it.
+    ///
+    /// # Errors
+    /// As [`crate::octree::build`].
+    fn build(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError>;
+
+    /// Writes what is around the nodes, and syncs all.
+    ///
+    /// # Errors
+    /// A disk that cannot be written, a tree that the format cannot hold.
+    fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError>;
 }
 
 /// A dataset to make: the settings of one of the formats. Made from [`crate::Potree2Settings`],

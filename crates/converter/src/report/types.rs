@@ -76,8 +76,11 @@ pub struct OutputReport {
     pub attributes_renamed: Vec<RenamedAttribute>,
     /// Bytes of its files.
     pub bytes: u64,
-    /// Wall seconds from the gathered points to the synced files.
+    /// Wall seconds from the gathered points to the synced files, those of [`Self::built_with`] included.
     pub seconds: f64,
+    /// Formats that were made of the same tree at the same time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub built_with: Vec<String>,
     /// Order-independent checksum of the points written; equals `checksum_in` of the report.
     pub checksum: String,
     /// Nodes of a tree.

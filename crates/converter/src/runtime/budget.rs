@@ -34,6 +34,8 @@ pub(crate) struct Least {
     points: u64,
     /// Bytes of output that a building thread must have in memory together, beside twenty thousand points.
     unit_bytes: u64,
+    /// Outputs that are built together: each has its own bytes of a point.
+    streams: u64,
     /// Bytes that decoding takes at most, on one thread.
     decode_bytes: u64,
     /// Bytes that all inputs take as long as the run goes on.
@@ -43,12 +45,17 @@ pub(crate) struct Least {
 impl Least {
     /// Of outputs that need as many points together.
     pub(crate) fn of(points: impl IntoIterator<Item = u64>, decode_bytes: u64, input_bytes: u64) -> Self {
-        Self { points: points.into_iter().fold(10_000, u64::max), unit_bytes: 0, decode_bytes, input_bytes }
+        Self { points: points.into_iter().fold(10_000, u64::max), unit_bytes: 0, streams: 1, decode_bytes, input_bytes }
     }
 
     /// The same, where a thread puts as many bytes of output together.
     pub(crate) fn with_units(self, unit_bytes: impl IntoIterator<Item = u64>) -> Self {
         Self { unit_bytes: unit_bytes.into_iter().fold(self.unit_bytes, u64::max), ..self }
+    }
+
+    /// The same, where so many outputs are built together.
+    pub(crate) fn with_streams(self, streams: u64) -> Self {
+        Self { streams: streams.max(1), ..self }
     }
 }
 
@@ -70,6 +77,8 @@ pub(crate) struct Budget {
     fixed_bytes: u64,
     /// The least points of a chunk.
     least_points: u64,
+    /// Outputs that are built together.
+    streams: u64,
     /// For tests.
     asked_task_points: Option<u64>,
 }
@@ -84,7 +93,7 @@ impl Budget {
         let reader_bytes = GATHER_BYTES + (TILE_POINTS * stride) as u64 + least.decode_bytes;
         // Allocators keep some of what is freed.
         let usable = ceiling - ceiling / 10;
-        let bytes_per_chunk_point = bytes_per_chunk_point(stride, window as u64, threads);
+        let bytes_per_chunk_point = bytes_per_chunk_point(stride, window as u64, threads, least.streams);
         let of_unit = least.unit_bytes + least.points.max(20_000) * chunk_point_in_unit(stride);
         let least_chunk = least.points.max(20_000).max(of_unit.div_ceil(bytes_per_chunk_point));
         let least_build = BUILD_BYTES + least_chunk.saturating_mul(bytes_per_chunk_point);
@@ -112,6 +121,7 @@ impl Budget {
             bytes_per_chunk_point,
             fixed_bytes,
             least_points: least.points,
+            streams: least.streams,
             asked_task_points: plan.task_points,
         })
     }
@@ -141,7 +151,7 @@ impl Budget {
         if self.chunk_points >= unit_points {
             return (unit_points, self.window);
         }
-        let output = unit_points * stride as u64;
+        let output = self.streams * unit_points * stride as u64;
         let points = self.chunk_bytes().saturating_sub(output) / chunk_point_in_unit(stride);
         (points.max(self.least_points), self.threads as usize)
     }
@@ -170,9 +180,9 @@ impl Budget {
 }
 
 /// A chunk's records, tree coordinates, keys twice, points and lists; and its share of finished payloads in flight.
-fn bytes_per_chunk_point(stride: usize, window: u64, threads: u64) -> u64 {
+fn bytes_per_chunk_point(stride: usize, window: u64, threads: u64, streams: u64) -> u64 {
     let stride = stride as u64;
-    stride + 12 + 16 + 16 + 8 + stride * (window / threads + 1)
+    stride + 12 + 16 + 16 + 8 + streams * stride * (window / threads + 1)
 }
 
 /// The same of a chunk whose payloads are part of a larger unit: records, tree coordinates, keys twice, points and lists;

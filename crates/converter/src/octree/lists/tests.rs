@@ -6,6 +6,8 @@ use pointmill_format::{Lattice, NodeKey};
 
 use super::super::borders::{Borders, UnitBorders};
 use super::super::sample::{Sampling, Spacing};
+use super::super::sink::NodeEncoder;
+use super::super::sinks::Stream;
 use super::*;
 use crate::cloud::{Checksum, Cube, JobBounds, JobPoint, StoredOrigin, morton};
 use crate::runtime::{SystemDisk, TempFiles};
@@ -80,7 +82,7 @@ fn sample(children: &[Vec<([i32; 3], u32)>], stride: usize, is_on_disk: bool) ->
         encoder: &mut NoBytes,
         memory: &mut ListMemory::new(Reservation::new(&memory, Consumer::Work)),
         borders: &mut UnitBorders::new(&borders, NodeKey::ROOT),
-        finished: &mut Finished::default(),
+        finished: &mut Finished::new(vec![Stream::default()]),
     };
     let leaf = |(i, points): (usize, &Vec<_>)| {
         let mut list = List::of_chunk(records(points, stride), stride);

@@ -4,12 +4,12 @@ mod spacing;
 
 use std::collections::HashSet;
 
-pub(super) use spacing::ChosenSpacing;
+pub(crate) use spacing::ChosenSpacing;
 
 use super::attributes::choose;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
-use crate::octree::{Octree, Sampling};
+use crate::octree::{Octree, OctreeSettings, Sampling};
 use crate::plan::{AttributeChoice, PlanError, PlanFault, Setting};
 use crate::report::TreeReport;
 use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
@@ -23,13 +23,15 @@ pub(super) const UNIT_BYTES: u64 = 10_000_000;
 /// Points of such a subtree: larger ones leave the caches and the threads uneven.
 const UNIT_POINTS: std::ops::RangeInclusive<u64> = 20_000..=300_000;
 
-/// How the tree is made, whatever the format.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TreeSettings {
+/// How the tree is made, whatever the format: formats with the same settings share one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TreeSettings {
     pub(super) sampling: Sampling,
     /// World units, in the root; `None`: it is chosen.
     pub(super) spacing: Option<f64>,
     pub(super) leaf_capacity: u32,
+    /// Of an inner node.
+    pub(super) most_points: u32,
 }
 
 impl TreeSettings {
@@ -57,8 +59,19 @@ impl TreeSettings {
         settings.insert("leaf-capacity".into(), self.leaf_capacity.into());
     }
 
+    /// The tree of a cloud.
+    pub(super) fn of(&self, spacing: &ChosenSpacing, cloud: &Cloud<'_>) -> OctreeSettings {
+        OctreeSettings {
+            sampling: self.sampling,
+            spacing: spacing.spacing,
+            leaf_capacity: self.leaf_capacity,
+            most_points: self.most_points,
+            unit_points: self.unit_points(cloud),
+        }
+    }
+
     /// Points of a subtree that one thread builds.
-    pub(super) fn unit_points(&self, cloud: &Cloud<'_>) -> u64 {
+    fn unit_points(&self, cloud: &Cloud<'_>) -> u64 {
         let (least, most) = UNIT_POINTS.into_inner();
         (UNIT_BYTES / chosen_bytes(cloud) as u64).clamp(least, most).max(self.leaf_capacity.into())
     }

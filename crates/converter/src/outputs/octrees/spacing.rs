@@ -34,7 +34,7 @@ const COUNTED_LEVEL: u8 = 6;
 
 /// A spacing, and why it was chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::outputs) struct ChosenSpacing {
+pub(crate) struct ChosenSpacing {
     pub(in crate::outputs) spacing: Spacing,
     /// World units, in the root.
     pub(in crate::outputs) root: f64,

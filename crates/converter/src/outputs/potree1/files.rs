@@ -19,9 +19,9 @@ const WRITING: &str = "writing a node";
 
 /// The files of nodes while they are made.
 pub(super) struct NodeFiles<'a> {
-    encoding: &'a Encoding<'a>,
+    encoding: Encoding<'a>,
     /// Says what files are called.
-    metadata: &'a Metadata,
+    metadata: Metadata,
     staged: &'a StagedDataset,
     folders: Mutex<Folders>,
 }
@@ -35,14 +35,24 @@ struct Folders {
 
 impl<'a> NodeFiles<'a> {
     pub(super) fn new(
-        encoding: &'a Encoding<'a>,
-        metadata: &'a Metadata,
+        encoding: Encoding<'a>,
+        metadata: Metadata,
         staged: &'a StagedDataset,
         rt: &Runtime<'_>,
     ) -> Result<Self, ConvertError> {
         staged.create_folder(&metadata.octree_dir)?;
         let folders = Folders { made: HashSet::new(), room: Reservation::new(&rt.memory, Consumer::Nodes) };
         Ok(Self { encoding, metadata, staged, folders: Mutex::new(folders) })
+    }
+
+    /// What is known of the dataset.
+    pub(super) fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// What they were made with, once all are.
+    pub(super) fn into_parts(self) -> (Encoding<'a>, Metadata) {
+        (self.encoding, self.metadata)
     }
 
     /// Writes the file of a node.
@@ -98,11 +108,14 @@ impl<'a> NodeFiles<'a> {
     }
 }
 
-impl<'a> NodeSink for NodeFiles<'a> {
-    type Encoder = RecordEncoder<'a>;
+impl NodeSink for NodeFiles<'_> {
+    type Encoder<'s>
+        = RecordEncoder<'s>
+    where
+        Self: 's;
 
-    fn encoder(&self) -> RecordEncoder<'a> {
-        RecordEncoder::new(self.encoding)
+    fn encoder(&self) -> RecordEncoder<'_> {
+        RecordEncoder::new(&self.encoding)
     }
 
     fn write(&self, nodes: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {

@@ -29,11 +29,11 @@ use self::steps::Steps;
 use super::attributes::changed;
 use super::colour::colour_of;
 use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
-use super::output::{DiskSize, Output, Target, Wants};
+use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::octree::{self, Octree, OctreeSettings};
+use crate::octree::{self, AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, ChangedAttribute, OutputReport};
 use crate::runtime::Runtime;
@@ -95,39 +95,72 @@ impl Output for Potree1Settings {
         notes::foresee(self.version, crs)
     }
 
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+    fn octree(&self) -> Option<&dyn OctreeOutput> {
+        Some(self)
+    }
+}
+
+impl OctreeOutput for Potree1Settings {
+    fn tree(&self) -> TreeSettings {
+        let Self { sampling, spacing, max_node_points, .. } = *self;
+        let most_points = max_node_points.unwrap_or(u32::MAX);
+        TreeSettings { sampling, spacing, leaf_capacity: self.capacity(), most_points }
+    }
+
+    fn begin<'a>(
+        &'a self,
+        cloud: &'a Cloud<'a>,
+        rt: &'a Runtime<'a>,
+        spacing: ChosenSpacing,
+        to: &'a StagedDataset,
+    ) -> Result<Box<dyn OctreeWriter + 'a>, ConvertError> {
         let content = Content::choose(cloud, self.version)?;
         let steps = Steps::new(&cloud.frame, &cloud.lattice.lattice);
         if let Some((axis, step)) = steps.finer_axis(&cloud.lattice.lattice) {
             let (kind, least) = (self.kind(), steps.scale);
             return Err(Unsupported::FineAxis { kind, axis, step, least }.into());
         }
-        let spacing = ChosenSpacing::of(self.sampling, self.spacing, cloud)?;
-        let mut metadata = metadata::metadata(cloud, self, &spacing, &content, &steps);
+        let metadata = metadata::metadata(cloud, self, &spacing, &content, &steps);
         let meter = Meter::new(cloud, &steps);
         let encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
-        let settings = OctreeSettings {
-            sampling: self.sampling,
-            spacing: spacing.spacing,
-            leaf_capacity: self.capacity(),
-            most_points: self.max_node_points.unwrap_or(u32::MAX),
-            unit_points: self.tree().unit_points(cloud),
-        };
-        let files = NodeFiles::new(&encoding, &metadata, to, rt)?;
-        let tree = octree::build(cloud, rt, settings, &files)?;
-        let index_bytes = write_index(&tree, &metadata, to, &files, rt)?;
-        drop(files);
+        let files = NodeFiles::new(encoding, metadata, to, rt)?;
+        Ok(Box::new(Writer { settings: self, cloud, rt, to, spacing, files }))
+    }
+}
+
+/// A dataset while its nodes are made.
+struct Writer<'a> {
+    settings: &'a Potree1Settings,
+    cloud: &'a Cloud<'a>,
+    rt: &'a Runtime<'a>,
+    to: &'a StagedDataset,
+    spacing: ChosenSpacing,
+    files: NodeFiles<'a>,
+}
+
+impl OctreeWriter for Writer<'_> {
+    fn sink(&self) -> &dyn AnySink {
+        &self.files
+    }
+
+    fn build(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError> {
+        octree::build(cloud, rt, settings, &self.files)
+    }
+
+    fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {
+        let Self { settings, cloud, rt, to, spacing, files } = *self;
+        let index_bytes = write_index(&tree, to, &files, rt)?;
+        let (Encoding { content, steps, tally, .. }, mut metadata) = files.into_parts();
         metadata.points = Some(tree.ledger.points());
         let json = metadata.to_json();
         to.write(METADATA_FILE, json.as_bytes())?;
 
-        let Encoding { content, steps, tally, .. } = encoding;
         let tally = tally.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let (attributes_changed, changes) = self.changes(cloud, &content, &tally);
-        let mut warnings = self.foresee(cloud.schema(), &content.kept, &cloud.facts.crs);
+        let (attributes_changed, changes) = settings.changes(cloud, &content, &tally);
+        let mut warnings = settings.foresee(cloud.schema(), &content.kept, &cloud.facts.crs);
         warnings.extend(content.warnings);
         warnings.extend(changes);
-        warnings.extend(notes::crowded(&tree.nodes, self.max_node_points));
+        warnings.extend(notes::crowded(&tree.nodes, settings.max_node_points));
         let errors = errors::errors(cloud, &steps, &tree.nodes, &tally.positions);
         Ok(OutputReport {
             points: tree.ledger.points(),
@@ -141,18 +174,13 @@ impl Output for Potree1Settings {
             bytes: tree.bytes + index_bytes + json.len() as u64,
             checksum: tree.ledger.unaltered().to_string(),
             tree: tree_report(&tree),
-            details: self.details(&spacing, &metadata),
+            details: settings.details(&spacing, &metadata),
             ..OutputReport::default()
         })
     }
 }
 
 impl Potree1Settings {
-    fn tree(&self) -> TreeSettings {
-        let Self { sampling, spacing, .. } = *self;
-        TreeSettings { sampling, spacing, leaf_capacity: self.capacity() }
-    }
-
     /// Points of a leaf, at most.
     fn capacity(&self) -> u32 {
         self.leaf_capacity.min(self.max_node_points.unwrap_or(u32::MAX))
@@ -184,11 +212,11 @@ impl Potree1Settings {
 /// Writes the index files, and syncs all that was written; returns the bytes of the index.
 fn write_index(
     tree: &Octree,
-    metadata: &Metadata,
     to: &StagedDataset,
     files: &NodeFiles<'_>,
     rt: &Runtime<'_>,
 ) -> Result<u64, ConvertError> {
+    let metadata = files.metadata();
     let mut counts: Vec<NodeCount> =
         tree.nodes.iter().map(|node| NodeCount { key: node.key, points: node.points }).collect();
     let indexes = encode_index(&mut counts, metadata.step)

@@ -23,13 +23,13 @@ pub(crate) use payload::PayloadEncoder;
 pub use settings::{DarkColours, Encoding, Potree2Settings};
 
 use self::watch::{AllSeen, Watch};
-use super::attributes::{changed, choose};
+use super::attributes::{Choice, changed, choose};
 use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
-use super::output::{DiskSize, Output, Target, Wants};
+use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::octree::{self, FinishedNode, NodeSink, OctreeSettings};
+use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport};
 use crate::runtime::{DiskFile, Events, Runtime};
@@ -97,54 +97,134 @@ impl Output for Potree2Settings {
         notes::foresee(self, schema, kept, crs)
     }
 
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+    fn octree(&self) -> Option<&dyn OctreeOutput> {
+        Some(self)
+    }
+}
+
+impl OctreeOutput for Potree2Settings {
+    fn tree(&self) -> TreeSettings {
+        let Self { sampling, spacing, leaf_capacity, .. } = *self;
+        TreeSettings { sampling, spacing, leaf_capacity, most_points: u32::MAX }
+    }
+
+    fn begin<'a>(
+        &'a self,
+        cloud: &'a Cloud<'a>,
+        rt: &'a Runtime<'a>,
+        spacing: ChosenSpacing,
+        to: &'a StagedDataset,
+    ) -> Result<Box<dyn OctreeWriter + 'a>, ConvertError> {
         let schema = cloud.schema();
         let choice = choose(&cloud.plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges);
         if let Some(wide) = choice.kept.iter().map(|&i| &schema.attributes[i]).find(|a| a.elements > MAX_ELEMENTS) {
             let (kind, name, elements) = (self.kind(), wide.name.clone(), wide.elements);
             return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());
         }
-        let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
-        let seen = AllSeen::default();
-        let payloads = Payloads {
+        Ok(Box::new(Payloads {
             file: to.create("octree.bin")?,
             turn: Mutex::default(),
-            layout,
-            encoding: self.encoding,
+            layout: OutputLayout::new(schema, &choice.kept, &cloud.frame),
             events: rt.events(),
             watch: self.watch(cloud, &choice.kept),
-            seen: &seen,
-        };
-        let spacing = ChosenSpacing::of(self.sampling, self.spacing, cloud)?;
-        let settings = OctreeSettings {
-            sampling: self.sampling,
-            spacing: spacing.spacing,
-            leaf_capacity: self.leaf_capacity,
-            most_points: u32::MAX,
-            unit_points: self.tree().unit_points(cloud),
-        };
-        let tree = octree::build(cloud, rt, settings, &payloads)?;
-        payloads.file.sync("syncing the payloads")?;
+            seen: AllSeen::default(),
+            settings: self,
+            cloud,
+            spacing,
+            choice,
+            to,
+        }))
+    }
+}
 
+impl Potree2Settings {
+    /// What to look for in the points.
+    fn watch(&self, cloud: &Cloud<'_>, kept: &[usize]) -> Watch {
+        let (schema, facts) = (cloud.schema(), &cloud.facts);
+        let is_deep = (0..cloud.sources.all.len()).any(|source| !facts.widening.is_narrow(source));
+        let attributes = kept.iter().map(|&i| (&schema.attributes[i], &facts.ranges[i]));
+        Watch::new(attributes, is_deep, self.dark_colours)
+    }
+}
+
+fn entry(node: &FinishedNode) -> NodeEntry {
+    let FinishedNode { key, points, byte_offset, byte_size } = *node;
+    NodeEntry::new(key, points, byte_offset, byte_size)
+}
+
+/// A dataset while its nodes are made.
+struct Payloads<'a> {
+    /// `octree.bin`
+    file: DiskFile,
+    /// Whose turn it is to write: threads that wait for the lock of a file in the kernel do not sleep.
+    turn: Mutex<()>,
+    layout: OutputLayout,
+    events: &'a dyn Events,
+    watch: Watch,
+    seen: AllSeen,
+    settings: &'a Potree2Settings,
+    cloud: &'a Cloud<'a>,
+    spacing: ChosenSpacing,
+    choice: Choice,
+    to: &'a StagedDataset,
+}
+
+impl NodeSink for Payloads<'_> {
+    type Encoder<'s>
+        = PayloadEncoder<'s>
+    where
+        Self: 's;
+
+    fn encoder(&self) -> PayloadEncoder<'_> {
+        PayloadEncoder::new(self.layout.clone(), self.settings.encoding, self.events)
+            .watching(self.watch.clone(), &self.seen)
+    }
+
+    fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
+        let turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        self.file.write_at(bytes, offset, "writing node payloads")?;
+        drop(turn);
+        self.file.start_write_back(offset, bytes.len());
+        Ok(())
+    }
+
+    fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
+        self.write(&[], bytes, node.byte_offset + at)
+    }
+}
+
+impl OctreeWriter for Payloads<'_> {
+    fn sink(&self) -> &dyn AnySink {
+        self
+    }
+
+    fn build(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError> {
+        octree::build(cloud, rt, settings, self)
+    }
+
+    fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {
+        self.file.sync("syncing the payloads")?;
+        let Self { seen, settings, cloud, spacing, choice, to, .. } = *self;
+        let (kind, schema) = (settings.kind(), cloud.schema());
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
         let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
         let names = Names::of(&notes::attributes(schema, &choice.kept));
-        let metadata = metadata::metadata(cloud, self, &spacing, &choice, &names, &tree.ledger, &hierarchy);
+        let metadata = metadata::metadata(cloud, settings, &spacing, &choice, &names, &tree.ledger, &hierarchy);
         to.write("hierarchy.bin", &hierarchy.bytes)?;
         let json = metadata.to_json();
         to.write("metadata.json", json.as_bytes())?;
         let seen = seen.total();
         let doubled = choice.kept.iter().filter_map(|&i| {
             let (attribute, changes) = (&schema.attributes[i], cloud.stats.doubled.get(i)?);
-            changed(self.kind(), attribute, viewable(attribute.ty), changes)
+            changed(kind, attribute, viewable(attribute.ty), changes)
         });
         let rounded = schema.rgb().and_then(|i| {
             let attribute = &schema.attributes[i];
-            changed(self.kind(), attribute, attribute.ty, &seen.rounded)
+            changed(kind, attribute, attribute.ty, &seen.rounded)
         });
         let (attributes_changed, changes): (_, Vec<_>) = doubled.chain(rounded).unzip();
-        let mut warnings = self.foresee(schema, &choice.kept, &cloud.facts.crs);
-        warnings.extend(notes::seen(self, &seen, tree.ledger.points()));
+        let mut warnings = settings.foresee(schema, &choice.kept, &cloud.facts.crs);
+        warnings.extend(notes::seen(settings, &seen, tree.ledger.points()));
         warnings.extend(changes);
         Ok(OutputReport {
             points: tree.ledger.points(),
@@ -161,57 +241,5 @@ impl Output for Potree2Settings {
             details: [("spacing".to_owned(), spacing.describe())].into_iter().chain(notes::details(&seen)).collect(),
             ..OutputReport::default()
         })
-    }
-}
-
-impl Potree2Settings {
-    /// What to look for in the points.
-    fn watch(&self, cloud: &Cloud<'_>, kept: &[usize]) -> Watch {
-        let (schema, facts) = (cloud.schema(), &cloud.facts);
-        let is_deep = (0..cloud.sources.all.len()).any(|source| !facts.widening.is_narrow(source));
-        let attributes = kept.iter().map(|&i| (&schema.attributes[i], &facts.ranges[i]));
-        Watch::new(attributes, is_deep, self.dark_colours)
-    }
-
-    fn tree(&self) -> TreeSettings {
-        let Self { sampling, spacing, leaf_capacity, .. } = *self;
-        TreeSettings { sampling, spacing, leaf_capacity }
-    }
-}
-
-fn entry(node: &FinishedNode) -> NodeEntry {
-    let FinishedNode { key, points, byte_offset, byte_size } = *node;
-    NodeEntry::new(key, points, byte_offset, byte_size)
-}
-
-/// `octree.bin` while it is written.
-struct Payloads<'a> {
-    file: DiskFile,
-    /// Whose turn it is to write: threads that wait for the lock of a file in the kernel do not sleep.
-    turn: Mutex<()>,
-    layout: OutputLayout,
-    encoding: Encoding,
-    events: &'a dyn Events,
-    watch: Watch,
-    seen: &'a AllSeen,
-}
-
-impl<'a> NodeSink for Payloads<'a> {
-    type Encoder = PayloadEncoder<'a>;
-
-    fn encoder(&self) -> PayloadEncoder<'a> {
-        PayloadEncoder::new(self.layout.clone(), self.encoding, self.events).watching(self.watch.clone(), self.seen)
-    }
-
-    fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
-        let turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        self.file.write_at(bytes, offset, "writing node payloads")?;
-        drop(turn);
-        self.file.start_write_back(offset, bytes.len());
-        Ok(())
-    }
-
-    fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
-        self.write(&[], bytes, node.byte_offset + at)
     }
 }
