@@ -50,6 +50,7 @@ fn advice(advice: &Advice) -> String {
         Advice::Project => "--reproject EPSG:n to a system in metres or feet gives a scene to look at".to_owned(),
         Advice::CommasSeparate => "pass --decimal point if they separate columns".to_owned(),
         Advice::NameEpsg => "pass --crs EPSG:n if viewers need the projection".to_owned(),
+        Advice::GiveWkt => "pass --crs \"$(cat FILE)\" with its WKT in FILE".to_owned(),
         Advice::GiveProj4 => "pass --crs \"+proj=…\" if viewers need the projection".to_owned(),
         Advice::Reproject => {
             "bring the inputs to one system with --reproject, or name the system of all with --crs".to_owned()

@@ -55,6 +55,8 @@ pub enum Advice {
     NameEpsg,
     /// Give the coordinate reference system as a proj4 definition.
     GiveProj4,
+    /// Give the coordinate reference system as WKT.
+    GiveWkt,
     /// Reproject the inputs, or name one coordinate reference system for all.
     Reproject,
     /// Name the attributes to keep.
@@ -108,6 +110,7 @@ impl fmt::Display for Advice {
             Self::Project => "reproject to a system in metres or feet if it is to be looked at",
             Self::CommasSeparate => "say so if they separate columns",
             Self::NameEpsg => "name the EPSG code if viewers need the projection",
+            Self::GiveWkt => "give its WKT",
             Self::GiveProj4 => "give a proj4 definition if viewers need the projection",
             Self::Reproject => "reproject the inputs, or name one system for all",
             Self::NameAttributes => "name the attributes to keep",

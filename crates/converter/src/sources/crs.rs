@@ -91,6 +91,7 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
         if let Some(height) = height {
             out.label = format!("{} + EPSG:{height}", out.label);
             out.vertical_unit = vertical::unit_of(height);
+            out.vertical_code = Some(height);
         }
         return Ok(out);
     }
@@ -103,7 +104,15 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
         let (projection, notes) = unzip(proj4::for_viewers(text, unit), None);
         let (unit, vertical_unit) = (Some(unit), proj4::vertical_unit(text));
         let (label, is_geocentric) = (printable(text), proj4::is_geocentric(text));
-        return Ok(ResolvedCrs { projection, wkt: None, label, unit, vertical_unit, is_geocentric, notes });
+        return Ok(ResolvedCrs {
+            projection,
+            label,
+            unit,
+            vertical_unit,
+            is_geocentric,
+            notes,
+            ..ResolvedCrs::default()
+        });
     }
     match wkt::is_wkt(text) {
         true if !wkt::is_whole(text) => fault(PlanFault::CutWkt),

@@ -46,6 +46,11 @@ pub enum ViewerNote {
         /// Their words.
         words: Vec<String>,
     },
+    /// The format has WKT alone, which is not known of the coordinate reference system.
+    NoWkt {
+        /// The system, for people.
+        system: String,
+    },
     /// Coordinates are geocentric: z is the axis of the Earth.
     Geocentric {
         /// The system, for people.
@@ -89,6 +94,8 @@ pub enum NameFault {
     Colouring,
     /// It is empty, or a list in a page does not show it as it is.
     Text,
+    /// Extra bytes of LAS have names of 32 bytes, each once, and three elements.
+    ExtraBytes,
 }
 
 impl ViewerNote {
@@ -102,6 +109,7 @@ impl ViewerNote {
             Self::Objects => "object_readers",
             Self::BehindColour { .. } => "behind_colour",
             Self::CrowdedNodes { .. } => "crowded_nodes",
+            Self::NoWkt { .. } => "no_wkt",
             Self::Geocentric { .. } => "geocentric",
             Self::Degrees { .. } => "degrees",
         }
@@ -111,6 +119,7 @@ impl ViewerNote {
         match self {
             Self::DarkColours { .. } => Some(Advice::RoundDarkColours),
             Self::CrowdedNodes { .. } => Some(Advice::LimitNodes),
+            Self::NoWkt { .. } => Some(Advice::GiveWkt),
             Self::Geocentric { .. } | Self::Degrees { .. } => Some(Advice::Project),
             _ => None,
         }
@@ -154,6 +163,11 @@ impl fmt::Display for ViewerNote {
                 "BA_PointCloud does not know the number of bytes of {}, and would show nonsense",
                 words.join(", ")
             ),
+            Self::NoWkt { system } => write!(
+                f,
+                "the coordinate reference system ({system}) is not written: it is not known as WKT, and the format has \
+                 nothing else"
+            ),
             Self::Geocentric { system } => write!(
                 f,
                 "coordinates are geocentric ({system}): viewers take z, the axis of the Earth, for up, and show the \
@@ -177,6 +191,7 @@ impl fmt::Display for NameFault {
             Self::Viewers => "viewers keep data of their own under that name",
             Self::Colouring => "Potree has a colouring of that name, and would show that instead",
             Self::Text => "pages of viewers would not show that name as it is",
+            Self::ExtraBytes => "extra bytes have names of 32 bytes and up to three elements",
         })
     }
 }

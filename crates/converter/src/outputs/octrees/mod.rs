@@ -1,9 +1,11 @@
 //! What the octree formats have in common: the same settings give all of them the same nodes.
 
+mod accuracy;
 mod spacing;
 
 use std::collections::HashSet;
 
+pub(super) use accuracy::{errors, half_ulp};
 pub(crate) use spacing::ChosenSpacing;
 
 use super::attributes::choose;

@@ -5,7 +5,7 @@ use pointmill_format::{Deviations, NodeKey};
 use super::steps::Steps;
 use crate::cloud::{Cloud, JobPoint, RecordFrame, position};
 use crate::octree::FinishedNode;
-use crate::outputs::potree2::half_ulp;
+use crate::outputs::octrees::half_ulp;
 use crate::outputs::recovery::Recovery;
 use crate::report::{FormatErrors, PositionErrors};
 

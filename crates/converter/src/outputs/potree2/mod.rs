@@ -1,6 +1,5 @@
 //! The Potree 2.0 octree: payloads behind one another in `octree.bin`, and the two files around them.
 
-mod accuracy;
 mod layout;
 mod metadata;
 mod names;
@@ -15,7 +14,6 @@ use pointmill_format::DatasetKind;
 use pointmill_format::potree2::{CHUNK_RECORDS, NodeEntry, encode_hierarchy};
 use serde_json::{Map, Value};
 
-pub(super) use accuracy::half_ulp;
 pub(crate) use layout::OutputLayout;
 pub(super) use layout::viewable;
 pub(super) use names::Names;
@@ -24,7 +22,7 @@ pub use settings::{DarkColours, Encoding, Potree2Settings};
 
 use self::watch::{AllSeen, Watch};
 use super::attributes::{Choice, changed, choose};
-use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
+use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, errors, tree_report};
 use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
@@ -229,7 +227,7 @@ impl OctreeWriter for Payloads<'_> {
         Ok(OutputReport {
             points: tree.ledger.points(),
             duplicates_dropped: tree.ledger.duplicates_dropped(),
-            accuracy: report::accuracy(cloud, tree.ledger.points(), accuracy::errors(cloud, metadata.lattice.offset)),
+            accuracy: report::accuracy(cloud, tree.ledger.points(), errors(cloud, cloud.frame.cube.min.0, metadata.lattice.offset)),
             attributes: cloud.names(choice.kept.iter().copied()),
             attributes_dropped: choice.dropped,
             attributes_changed,

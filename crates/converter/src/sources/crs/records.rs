@@ -54,6 +54,7 @@ fn from_keys(found: &Crs) -> ResolvedCrs {
     };
     if let Some(code) = found.vertical_epsg.filter(|_| !out.label.is_empty()) {
         out.label = format!("{} + EPSG:{code}", out.label);
+        out.vertical_code = Some(code);
     }
     out.vertical_unit = heights_of_keys(found).or(out.vertical_unit);
     out

@@ -1,5 +1,7 @@
 //! A coordinate reference system by its code, and what is known of it.
 
+use std::borrow::Cow;
+
 use pointmill_format::Unit;
 
 use super::{proj4, wkt};
@@ -24,6 +26,10 @@ pub struct ResolvedCrs {
     pub vertical_unit: Option<Unit>,
     /// x, y and z are measured from the centre of the Earth, z along its axis.
     pub is_geocentric: bool,
+    /// The WKT of the table for the code, where the scan says nothing else than the code does.
+    pub(super) of_code: Option<&'static str>,
+    /// EPSG code of the system of heights, where it stands beside a code.
+    pub(super) vertical_code: Option<u32>,
     /// What the user should know: why `projection` is empty although a system is named, that a unit is not the one of
     /// the code, or that WKT and GeoTIFF keys of one file disagree.
     pub notes: Vec<CrsNote>,
@@ -33,6 +39,19 @@ impl ResolvedCrs {
     /// True if x and y are longitude and latitude, in degrees or another angle.
     pub fn is_geographic(&self) -> bool {
         self.unit.is_some_and(Unit::is_angle)
+    }
+
+    /// The system as WKT: what was found or given, else what its code means. `None` if there is no system, or nothing says it
+    /// in WKT.
+    pub fn wkt_text(&self) -> Option<Cow<'_, str>> {
+        if let Some(wkt) = &self.wkt {
+            return Some(Cow::Borrowed(wkt));
+        }
+        let horizontal = self.of_code?;
+        match self.vertical_code {
+            None => Some(Cow::Borrowed(horizontal)),
+            Some(code) => wkt::compound(horizontal, code, self.vertical_unit?).map(Cow::Owned),
+        }
     }
 
     /// Equal for systems that are the same, though files may declare them in other words.
@@ -63,7 +82,10 @@ pub(super) fn from_code(code: u32, declared: Option<Unit>, false_easting: Option
     }
     let vertical_unit = proj4::vertical_unit(def.proj4);
     let is_geocentric = proj4::is_geocentric(def.proj4);
-    ResolvedCrs { projection, wkt: None, label, unit: Some(unit), vertical_unit, is_geocentric, notes }
+    let is_as_declared = unit == own && !notes.iter().any(|note| matches!(note, CrsNote::FalseEasting { .. }));
+    let of_code = is_as_declared.then_some(def.wkt);
+    let (wkt, unit, vertical_code) = (None, Some(unit), None);
+    ResolvedCrs { projection, wkt, label, unit, vertical_unit, is_geocentric, of_code, vertical_code, notes }
 }
 
 /// A definition knows degrees alone: that a system is in grads is in the WKT of the table.

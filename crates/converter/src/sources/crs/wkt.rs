@@ -265,6 +265,22 @@ fn string_len(bytes: &[u8]) -> Option<usize> {
     }
 }
 
+/// A system of a code of EPSG with another one for heights, in `unit`, as WKT 1. Nothing but their codes says which these are.
+pub(super) fn compound(horizontal: &str, vertical: u32, unit: Unit) -> Option<String> {
+    let name = parse_name(horizontal)?;
+    let Unit::Length(metres) = unit else { return None };
+    let authority = unit.epsg().map_or_else(String::new, |code| format!(",AUTHORITY[\"EPSG\",\"{code}\"]"));
+    Some(format!(
+        "COMPD_CS[\"{name} + EPSG:{vertical}\",{horizontal},VERT_CS[\"EPSG:{vertical}\",VERT_DATUM[\"datum of \
+         EPSG:{vertical}\",2005],UNIT[\"{unit}\",{metres}{authority}],AXIS[\"Up\",UP],AUTHORITY[\"EPSG\",\"{vertical}\"]]]"
+    ))
+}
+
+/// The name of the outermost system.
+fn parse_name(text: &str) -> Option<String> {
+    Some(read(text)?.name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -16,8 +16,9 @@ struct Axis {
     max: i64,
 }
 
-/// The errors of a dataset whose stored 0 is at `offset`. Integers come back in any case, and are what a reader compares.
-pub(super) fn errors(cloud: &Cloud<'_>, offset: [f64; 3]) -> FormatErrors {
+/// The errors of a dataset whose stored 0 is the point `anchor` of the job lattice, and at `offset`. Integers come back in
+/// any case, and are what a reader compares.
+pub(in crate::outputs) fn errors(cloud: &Cloud<'_>, anchor: [i64; 3], offset: [f64; 3]) -> FormatErrors {
     let (lattice, bounds) = (&cloud.lattice.lattice, &cloud.stats.bounds);
     if bounds.is_empty() {
         return FormatErrors { merged: Some(0), ..FormatErrors::default() };
@@ -26,7 +27,7 @@ pub(super) fn errors(cloud: &Cloud<'_>, offset: [f64; 3]) -> FormatErrors {
         scale: lattice.scale[a],
         job_offset: lattice.offset[a],
         offset: offset[a],
-        anchor: cloud.frame.cube.min[a],
+        anchor: anchor[a],
         min: bounds.min[a],
         max: bounds.max[a],
     };
