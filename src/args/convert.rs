@@ -77,7 +77,7 @@ pub(crate) struct ConvertArgs {
     pub(crate) scale: Scale,
 
     /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
-    /// [default: all for potree2, colour for potree1 and batches, classification for bintree]
+    /// [default: all for potree2 and copc, colour for potree1 and batches, classification for bintree]
     #[arg(long, value_name = "all|scene|LIST", value_parser = parse_attributes, help_heading = "Selecting data")]
     pub(crate) attributes: Option<Attributes>,
     /// Keeps only points inside this box, in world coordinates
@@ -217,6 +217,8 @@ pub(crate) enum TargetArg {
     Potree2,
     /// The octree before Potree 2.0, a file per node: for engines, three-loader and installations that read nothing newer
     Potree1,
+    /// The octree as one LAZ file with a hierarchy: for QGIS, PDAL, deck.gl and maps in browsers
+    Copc,
     /// Mean-split binary tree with tight boxes, which draws every point at every distance
     Bintree,
     /// Morton-sorted quantised batches with continuous levels of detail, for compute-shader renderers
@@ -229,6 +231,7 @@ impl TargetArg {
         match self {
             Self::Potree2 => "potree2",
             Self::Potree1 => "potree1",
+            Self::Copc => "copc",
             Self::Bintree => "bintree",
             Self::Batches => "batches",
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, DarkColours, Duplicates, Encoding, Filter, OnFault,
+    AttributeChoice, BatchesSettings, BintreeSettings, CopcSettings, DarkColours, Duplicates, Encoding, Filter, OnFault,
     OriginPoints, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, RgbDepth, Sampling,
     ScaleChoice, Target,
 };
@@ -88,11 +88,12 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
             TargetArg::Bintree => bintree_settings(&args.bintree).into(),
             TargetArg::Batches => batches_settings(&args.batches).into(),
             TargetArg::Potree1 => potree1_settings(args).into(),
+            TargetArg::Copc => copc_settings(args).into(),
         };
         targets.push(target);
     }
     let (tree, batches) = (&args.bintree, &args.batches);
-    let octrees: &[TargetArg] = &[TargetArg::Potree2, TargetArg::Potree1];
+    let octrees: &[TargetArg] = &[TargetArg::Potree2, TargetArg::Potree1, TargetArg::Copc];
     let given: &[(&str, &[TargetArg], bool)] = &[
         ("--sampling", octrees, args.sampling.is_some()),
         ("--spacing", octrees, args.spacing.is_some()),
@@ -137,6 +138,15 @@ fn potree1_settings(args: &ConvertArgs) -> Potree1Settings {
             Potree1VersionArg::V1_7 => Potree1Version::V1_7,
             Potree1VersionArg::V1_8 => Potree1Version::V1_8,
         }),
+    }
+}
+
+fn copc_settings(args: &ConvertArgs) -> CopcSettings {
+    let default = CopcSettings::default();
+    CopcSettings {
+        sampling: sampling(args).unwrap_or(default.sampling),
+        spacing: args.spacing.and_then(|s| s.0),
+        leaf_capacity: args.leaf_capacity.unwrap_or(default.leaf_capacity),
     }
 }
 

@@ -55,6 +55,7 @@ pub use estimate::estimate;
 pub use octree::Sampling;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
+pub use outputs::copc::CopcSettings;
 pub use outputs::potree1::{Potree1Settings, Potree1Version};
 pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
 pub use outputs::{StagedFiles, Target, resolve_path};

@@ -4,6 +4,7 @@ mod attributes;
 pub(crate) mod batches;
 pub(crate) mod bintree;
 mod colour;
+pub(crate) mod copc;
 mod number;
 mod octrees;
 mod origin;
