@@ -5,7 +5,7 @@ use crate::octree::LinkedTree;
 use super::NodeEntry;
 
 /// The roots of the chunks, in breadth-first order, if a chunk should have at most `most` records.
-pub(super) fn chunk_roots(tree: &LinkedTree<'_, NodeEntry>, most: usize) -> Vec<usize> {
+pub(crate) fn chunk_roots(tree: &LinkedTree<'_, NodeEntry>, most: usize) -> Vec<usize> {
     let mut roots = Vec::new();
     let mut waiting = vec![0];
     while let Some(root) = waiting.pop() {
