@@ -29,7 +29,6 @@
 
 mod brotli;
 mod chunk;
-mod chunk_cut;
 mod columns;
 mod dataset;
 mod encode_brotli;
@@ -44,8 +43,6 @@ mod octree;
 mod payload;
 mod record;
 
-#[cfg_attr(not(feature = "las"), allow(unused_imports))]
-pub(crate) use chunk_cut::chunk_roots;
 pub use dataset::Dataset;
 pub use encode_brotli::{BrotliScratch, encode_brotli, encode_brotli_while};
 pub use encode_hierarchy::{CHUNK_RECORDS, HierarchyBytes, encode_hierarchy};

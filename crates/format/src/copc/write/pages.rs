@@ -1,7 +1,7 @@
 //! The hierarchy, cut into pages.
 
-use crate::octree::LinkedTree;
-use crate::potree2::{CHUNK_RECORDS, NodeEntry, chunk_roots};
+use crate::octree::{LinkedTree, chunk_roots};
+use crate::potree2::{CHUNK_RECORDS, NodeEntry};
 use crate::{NodeKey, WriteError};
 
 use super::super::Entry;
