@@ -8,10 +8,10 @@ mod encoder;
 mod notes;
 mod settings;
 
+use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 
-use pointmill_format::copc::Info;
-use pointmill_format::copc::write::Heading;
+use pointmill_format::copc::{Heading, Info};
 use pointmill_format::potree2::NodeEntry;
 use pointmill_format::scan::las::write::ChunkEncoder;
 use pointmill_format::{DatasetKind, WriteError};
@@ -103,7 +103,7 @@ impl OctreeOutput for CopcSettings {
         let content = Content::choose(cloud)?;
         let mut heading = Heading::new(content.layout.point_format(), content.lattice).map_err(failed)?;
         heading.extra_bytes = content.layout.extra_bytes().to_vec();
-        heading.wkt = cloud.facts.crs.wkt_text().map(str::to_owned);
+        heading.wkt = cloud.facts.crs.wkt_text().map(Cow::into_owned);
         let chunks_start = heading.chunks_start().map_err(failed)?;
         let chunks = ChunkEncoder::new(&content.layout).map_err(failed)?;
         let file = to.create(self.kind().marker_file())?;
@@ -216,7 +216,7 @@ impl OctreeWriter for Writer<'_> {
 fn in_file(tree: &Octree) -> Result<Vec<(u32, u32)>, ConvertError> {
     let mut nodes: Vec<&FinishedNode> = tree.nodes.iter().collect();
     nodes.sort_unstable_by_key(|node| node.byte_offset);
-    let too_large = |node: &FinishedNode| {
+    let too_large = |node: &FinishedNode| -> ConvertError {
         let what = format!("node {} takes {} bytes", node.key, node.byte_size);
         Unsupported::Format { kind: DatasetKind::Copc, what }.into()
     };
