@@ -45,7 +45,7 @@ pub(crate) enum Command {
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ValidateArgs {
-    /// Folder of a dataset, or a .qbatch file; the format is detected from the content
+    /// Folder of a dataset, or a .qbatch or COPC file; the format is detected from the content
     pub(crate) dataset: PathBuf,
     /// Checks that the dataset holds every point of these scans exactly once: files, folders or globs
     #[arg(long, value_name = "INPUT", num_args = 1..)]

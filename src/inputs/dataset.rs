@@ -66,8 +66,9 @@ pub(super) fn scans_beside(dataset: &Path) -> Vec<PathBuf> {
     scans
 }
 
+/// COPC files are scans like others.
 fn detected(path: &Path) -> Option<Located> {
-    DatasetKind::detect(path)?;
+    DatasetKind::detect(path).filter(|kind| *kind != DatasetKind::Copc)?;
     locate(path).ok()
 }
 

@@ -105,7 +105,8 @@ fn damaged_datasets_end_the_run_or_are_skipped() {
     put(&mut bytes, 2, &u32::MAX.to_le_bytes());
     fs::write(&hierarchy, bytes).unwrap();
     dir.run(["convert", "in/octree", "-o", "out"]).failed_with(3, &["octree.bin", "node r has"]);
-    dir.run(["convert", "in", "b.las", "-o", "out"]).failed_with(3, &["octree.bin", "copy or convert the dataset again"]);
+    dir.run(["convert", "in", "b.las", "-o", "out"])
+        .failed_with(3, &["octree.bin", "copy or convert the dataset again"]);
     dir.succeed(["convert", "in", "b.las", "-o", "out", "--unreadable", "skip", "-q"]);
     assert_eq!(points(&dir, "out"), 500);
     fs::remove_file(&hierarchy).unwrap();

@@ -22,6 +22,9 @@ pub enum DatasetKind {
     Bintree,
     /// Quantised batches: a file `*.qbatch`, or a folder with `points.qbatch` ([`crate::batches`]).
     Batches,
+    /// COPC 1.0: a LAZ file, which is a scan too, by habit `*.copc.laz`, or a folder with `points.copc.laz` (`copc`, feature
+    /// `las`).
+    Copc,
 }
 
 /// The facts about one kind; see the methods of [`DatasetKind`].
@@ -30,11 +33,13 @@ struct Row {
     title: &'static str,
     marker: &'static str,
     mark: &'static str,
+    /// Bytes that stand at these places of the marker file.
+    places: &'static [(usize, &'static [u8])],
     required: &'static [&'static str],
     optional: &'static [&'static str],
     /// Names that follow a pattern.
     owns: fn(&str) -> bool,
-    /// A dataset that is one file can have any name with this extension.
+    /// A dataset that is one file can have any name with this extension, or any name at all if places tell it.
     extension: Option<&'static str>,
 }
 
@@ -45,6 +50,7 @@ const POTREE2: Row = Row {
     title: "Potree 2.0",
     marker: "metadata.json",
     mark: "\"hierarchy\"",
+    places: &[],
     required: &["hierarchy.bin", "octree.bin"],
     optional: &["log.txt"], // PotreeConverter writes it
     owns: NO_PATTERN,
@@ -56,6 +62,7 @@ const POTREE1: Row = Row {
     title: "Potree 1.x",
     marker: "cloud.js",
     mark: "\"octreeDir\"",
+    places: &[],
     required: &[],               // the folder of the nodes can have any name
     optional: &["sources.json"], // PotreeConverter writes it
     owns: is_node_file,
@@ -67,6 +74,7 @@ const BINTREE: Row = Row {
     title: "binary tree",
     marker: "index.json",
     mark: "\"pointmill-bintree\"",
+    places: &[],
     required: &[], // which of the others are there depends on the layout
     optional: &["leaves.bin"],
     owns: is_leaf_file,
@@ -78,10 +86,23 @@ const BATCHES: Row = Row {
     title: "quantised batches",
     marker: "points.qbatch",
     mark: "QBATCHES",
+    places: &[],
     required: &[],
     optional: &[],
     owns: NO_PATTERN,
     extension: Some("qbatch"),
+};
+
+const COPC: Row = Row {
+    name: "copc",
+    title: "COPC",
+    marker: "points.copc.laz",
+    mark: "copc",
+    places: &[(0, b"LASF"), (377, b"copc\0"), (393, &[1, 0])], // LAS, and its first record is the info record
+    required: &[],
+    optional: &[],
+    owns: NO_PATTERN,
+    extension: Some("copc.laz"),
 };
 
 /// `r0427.bin`, `r0427.hrc`: a node of an octree, named after its path from the root.
@@ -101,7 +122,7 @@ const MARK_WITHIN_BYTES: u64 = 64 << 10;
 
 impl DatasetKind {
     /// Every kind.
-    pub const ALL: &[Self] = &[Self::Potree2, Self::Potree1, Self::Bintree, Self::Batches];
+    pub const ALL: &[Self] = &[Self::Potree2, Self::Potree1, Self::Bintree, Self::Batches, Self::Copc];
 
     const fn row(self) -> &'static Row {
         match self {
@@ -109,6 +130,7 @@ impl DatasetKind {
             Self::Potree1 => &POTREE1,
             Self::Bintree => &BINTREE,
             Self::Batches => &BATCHES,
+            Self::Copc => &COPC,
         }
     }
 
@@ -149,6 +171,15 @@ impl DatasetKind {
         name == row.marker || row.required.contains(&name) || row.optional.contains(&name) || (row.owns)(name)
     }
 
+    /// True if the first bytes of a file, 64 KiB or all, are those of a marker file of this kind.
+    #[must_use]
+    pub fn is_marked(self, first_bytes: &[u8]) -> bool {
+        let Row { mark, places, .. } = *self.row();
+        let is_at = |(place, bytes): &(usize, &[u8])| first_bytes.get(*place..).is_some_and(|b| b.starts_with(bytes));
+        places.iter().all(is_at)
+            && (!places.is_empty() || first_bytes.windows(mark.len()).any(|w| w == mark.as_bytes()))
+    }
+
     /// The kind of the dataset at `path`, a folder or its marker file, by name and content: the marker file is there
     /// and has its mark; or of the one in an archive (feature `zip`). `None` for anything else, and for what cannot be read.
     ///
@@ -165,7 +196,7 @@ impl DatasetKind {
         let located = find(path)?;
         // an archive was looked into
         let is_archive = located.path == path && !located.kind.is_single_file() && path.is_file();
-        (is_archive || starts_with_mark(&located.marker_path(), located.kind.mark())).then_some(located.kind)
+        (is_archive || starts_as(located.kind, &located.marker_path())).then_some(located.kind)
     }
 }
 
@@ -194,7 +225,8 @@ impl Located {
     }
 }
 
-/// Finds the dataset at `path`, a folder or its marker file, by the names of files alone: a damaged one is found too.
+/// Finds the dataset at `path`, a folder or its marker file, by the names of files alone: a damaged one is found too. A COPC file
+/// is also found by its content, whatever it is called.
 ///
 /// # Errors
 /// `path` leads to nothing, or to nothing that is named like a dataset; or what is named like one is no file, or may not be
@@ -225,7 +257,7 @@ fn find(path: &Path) -> Option<Located> {
         return Some(Located { kind: DatasetKind::Potree1, path: path.to_path_buf() });
     }
     let is = |kind: &DatasetKind| match kind.row().extension {
-        Some(extension) => path.extension().is_some_and(|e| e == extension),
+        Some(extension) => has_extension(path, extension) || !kind.row().places.is_empty() && starts_as(*kind, path),
         None => path.file_name().is_some_and(|name| name == kind.marker_file()),
     };
     let kind = kinds.find(is)?;
@@ -256,15 +288,32 @@ fn advice() -> String {
     format!("give a folder with {}{files}", folders.join(" or "))
 }
 
-fn starts_with_mark(file: &Path, mark: &str) -> bool {
+/// True for `a.copc.laz` and "copc.laz"; a name that is an extension alone has none.
+fn has_extension(path: &Path, extension: &str) -> bool {
+    let name = path.file_name().map(|name| name.as_encoded_bytes());
+    let stem = name.and_then(|name| name.strip_suffix(extension.as_bytes())?.strip_suffix(b"."));
+    stem.is_some_and(|stem| !stem.is_empty())
+}
+
+fn starts_as(kind: DatasetKind, file: &Path) -> bool {
     let mut start = Vec::new();
     let read = open_file(file).and_then(|f| f.take(MARK_WITHIN_BYTES).read_to_end(&mut start));
-    read.is_ok() && start.windows(mark.len()).any(|w| w == mark.as_bytes())
+    read.is_ok() && kind.is_marked(&start)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The least that a marker file has to have.
+    fn marked(kind: DatasetKind) -> Vec<u8> {
+        let mut bytes = format!("{{ {} }}", kind.mark()).into_bytes();
+        for (place, part) in kind.row().places {
+            bytes.resize(bytes.len().max(place + part.len()), 0);
+            bytes[*place..][..part.len()].copy_from_slice(part);
+        }
+        bytes
+    }
 
     #[test]
     fn a_dataset_is_found_by_the_file_it_is_known_by_or_its_folder() {
@@ -275,13 +324,13 @@ mod tests {
             fs::create_dir(&folder).unwrap();
             assert!(locate(&folder).is_err());
             fs::write(&file, "").unwrap();
-            let path = if kind == DatasetKind::Batches { file.clone() } else { folder.clone() };
+            let path = if kind.is_single_file() { file.clone() } else { folder.clone() };
             let expected = Located { kind, path };
             assert_eq!(expected.marker_path(), file);
             assert_eq!(locate(&folder).unwrap(), expected);
             assert_eq!(locate(&file).unwrap(), expected);
             assert_eq!(DatasetKind::detect(&folder), None, "found by name, but without its mark");
-            fs::write(&file, format!("{{ {} }}", kind.mark())).unwrap();
+            fs::write(&file, marked(kind)).unwrap();
             assert_eq!([&folder, &file].map(DatasetKind::detect), [Some(kind); 2]);
         }
     }
@@ -294,10 +343,27 @@ mod tests {
         for path in [temp.path(), &scan] {
             let line = locate(path).unwrap_err().to_string();
             let advice = "give a folder with metadata.json (Potree 2.0) or cloud.js (Potree 1.x) or index.json (binary tree), or a \
-                          .qbatch file";
+                          .qbatch file, or a .copc.laz file";
             assert!(line.ends_with(advice), "{line}");
         }
         assert!(locate(temp.path().join("nothing")).is_err());
+    }
+
+    #[test]
+    fn a_copc_file_is_found_by_its_content_whatever_its_name_and_by_its_name_when_it_is_damaged() {
+        let temp = tempfile::tempdir().unwrap();
+        let copc = |path: &Path| locate(path).is_ok_and(|l| (l.kind, l.path.as_path()) == (DatasetKind::Copc, path));
+        for (name, bytes, is_found, is_copc) in [
+            ("tile.laz", marked(DatasetKind::Copc), true, true),
+            ("tile.copc.laz", marked(DatasetKind::Copc), true, true),
+            ("broken.copc.laz", b"LASF".to_vec(), true, false),
+            ("plain.laz", [&b"LASF"[..], &[0; 400]].concat(), false, false),
+            (".copc.laz", b"LASF".to_vec(), false, false),
+        ] {
+            let path = temp.path().join(name);
+            fs::write(&path, bytes).unwrap();
+            assert_eq!((copc(&path), DatasetKind::detect(&path).is_some()), (is_found, is_copc), "{name}");
+        }
     }
 
     #[test]
@@ -315,6 +381,7 @@ mod tests {
             ("n.bin", DatasetKind::Bintree),
             ("n0101.bin", DatasetKind::Bintree),
             ("points.qbatch", DatasetKind::Batches),
+            ("points.copc.laz", DatasetKind::Copc),
         ] {
             assert_eq!(owned(name), [kind], "{name}");
         }
@@ -325,7 +392,11 @@ mod tests {
             assert_eq!(kind.to_string().parse(), Ok(kind));
         }
         assert!(
-            "Potree".parse::<DatasetKind>().unwrap_err().to_string().contains("potree2, potree1, bintree, batches")
+            "Potree"
+                .parse::<DatasetKind>()
+                .unwrap_err()
+                .to_string()
+                .contains("potree2, potree1, bintree, batches, copc")
         );
     }
 }

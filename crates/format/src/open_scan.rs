@@ -24,18 +24,25 @@ pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dy
 }
 
 fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
-    if let Some(located) = dataset_at(path) {
-        return dataset_scan::open(&located, options);
+    match dataset_at(path) {
+        Some(Located { kind: DatasetKind::Copc, path, .. }) => open_copc(&path, options),
+        Some(dataset) => dataset_scan::open(&dataset, options),
+        None if options.has_levels() => {
+            // what is no scan at all says so
+            open_file(path, options).and(Err(dataset_scan::no_levels(path)))
+        }
+        None => open_file(path, options),
     }
-    if !options.has_levels() {
-        return open_file(path, options);
-    }
-    #[cfg(feature = "las")]
-    if crate::copc::detect(path) {
-        return dataset_scan::open_copc(path, options);
-    }
-    // what is no scan at all says so
-    open_file(path, options).and(Err(dataset_scan::no_levels(path)))
+}
+
+#[cfg(feature = "las")]
+fn open_copc(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+    if options.has_levels() { dataset_scan::open_copc(path, options) } else { open_file(path, options) }
+}
+
+#[cfg(not(feature = "las"))]
+fn open_copc(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+    open_file(path, options)
 }
 
 /// The dataset that is read as a scan if `path` is named: a folder or its marker file, or an archive.

@@ -22,29 +22,35 @@ use crate::exit::{Failure, emit, print_line, to_json};
 use crate::inputs;
 use crate::{scan_choice, text_choice};
 
-/// Describes a dataset; each kind has a file here.
-fn describe_dataset(dataset: &Located) -> Result<Description, Failure> {
+/// Describes a dataset; each kind has a file here. COPC is a scan, too, and described as one.
+fn describe_dataset(dataset: &Located, options: &OpenOptions, deep: bool) -> Result<Description, Failure> {
     let marker = dataset.marker_path();
     match dataset.kind {
         DatasetKind::Potree2 => potree2::describe(&marker),
         DatasetKind::Potree1 => potree1::describe(&marker),
         DatasetKind::Bintree => bintree::describe(&marker),
         DatasetKind::Batches => batches::describe(&marker),
+        DatasetKind::Copc => scan::describe(&marker, options, deep),
         other => Err(Failure::Usage(format!("{}: info does not read datasets of kind {other}", marker.display()))),
     }
 }
 
 /// Describes what a search has found.
 fn describe(path: &Path, options: &OpenOptions, deep: bool) -> Result<Description, Failure> {
-    match DatasetKind::detect(path).and_then(|_| locate(path).ok()) {
-        Some(dataset) => describe_dataset(&dataset),
+    match DatasetKind::detect(path).filter(|kind| *kind != DatasetKind::Copc).and_then(|_| locate(path).ok()) {
+        Some(dataset) => describe_dataset(&dataset, options, deep),
         None => scan::describe(path, options, deep),
     }
 }
 
-/// The datasets at `path`: the one that it is, or those that one conversion has put into it.
+/// The datasets at `path`: the one that it is, or those that one conversion has put into it. A COPC file is found as the scan
+/// that it is, among others of its folder.
 fn datasets(path: &Path) -> Vec<Located> {
-    locate(path).map_or_else(|_| datasets::inside(path), |one| vec![one])
+    match locate(path) {
+        Ok(Located { kind: DatasetKind::Copc, .. }) => Vec::new(),
+        Ok(one) => vec![one],
+        Err(_) => datasets::inside(path),
+    }
 }
 
 /// What is named like the first file of a dataset and cannot be read: a pipe, or what may not be looked at.
@@ -66,7 +72,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         }
         let datasets = datasets(path);
         for dataset in &datasets {
-            out.show(describe_dataset(dataset))?;
+            out.show(describe_dataset(dataset, &options, args.deep))?;
         }
         if !datasets.is_empty() {
             continue;

@@ -27,8 +27,10 @@ mod entry;
 mod info;
 mod octree;
 mod page;
+mod write;
 
 pub use dataset::Dataset;
 pub use detect::{FIRST_BYTES, detect, is_copc};
 pub use entry::Entry;
 pub use info::Info;
+pub use write::{Ending, Heading, MAX_PAGE_ENTRIES, Pages, Summary, encode_pages};

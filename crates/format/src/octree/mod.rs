@@ -28,6 +28,7 @@
 //! # }
 //! ```
 
+mod chunk_cut;
 mod linked_tree;
 mod nodes;
 mod ranges;
@@ -36,6 +37,7 @@ use std::path::PathBuf;
 
 use crate::{Aabb, Attribute, NodeKey, NodePoints, ReadError};
 
+pub(crate) use chunk_cut::chunk_roots;
 pub(crate) use linked_tree::{Keyed, LinkedTree};
 pub use nodes::OctreeNodes;
 pub(crate) use ranges::ChunkRanges;

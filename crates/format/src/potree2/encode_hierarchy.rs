@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::NodeKey;
-use crate::octree::LinkedTree;
+use crate::octree::{LinkedTree, chunk_roots};
 
-use super::chunk_cut::chunk_roots;
 use super::{NodeEntry, NodeRecord, NodeType};
 
 /// Records of a hierarchy chunk that a client can take at once: what a full tree of four levels below its root has,

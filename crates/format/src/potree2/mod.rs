@@ -29,7 +29,6 @@
 
 mod brotli;
 mod chunk;
-mod chunk_cut;
 mod columns;
 mod dataset;
 mod encode_brotli;

@@ -2,7 +2,7 @@
 
 use pointmill_format::copc::{Dataset, detect, is_copc};
 use pointmill_format::octree::Octree;
-use pointmill_format::{Column, NodePoints, OpenOptions, open_octree, open_scan, with_column};
+use pointmill_format::{Column, DatasetKind, NodePoints, OpenOptions, open_octree, open_scan, with_column};
 use pointmill_testkit::files::{fixture, fixture_bytes};
 
 use crate::util::{FIXTURES, golden, load, open, read_all, walk};
@@ -97,6 +97,7 @@ fn the_octree_has_the_columns_and_points_of_the_scan() {
 #[test]
 fn a_copc_file_is_known_by_its_content() {
     for name in FIXTURES {
+        assert_eq!(DatasetKind::detect(golden(name)), Some(DatasetKind::Copc), "{name}");
         assert!(detect(golden(name)) && is_copc(&load(name)[..395]) && !is_copc(&load(name)[..394]), "{name}");
         assert_eq!(walk(&*open_octree(golden(name)).unwrap()).unwrap().len(), 7);
     }

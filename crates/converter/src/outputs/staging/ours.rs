@@ -19,6 +19,9 @@ const JSON_BYTES: u64 = 1 << 30;
 /// The head of an index lies within this.
 const HEAD_BYTES: u64 = 64 << 10;
 
+/// Where the header of a LAS file names the program that wrote it.
+const SOFTWARE: usize = 58;
+
 /// What stands at the place of an output.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Standing {
@@ -115,6 +118,7 @@ impl Own {
             }
             DatasetKind::Potree1 => (is_cloud(&marker), false),
             DatasetKind::Batches => (head(&marker, 8).is_some_and(|h| h == kind.mark().as_bytes()), false),
+            DatasetKind::Copc => (head(&marker, HEAD_BYTES).is_some_and(|h| is_copc(&h)), false),
             _ => (false, false),
         };
         is_ours.then_some(Self { kind, is_packed })
@@ -184,6 +188,12 @@ fn is_cloud(path: &Path) -> bool {
     is_json::<Cloud>(path)
 }
 
+/// True for the first bytes of a COPC file whose header names this program: COPC files of others are scans.
+fn is_copc(head: &[u8]) -> bool {
+    let software = head.get(SOFTWARE..).unwrap_or_default();
+    DatasetKind::Copc.is_marked(head) && software.starts_with(b"pointmill ")
+}
+
 /// True if a JSON file has this shape; what does not matter is not kept in memory.
 fn is_json<T: DeserializeOwned>(path: &Path) -> bool {
     is_file(path)
@@ -242,6 +252,11 @@ mod tests {
         [&[metadata, ("octree.bin", ""), ("hierarchy.bin", "")], more].concat()
     }
 
+    /// The head of a COPC file, which is text by chance.
+    fn copc(software: &str) -> String {
+        format!("LASF{:54}{software:\0<317}\0\0copc{:\0<12}\u{1}\0", "", "")
+    }
+
     fn standing(dir: &tempfile::TempDir) -> String {
         match Standing::of(dir.path(), None).unwrap() {
             Standing::Foreign(path) => format!("foreign {}", path.strip_prefix(dir.path()).unwrap().display()),
@@ -270,7 +285,11 @@ mod tests {
         let inner = [("report.json", REPORT), ("potree1/cloud.js", cloud.1), ("potree1/data/r/r.bin", "")];
         assert_eq!(standing(&folder(&inner)), "ours 4");
 
+        assert_eq!(standing(&folder(&[("points.copc.laz", &copc("pointmill 0.1.0"))])), "ours 1");
+
         let other = [
+            ("points.copc.laz", copc("PDAL 2.8.0")),
+            ("points.copc.laz", copc("pointmill 0.1.0").replace("copc", "corp")),
             ("cloud.js", r#"{"version": "1.7", "octreeDir": "data"}"#.to_owned()),
             ("index.json", packed.replace("pointmill 0", "tree 0")),
             ("metadata.json", r#"{"hierarchy": {}, "author": "me"}"#.to_owned()),

@@ -3,12 +3,13 @@
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use super::chunk_table::{Chunk, Layout};
+use super::bytes::u32_at;
+use super::chunk_table::{Chunk, Layout, MAX_CHUNKS};
 use super::decompress::{self, LazModels};
 use super::front::Front;
 use super::kernels;
 use super::laszip::LaszipRecord;
-use super::laz::{Layered, Stop};
+use super::laz::{Layered, Stop, decode_entries};
 use super::schema::Schema;
 use crate::bytes::ByteSource;
 use crate::scan::source::Source;
@@ -259,4 +260,12 @@ impl ChunkFile {
         let what = format!("{who} ({bytes} bytes) gives {good} of its {points} points: {why}");
         ReadError::broken(self.source.path(), offset + at.min(bytes), Fault::Other(what)).advise(advice)
     }
+}
+
+/// Points and bytes of the chunks of a chunk table that gives both, its head of 8 bytes included; `None` if it is none, or
+/// has more entries than bytes allow.
+pub(crate) fn chunk_table_entries(table: &[u8]) -> Option<Vec<(u32, u32)>> {
+    let (head, coded) = table.split_first_chunk::<8>()?;
+    let (version, count) = (u32_at(head, 0), u32_at(head, 4) as usize);
+    (version == 0 && count <= MAX_CHUNKS as usize).then(|| decode_entries(coded, count, true)).flatten()
 }

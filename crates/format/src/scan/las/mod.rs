@@ -67,7 +67,7 @@ use front::Front;
 use laszip::LaszipRecord;
 use pieces::Planner;
 
-pub(crate) use chunks::{ChunkFile, ChunkPlace};
+pub(crate) use chunks::{ChunkFile, ChunkPlace, chunk_table_entries};
 pub use header::is_las;
 
 /// Scans opened so far: each has a number of its own.

@@ -1,11 +1,9 @@
-//! Where the hierarchy is cut into chunks.
+//! Where a hierarchy is cut into chunks.
 
-use crate::octree::LinkedTree;
-
-use super::NodeEntry;
+use super::{Keyed, LinkedTree};
 
 /// The roots of the chunks, in breadth-first order, if a chunk should have at most `most` records.
-pub(super) fn chunk_roots(tree: &LinkedTree<'_, NodeEntry>, most: usize) -> Vec<usize> {
+pub(crate) fn chunk_roots(tree: &LinkedTree<'_, impl Keyed>, most: usize) -> Vec<usize> {
     let mut roots = Vec::new();
     let mut waiting = vec![0];
     while let Some(root) = waiting.pop() {
@@ -21,7 +19,7 @@ pub(super) fn chunk_roots(tree: &LinkedTree<'_, NodeEntry>, most: usize) -> Vec<
 /// Whole levels come first, because renderers load by levels: a first picture should meet no proxy. They get half of
 /// the room only. The rest goes to the smallest subtrees below them, or there would be many chunks of a few records,
 /// each of which costs a request.
-fn cut(tree: &LinkedTree<'_, NodeEntry>, root: usize, most: usize) -> Vec<usize> {
+fn cut(tree: &LinkedTree<'_, impl Keyed>, root: usize, most: usize) -> Vec<usize> {
     if tree.size(root) <= most {
         return Vec::new();
     }
