@@ -32,7 +32,8 @@
 //! Programs that use all cores decode the pieces of a scan on their own threads ([`Scan::decode`]).
 //!
 //! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
-//!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF); `scans` is all of them.
+//!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF); `scans` is all of them. `scan::las::write` writes
+//!   LAS (feature `las`) and LAZ (feature `laz`).
 //! * [`potree1`]: Potree 1.4 to 1.8 octrees (`cloud.js`), read lazily from a folder or (feature `zip`) an uncompressed
 //!   archive, and what a writer of them needs.
 //! * [`potree2`]: Potree 2.0 octrees, read lazily from a folder or any byte-range source, and written.
