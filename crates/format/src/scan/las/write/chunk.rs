@@ -44,7 +44,7 @@ impl ChunkEncoder {
         let extra = extra.ok_or_else(|| {
             WriteError::input(format!("{extra_bytes} extra bytes a point; compressed points have 2048"))
         })?;
-        let vlr = LazVlr::from_buffer(records::laszip(point_format, extra)).map_err(failed)?;
+        let vlr = LazVlr::from_buffer(records::laszip(point_format, extra)).map_err(|e| failed(&e))?;
         let record_len = usize::try_from(vlr.items_size()).unwrap_or(usize::MAX);
         Ok(Self { vlr, record_len })
     }
@@ -86,7 +86,7 @@ fn compress<W: RecordCompressor<Cursor<Vec<u8>>>>(
     record_len: usize,
     records: &[u8],
 ) -> Result<Vec<u8>, WriteError> {
-    encoder.set_fields_from(vlr.items()).map_err(failed)?;
+    encoder.set_fields_from(vlr.items()).map_err(|e| failed(&e))?;
     for record in records.chunks_exact(record_len) {
         encoder.compress_next(record).map_err(WriteError::Io)?;
     }
@@ -95,6 +95,6 @@ fn compress<W: RecordCompressor<Cursor<Vec<u8>>>>(
     Ok(Box::new(encoder).box_into_inner().into_inner())
 }
 
-fn failed(error: laz::LasZipError) -> WriteError {
+fn failed(error: &laz::LasZipError) -> WriteError {
     WriteError::Compress(error.to_string())
 }
