@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, CopcSettings, DarkColours, Duplicates, Encoding, Filter, OnFault,
-    OriginPoints, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, RgbDepth, Sampling,
-    ScaleChoice, Target,
+    AttributeChoice, BatchesSettings, BintreeSettings, CopcSettings, DarkColours, Duplicates, Encoding, Filter,
+    OnFault, OriginPoints, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, RgbDepth,
+    Sampling, ScaleChoice, Target,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 

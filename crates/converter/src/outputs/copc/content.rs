@@ -68,8 +68,7 @@ impl Content {
             }
         }
         let rows = &*rows;
-        let positions =
-            [0, 4, 8].map(|at| StridedColumn::new(rows, at, self.stored_stride, AttributeType::Int32, 1));
+        let positions = [0, 4, 8].map(|at| StridedColumn::new(rows, at, self.stored_stride, AttributeType::Int32, 1));
         let column = |(at, ty, elements): &(usize, AttributeType, usize)| {
             Some(StridedColumn::new(rows, *at, self.stored_stride, *ty, *elements))
         };

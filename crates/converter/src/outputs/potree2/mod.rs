@@ -227,7 +227,11 @@ impl OctreeWriter for Payloads<'_> {
         Ok(OutputReport {
             points: tree.ledger.points(),
             duplicates_dropped: tree.ledger.duplicates_dropped(),
-            accuracy: report::accuracy(cloud, tree.ledger.points(), errors(cloud, cloud.frame.cube.min.0, metadata.lattice.offset)),
+            accuracy: report::accuracy(
+                cloud,
+                tree.ledger.points(),
+                errors(cloud, cloud.frame.cube.min.0, metadata.lattice.offset),
+            ),
             attributes: cloud.names(choice.kept.iter().copied()),
             attributes_dropped: choice.dropped,
             attributes_changed,
