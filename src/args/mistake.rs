@@ -138,7 +138,7 @@ mod tests {
             (&["validate", "a", "b"], "'b' is one argument too many; see 'pointmill validate --help'"),
             (
                 &["convert", "a", "-o", "b", "--to", "potree"],
-                "one of potree2, potree1, bintree, batches; did you mean potree2?",
+                "one of potree2, potree1, copc, bintree, batches; did you mean potree2?",
             ),
             (&["convert", "a", "-o", "b", "--threads", "x"], "--threads 'x': expected a whole number from 1 to 1024"),
             (&["convert", "a", "-o", "b", "--memory", "-5"], "--memory '-5': expected a size such as"),

@@ -144,9 +144,9 @@ fn values_that_are_none() {
         (
             "convert~a.las~-o~o~--to~potree",
             2,
-            &["--to 'potree'", "potree2, potree1, bintree, batches", "did you mean potree2?"],
+            &["--to 'potree'", "potree2, potree1, copc, bintree, batches", "did you mean potree2?"],
         ),
-        ("convert~a.las~-o~o~--to~obj", 2, &["--to 'obj'", "expected one of potree2, potree1, bintree, batches"]),
+        ("convert~a.las~-o~o~--to~obj", 2, &["--to 'obj'", "expected one of potree2, potree1, copc, bintree, batches"]),
         ("convert~a.las~-o~o~--to~potree2~--to~potree2", 2, &["--to", "named twice"]),
         ("convert~a.las~-o~o~--memory~some", 2, &["--memory 'some'", "2GiB"]),
         ("convert~a.las~-o~o~--memory~0", 2, &["--memory '0'", "2GiB"]),

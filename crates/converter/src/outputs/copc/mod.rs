@@ -101,11 +101,11 @@ impl OctreeOutput for CopcSettings {
         to: &'a StagedDataset,
     ) -> Result<Box<dyn OctreeWriter + 'a>, ConvertError> {
         let content = Content::choose(cloud)?;
-        let mut heading = Heading::new(content.layout.point_format(), content.lattice).map_err(failed)?;
+        let mut heading = Heading::new(content.layout.point_format(), content.lattice).map_err(|e| failed(&e))?;
         heading.extra_bytes = content.layout.extra_bytes().to_vec();
         heading.wkt = cloud.facts.crs.wkt_text().map(Cow::into_owned);
-        let chunks_start = heading.chunks_start().map_err(failed)?;
-        let chunks = ChunkEncoder::new(&content.layout).map_err(failed)?;
+        let chunks_start = heading.chunks_start().map_err(|e| failed(&e))?;
+        let chunks = ChunkEncoder::new(&content.layout).map_err(|e| failed(&e))?;
         let file = to.create(self.kind().marker_file())?;
         let encoding = Encoding { content, chunks, counted: Mutex::default(), events: rt.events() };
         Ok(Box::new(Writer {
@@ -173,10 +173,10 @@ impl OctreeWriter for Writer<'_> {
         let Counted { tally, changes } = counted.into_inner().unwrap_or_else(PoisonError::into_inner);
         let summary = tally.summary(&content.lattice);
         heading.is_adjusted_time = summary.is_adjusted_time();
-        let table = chunks.table(&in_file(&tree)?).map_err(failed)?;
+        let table = chunks.table(&in_file(&tree)?).map_err(|e| failed(&e))?;
         let entry = |n: &FinishedNode| NodeEntry::new(n.key, n.points, chunks_start + n.byte_offset, n.byte_size);
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
-        let ending = heading.finish(info(cloud, &spacing), &summary, &mut nodes, &table).map_err(failed)?;
+        let ending = heading.finish(info(cloud, &spacing), &summary, &mut nodes, &table).map_err(|e| failed(&e))?;
         file.write_at(&ending.tail, ending.tail_start, "writing the hierarchy")?;
         file.write_at(&ending.head, 0, "writing the header")?;
         file.sync("syncing the file")?;
@@ -238,6 +238,6 @@ fn info(cloud: &Cloud<'_>, spacing: &ChosenSpacing) -> Info {
     }
 }
 
-fn failed(error: WriteError) -> ConvertError {
+fn failed(error: &WriteError) -> ConvertError {
     Unsupported::Format { kind: DatasetKind::Copc, what: error.to_string() }.into()
 }
