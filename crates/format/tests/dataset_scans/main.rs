@@ -2,5 +2,6 @@
 
 mod damage;
 mod golden;
+mod leaves;
 mod levels;
 mod util;
