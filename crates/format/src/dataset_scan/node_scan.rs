@@ -113,7 +113,8 @@ impl<N: Nodes> Scan for NodeScan<N> {
         let most =
             |of: fn(Place) -> u64| (0..self.nodes.len()).map(|node| of(self.nodes.place(node))).max().unwrap_or(0);
         let (points, stored) = (most(|place| place.points), most(|place| place.byte_size));
-        let batch = batch_bytes(&self.info.attributes, self.info.lattice.is_some(), wanted, self.batch_points as u64);
+        let in_batch = points.min(self.batch_points as u64);
+        let batch = batch_bytes(&self.info.attributes, self.info.lattice.is_some(), wanted, in_batch);
         let memory = self.described.memory;
         batch + stored.saturating_add(points.saturating_mul(memory.per_point)).saturating_add(memory.decompressor)
     }
