@@ -31,6 +31,7 @@ fn records(dataset: &Path) -> BTreeMap<Vec<u64>, u64> {
 }
 
 /// [`records`], of which the values of columns are changed.
+#[allow(clippy::unnecessary_cast)] // one of the ten types is the target
 fn records_of(dataset: &Path, change: impl Fn(&str, f64) -> f64) -> BTreeMap<Vec<u64>, u64> {
     let dataset = Dataset::open(dataset).unwrap();
     let (mut points, mut records) = (NodePoints::default(), BTreeMap::new());

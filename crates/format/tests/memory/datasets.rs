@@ -22,6 +22,9 @@ fn attributes() -> Vec<Attribute> {
     ]
 }
 
+/// What a dataset is called here, and what makes it in a folder.
+type Made<'a> = (&'a str, &'a dyn Fn(&Path));
+
 /// Records of positions, colours and times.
 fn records() -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -104,7 +107,7 @@ fn compressed(folder: &Path) {
 
 #[test]
 fn what_decoding_a_dataset_takes_is_known_beforehand() {
-    let made: [(&str, &dyn Fn(&Path)); 6] = [
+    let made: [Made<'_>; 6] = [
         ("potree2", &|folder| potree2(folder, Encoding::Default)),
         ("brotli", &|folder| potree2(folder, Encoding::Brotli)),
         ("potree1", &potree1),
