@@ -132,6 +132,7 @@ fn three_formats_have_the_same_points_in_the_same_nodes_those_of_the_scan() {
     let mut all: Vec<Row> = each[2].values().flatten().copied().collect();
     let row = |p: &pointmill_testkit::las::Point| (p.xyz.map(i64::from), p.intensity, p.source, p.gps_time.to_bits());
     let mut expected: Vec<Row> = las.points.iter().map(row).collect();
-    (all.sort_unstable(), expected.sort_unstable());
+    all.sort_unstable();
+    expected.sort_unstable();
     assert!(all == expected);
 }
