@@ -115,6 +115,16 @@ impl Unit {
         }
     }
 
+    /// The EPSG code of the unit; `None` if it has none.
+    pub fn epsg(self) -> Option<u16> {
+        let (table, size) = match self {
+            Self::Length(metres) => (&LENGTHS[..], metres),
+            Self::Angle(radians) => (&ANGLES[..], radians),
+            Self::Unknown => return None,
+        };
+        table.iter().find(|(_, of, _)| *of == size).map(|(code, ..)| *code)
+    }
+
     /// Metres of a length; `None` for others.
     pub const fn metres(self) -> Option<f64> {
         match self {
@@ -166,6 +176,7 @@ mod tests {
         for (code, metres, name) in LENGTHS {
             let unit = Unit::from_epsg(code);
             assert_eq!((unit, unit.to_string().as_str()), (Unit::length(metres), name), "{code}");
+            assert_eq!(unit.epsg(), Some(code));
         }
     }
 

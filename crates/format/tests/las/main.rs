@@ -11,3 +11,7 @@ mod mended;
 mod mutation;
 mod oracle;
 mod records;
+#[cfg(feature = "laz")]
+mod write;
+#[cfg(feature = "laz")]
+mod write_values;

@@ -2,12 +2,13 @@
 
 use crate::potree2::NodeEntry;
 use crate::scan::las::chunk_table_entries;
+use crate::scan::las::write::header::{Fields, LEN_1_4};
+use crate::scan::las::write::records::{self, EXTENDED_HEADER};
+use crate::scan::las::write::{Ending, Summary};
 use crate::{Attribute, Lattice, WriteError};
 
 use super::super::Info;
-use super::header::{Fields, HEADER, Summary};
 use super::pages::{MAX_PAGE_ENTRIES, encode_pages};
-use super::records;
 
 /// Bytes before the chunks: where the chunk table is.
 const TABLE_OFFSET: u64 = 8;
@@ -29,18 +30,6 @@ pub struct Heading {
     pub is_adjusted_time: bool,
     /// The program that writes, up to 32 bytes.
     pub software: String,
-}
-
-/// The bytes around the chunks.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Ending {
-    /// The first bytes of the file, [`Heading::chunks_start`] of them.
-    pub head: Vec<u8>,
-    /// Where the chunks end, and the rest of the file begins.
-    pub tail_start: u64,
-    /// The rest of the file.
-    pub tail: Vec<u8>,
 }
 
 impl Heading {
@@ -133,28 +122,29 @@ impl Heading {
         tail.extend(&pages.bytes);
         let too_long = || WriteError::input("records of more than 4 GiB");
         let fields = Fields {
+            is_1_4: true,
             point_format: self.point_format,
+            is_compressed: true,
             record_len: u16::try_from(self.record_len()).unwrap_or(u16::MAX),
             lattice: self.lattice,
             software: &self.software,
             is_adjusted_time: self.is_adjusted_time,
+            is_wkt: true,
             records: count,
             points_start: u32::try_from(chunks_start - TABLE_OFFSET).map_err(|_| too_long())?,
-            hierarchy_start,
+            extended: (hierarchy_start, 1),
             summary,
         };
-        let mut head = Vec::with_capacity(HEADER + records.len());
+        let mut head = Vec::with_capacity(LEN_1_4 + records.len());
         head.extend(fields.bytes());
         let (root_page_offset, root_page_size, gps_time) = (pages_start, pages.root_size, summary.gps_time);
-        records::append_info(&mut head, &Info { root_page_offset, root_page_size, gps_time, ..info })?;
+        let info = Info { root_page_offset, root_page_size, gps_time, ..info };
+        records::append(&mut head, "copc", 1, &info.to_bytes())?;
         head.extend(records);
         head.extend(tail_start.to_le_bytes());
-        Ok(Ending { head, tail_start, tail })
+        Ok(Ending::new(head, tail_start, tail))
     }
 }
-
-/// Bytes of the header of an extended record.
-const EXTENDED_HEADER: u64 = 60;
 
 /// Where the chunks end, if they are those of the table, without gaps.
 fn check_chunks(nodes: &[NodeEntry], start: u64, chunk_table: &[u8], points: u64) -> Result<u64, WriteError> {

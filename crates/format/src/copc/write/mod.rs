@@ -1,10 +1,8 @@
 //! What stands around the chunks of a COPC file.
 
-mod header;
 mod heading;
 mod pages;
-mod records;
 
-pub use header::Summary;
-pub use heading::{Ending, Heading};
+pub use crate::scan::las::write::{Ending, Summary};
+pub use heading::Heading;
 pub use pages::{MAX_PAGE_ENTRIES, Pages, encode_pages};

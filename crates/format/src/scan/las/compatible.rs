@@ -135,7 +135,7 @@ impl Recovered {
 }
 
 /// Whole degrees in steps of 0.006°, rounded as LASzip does, in single precision: what was left of this was stored.
-fn angle_of_rank(rank: i8) -> i16 {
+pub(super) fn angle_of_rank(rank: i8) -> i16 {
     let steps = f32::from(rank) / 0.006;
     (if steps >= 0.0 { steps + 0.5 } else { steps - 0.5 }) as i16
 }

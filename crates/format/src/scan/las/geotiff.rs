@@ -9,26 +9,26 @@ pub(super) const DOUBLES: u16 = 34736;
 pub(super) const TEXTS: u16 = 34737;
 
 /// Ids of keys.
-const MODEL_TYPE: u16 = 1024;
-const CITATION: u16 = 1026;
-const GEODETIC_CRS: u16 = 2048;
+pub(super) const MODEL_TYPE: u16 = 1024;
+pub(super) const CITATION: u16 = 1026;
+pub(super) const GEODETIC_CRS: u16 = 2048;
 const GEODETIC_CITATION: u16 = 2049;
-const GEOCENTRIC_UNIT: u16 = 2052;
-const GEOCENTRIC_UNIT_SIZE: u16 = 2053;
-const ANGULAR_UNIT: u16 = 2054;
-const ANGULAR_UNIT_SIZE: u16 = 2055;
-const PROJECTED_CRS: u16 = 3072;
+pub(super) const GEOCENTRIC_UNIT: u16 = 2052;
+pub(super) const GEOCENTRIC_UNIT_SIZE: u16 = 2053;
+pub(super) const ANGULAR_UNIT: u16 = 2054;
+pub(super) const ANGULAR_UNIT_SIZE: u16 = 2055;
+pub(super) const PROJECTED_CRS: u16 = 3072;
 const PROJECTED_CITATION: u16 = 3073;
-const LINEAR_UNIT: u16 = 3076;
-const LINEAR_UNIT_SIZE: u16 = 3077;
-const VERTICAL_CRS: u16 = 4096;
-const VERTICAL_UNIT: u16 = 4099;
+pub(super) const LINEAR_UNIT: u16 = 3076;
+pub(super) const LINEAR_UNIT_SIZE: u16 = 3077;
+pub(super) const VERTICAL_CRS: u16 = 4096;
+pub(super) const VERTICAL_UNIT: u16 = 4099;
 
 /// Values of [`MODEL_TYPE`].
-const PROJECTED: u16 = 1;
-const GEOCENTRIC: u16 = 3;
+pub(super) const PROJECTED: u16 = 1;
+pub(super) const GEOCENTRIC: u16 = 3;
 /// A code that says "by parameters", not by a code.
-const USER_DEFINED: u16 = 32767;
+pub(super) const USER_DEFINED: u16 = 32767;
 
 /// The keys, and the values they point to.
 pub(super) struct GeoKeys<'a> {

@@ -13,7 +13,7 @@ const OFFSETS: u64 = 155;
 const HEADER_1_4: u64 = 375;
 
 /// Bytes of a record of each point format, without extra bytes.
-const RECORD_LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+pub(super) const RECORD_LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
 /// The fields that reading needs. Counts and offsets are claims.
 #[derive(Debug, Clone)]

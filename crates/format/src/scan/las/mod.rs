@@ -55,6 +55,7 @@ mod mend;
 mod pieces;
 mod records;
 mod schema;
+pub mod write;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -98,6 +98,17 @@ impl Schema {
         schema
     }
 
+    /// The standard columns of a point format, for writers.
+    pub(super) fn of_format(point_format: u8) -> Self {
+        let mut schema = Self::default();
+        schema.colours(point_format);
+        match point_format < 6 {
+            true => schema.legacy(point_format),
+            false => schema.extended(),
+        }
+        schema
+    }
+
     fn colours(&mut self, point_format: u8) {
         let at = match point_format {
             2 => 20,

@@ -1,14 +1,18 @@
-//! Variable length records of a COPC file.
+//! Variable length records.
 
 use crate::{Attribute, AttributeType, WriteError};
-
-use super::super::Info;
 
 /// Bytes of a description of extra bytes.
 const DESCRIPTION: usize = 192;
 
+/// Bytes of the name of extra bytes.
+pub(super) const MAX_NAME: usize = 32;
+
+/// Bytes of the header of an extended record.
+pub(crate) const EXTENDED_HEADER: u64 = 60;
+
 /// Appends a record with its header of 54 bytes.
-pub(super) fn append(out: &mut Vec<u8>, user: &str, number: u16, data: &[u8]) -> Result<(), WriteError> {
+pub(crate) fn append(out: &mut Vec<u8>, user: &str, number: u16, data: &[u8]) -> Result<(), WriteError> {
     let Ok(len) = u16::try_from(data.len()) else {
         return Err(WriteError::input(format!(
             "a record of {} bytes ({user} {number}); it can have 65535",
@@ -25,7 +29,7 @@ pub(super) fn append(out: &mut Vec<u8>, user: &str, number: u16, data: &[u8]) ->
 }
 
 /// Appends the header, of 60 bytes, of an extended record with `len` bytes of data.
-pub(super) fn append_extended(out: &mut Vec<u8>, user: &str, number: u16, len: u64) {
+pub(crate) fn append_extended(out: &mut Vec<u8>, user: &str, number: u16, len: u64) {
     out.extend([0; 2]);
     out.extend(fixed::<16>(user));
     out.extend(number.to_le_bytes());
@@ -33,31 +37,32 @@ pub(super) fn append_extended(out: &mut Vec<u8>, user: &str, number: u16, len: u
     out.extend([0; 32]);
 }
 
-/// Appends the info record, which is to be the first.
-pub(super) fn append_info(out: &mut Vec<u8>, info: &Info) -> Result<(), WriteError> {
-    append(out, "copc", 1, &info.to_bytes())
-}
-
-/// The data of the LASzip record: layered chunks, each with its own number of points.
-pub(super) fn laszip(point_format: u8, extra_bytes: u16) -> Vec<u8> {
-    const VERSION: u16 = 3;
-    let mut items: Vec<(u16, u16)> = vec![(10, 30)];
-    match point_format {
-        7 => items.push((11, 6)),
-        8 => items.push((12, 8)),
-        _ => {}
-    }
+/// The data of the LASzip record: chunks that each have their own number of points; of layers in the formats 6 and above.
+pub(crate) fn laszip(point_format: u8, extra_bytes: u16) -> Vec<u8> {
+    const TIME: (u16, u16) = (7, 8);
+    const COLOUR: (u16, u16) = (8, 6);
+    let mut items: Vec<(u16, u16)> = match point_format {
+        0 => vec![(6, 20)],
+        1 => vec![(6, 20), TIME],
+        2 => vec![(6, 20), COLOUR],
+        3 => vec![(6, 20), TIME, COLOUR],
+        7 => vec![(10, 30), (11, 6)],
+        8 => vec![(10, 30), (12, 8)],
+        _ => vec![(10, 30)],
+    };
+    // compressor, version of the items, number of the item of extra bytes
+    let (compressor, version, bytes) = if point_format < 6 { (2u16, 2u16, 0) } else { (3, 3, 14) };
     if extra_bytes > 0 {
-        items.push((14, extra_bytes));
+        items.push((bytes, extra_bytes));
     }
     let mut out = Vec::new();
-    out.extend([3u16, 0].map(u16::to_le_bytes).concat()); // compressor, coder
+    out.extend([compressor, 0].map(u16::to_le_bytes).concat()); // compressor, coder
     out.extend([3, 4, 0, 0]); // version 3.4, revision
     out.extend([0, u32::MAX].map(u32::to_le_bytes).concat()); // options, points of a chunk
     out.extend([-1i64; 2].map(i64::to_le_bytes).concat()); // special records: none
     out.extend((items.len() as u16).to_le_bytes());
     for (kind, size) in items {
-        out.extend([kind, size, VERSION].map(u16::to_le_bytes).concat());
+        out.extend([kind, size, version].map(u16::to_le_bytes).concat());
     }
     out
 }
@@ -66,7 +71,7 @@ pub(super) fn laszip(point_format: u8, extra_bytes: u16) -> Vec<u8> {
 ///
 /// # Errors
 /// An attribute of more than three elements; a name of more than 32 bytes.
-pub(super) fn extra_bytes(attributes: &[Attribute]) -> Result<Vec<u8>, WriteError> {
+pub(crate) fn extra_bytes(attributes: &[Attribute]) -> Result<Vec<u8>, WriteError> {
     let mut out = Vec::with_capacity(DESCRIPTION * attributes.len());
     for attribute in attributes {
         out.extend(description(attribute)?);
@@ -76,7 +81,7 @@ pub(super) fn extra_bytes(attributes: &[Attribute]) -> Result<Vec<u8>, WriteErro
 
 fn description(attribute: &Attribute) -> Result<[u8; DESCRIPTION], WriteError> {
     let Attribute { name, description, ty, elements, scale, offset, no_data, .. } = attribute;
-    if !(1..=3).contains(elements) || name.len() > 32 {
+    if !(1..=3).contains(elements) || name.len() > MAX_NAME {
         let what =
             format!("the attribute {name:?} of {elements} elements; extra bytes have three, and names of 32 bytes");
         return Err(WriteError::input(what));
@@ -134,11 +139,17 @@ fn any_type(ty: AttributeType, value: f64) -> [u8; 8] {
 }
 
 /// Text in a field of that many bytes: cut at a character if it is longer.
-pub(super) fn fixed<const N: usize>(text: &str) -> [u8; N] {
+pub(crate) fn fixed<const N: usize>(text: &str) -> [u8; N] {
     let mut out = [0; N];
-    let end = (0..=text.len().min(N)).rev().find(|end| text.is_char_boundary(*end)).unwrap_or(0);
-    out[..end].copy_from_slice(&text.as_bytes()[..end]);
+    let cut = cut_name(text, N).as_bytes();
+    out[..cut.len()].copy_from_slice(cut);
     out
+}
+
+/// So much of a text as fits `most` bytes.
+pub(super) fn cut_name(text: &str, most: usize) -> &str {
+    let end = (0..=text.len().min(most)).rev().find(|end| text.is_char_boundary(*end)).unwrap_or(0);
+    &text[..end]
 }
 
 #[cfg(test)]
@@ -147,7 +158,7 @@ mod tests {
 
     #[test]
     fn the_laszip_record_is_that_of_the_crate_laz() {
-        for (format, extra) in [(6, 0), (7, 0), (8, 0), (7, 5)] {
+        for (format, extra) in [(0, 0), (1, 0), (2, 4), (3, 7), (6, 0), (7, 0), (8, 0), (7, 5)] {
             let builder = laz::LazVlrBuilder::default().with_point_format(format, extra).unwrap();
             let mut theirs = Vec::new();
             builder.with_variable_chunk_size().build().write_to(&mut theirs).unwrap();
