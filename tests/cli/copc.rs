@@ -68,7 +68,7 @@ fn a_copc_file_is_validated_by_its_content_also_against_itself_as_a_scan() {
     assert_eq!((&outcome["format"], &outcome["points"], &outcome["nodes"]), (&json!("copc"), &json!(22), &json!(7)));
     assert_eq!(outcome["checks"].as_array().unwrap().len(), 19);
 
-    let mut broken = bytes.clone();
+    let mut broken = bytes;
     // the header counts another point
     put(&mut broken, 247, &23u64.to_le_bytes());
     dir.write("broken.copc.laz", &broken);

@@ -27,7 +27,7 @@ fn a_page_that_leaves_the_file_or_is_no_whole_number_of_entries() {
     let mut uneven = file.clone();
     uneven.put(at + 24, &33i32.to_le_bytes());
     assert_eq!(page_faults(&uneven.validate()), 1);
-    let mut root = file.clone();
+    let mut root = file;
     root.put(INFO + 48, &0u64.to_le_bytes());
     let outcome = root.validate();
     assert!(page_faults(&outcome) == 1 && outcome.nodes == 0, "{:#?}", outcome.problems);
@@ -92,7 +92,7 @@ fn entries_that_are_no_nodes_twice_or_of_another_page() {
     let found = outcome.problems.iter().find(|p| p.check == Check::Pages).unwrap();
     assert!(found.node == Some(other.into()) && found.subject == "entries of the node", "{:#?}", outcome.problems);
     // a node of a page becomes the root
-    let mut elsewhere = file.clone();
+    let mut elsewhere = file;
     elsewhere.put(at, &[0; 16]);
     let outcome = elsewhere.validate();
     assert_eq!(page_faults(&outcome), 1, "{:#?}", outcome.problems);
@@ -123,7 +123,7 @@ fn counts_offsets_and_bytes_that_contradict_each_other() {
     no_bytes.put(at + 24, &0i32.to_le_bytes());
     let outcome = no_bytes.validate();
     assert!(page_faults(&outcome) == 1 && outcome.problems[0].node == Some(leaf.into()), "{:#?}", outcome.problems);
-    let mut no_points = file.clone();
+    let mut no_points = file;
     no_points.put(at + 28, &0i32.to_le_bytes());
     let outcome = no_points.validate();
     assert_eq!(page_faults(&outcome), 1, "{:#?}", outcome.problems);

@@ -37,7 +37,7 @@ fn bounds_of_the_header_are_those_of_the_points() {
         file.put(at, &value.to_le_bytes());
         assert_only(&file.validate(), Check::TightBox, 1);
     }
-    let mut near = file.clone();
+    let mut near = file;
     near.put(211, &(max + 0.4 * SCALE).to_le_bytes());
     assert_only(&near.validate(), Check::TightBox, 1);
     let mut theirs = foreign();
@@ -69,7 +69,7 @@ fn the_range_of_gps_times() {
     let mut theirs = foreign();
     theirs.put(INFO + 56, &(first - 0.01).to_le_bytes());
     assert!(theirs.validate().ok, "nothing is outside");
-    let mut turned = file.clone();
+    let mut turned = file;
     turned.put(INFO + 56, &(last + 1.0).to_le_bytes());
     assert!(broken(&turned.validate()).contains(&Check::OctreeInfo));
 }
