@@ -5,6 +5,8 @@ use std::path::Path;
 
 use las::Reader;
 use pointmill_converter::{CopcSettings, Outliers, Plan, Report, Silent, convert};
+use pointmill_format::octree::OctreeNodes;
+use pointmill_format::{NodeKey, NodePoints, open_octree};
 use pointmill_testkit::files::fixture;
 use pointmill_testkit::las::{Las, Point};
 
@@ -41,6 +43,28 @@ fn another_reader_finds_every_point_with_all_it_has() {
         }
         assert_eq!(report.outputs[0].bytes, fs::metadata(&file).unwrap().len());
     }
+}
+
+#[test]
+fn points_of_a_node_are_in_the_order_of_time() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut las = Las::terrain(3_000, 3);
+    for (i, point) in las.points.iter_mut().enumerate() {
+        point.gps_time = [5.0, -3.5, 0.25, -0.0, 1e9][i % 5] * (i % 700) as f64;
+    }
+    fs::write(dir.path().join("a.las"), las.bytes()).unwrap();
+    written(&dir.path().join("a.las"), dir.path());
+    let octree = open_octree(dir.path().join("out")).unwrap();
+    let mut nodes = OctreeNodes::new(&*octree).unwrap();
+    let (mut stack, mut points, mut count) = (vec![NodeKey::ROOT], NodePoints::default(), 0);
+    while let Some(key) = stack.pop() {
+        nodes.load(&*octree, key).unwrap();
+        stack.extend(nodes.children(key).map(|child| child.key));
+        octree.points(nodes.get(key).unwrap(), &mut points).unwrap();
+        assert!(points.column::<f64>("gps-time").unwrap().is_sorted(), "{key}");
+        count += points.len();
+    }
+    assert_eq!((count, nodes.len() > 10), (3_000, true));
 }
 
 #[test]

@@ -26,6 +26,8 @@ pub(super) struct Content {
     columns: Vec<(usize, AttributeType, usize)>,
     /// Bytes of a stored record.
     pub(super) stored_stride: usize,
+    /// Where the GPS time is in a stored record.
+    pub(super) time_at: Option<usize>,
 }
 
 impl Content {
@@ -50,6 +52,7 @@ impl Content {
         Ok(Self {
             columns: columns(schema, &choice.kept),
             stored_stride: schema.stride,
+            time_at: time_at(schema, &choice.kept),
             lattice: Lattice { scale: job.scale, offset },
             shift: shift(frame, anchor),
             anchor,
@@ -95,6 +98,12 @@ impl Content {
         }
         renamed
     }
+}
+
+/// Where the GPS time is that goes to its field.
+fn time_at(schema: &Schema, kept: &[usize]) -> Option<usize> {
+    let is_time = |a: &Attribute| a.name == "gps-time" && a.ty == AttributeType::Float64 && a.elements == 1;
+    kept.iter().find(|&&i| is_time(&schema.attributes[i])).map(|&i| schema.offsets[i])
 }
 
 fn columns(schema: &Schema, kept: &[usize]) -> Vec<(usize, AttributeType, usize)> {

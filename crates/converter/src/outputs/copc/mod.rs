@@ -23,6 +23,7 @@ use self::content::Content;
 use self::encoder::{ChunkMaker, Counted, Encoding};
 use super::attributes::changed;
 use super::octrees::{self, ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
+use super::origin::own_key;
 use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
@@ -104,6 +105,7 @@ impl OctreeOutput for CopcSettings {
         let mut heading = Heading::new(content.layout.point_format(), content.lattice).map_err(|e| failed(&e))?;
         heading.extra_bytes = content.layout.extra_bytes().to_vec();
         heading.wkt = cloud.facts.crs.wkt_text().map(Cow::into_owned);
+        heading.making = self.making(cloud, &content);
         let chunks_start = heading.chunks_start().map_err(|e| failed(&e))?;
         let chunks = ChunkEncoder::new(&content.layout).map_err(|e| failed(&e))?;
         let file = to.create(self.kind().marker_file())?;
@@ -118,6 +120,22 @@ impl OctreeOutput for CopcSettings {
             turn: Mutex::default(),
             encoding,
         }))
+    }
+}
+
+impl CopcSettings {
+    /// What the file says of its making.
+    fn making(&self, cloud: &Cloud<'_>, content: &Content) -> String {
+        let mut own = own_key(cloud, &content.choice.dropped);
+        own.remove("wkt"); // it has a record of its own
+        let renamed = content.renamed(cloud.schema());
+        if !renamed.is_empty() {
+            let renamed = renamed.into_iter().map(|r| (r.stored_as, r.name.into()));
+            own.insert("attributesRenamed".into(), renamed.collect::<Map<_, _>>().into());
+        }
+        own.insert("sampling".into(), self.sampling.name().into());
+        own.insert("leafCapacity".into(), self.leaf_capacity.into());
+        Value::from(own).to_string()
     }
 }
 

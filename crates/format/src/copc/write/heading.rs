@@ -30,6 +30,8 @@ pub struct Heading {
     pub is_adjusted_time: bool,
     /// The program that writes, up to 32 bytes.
     pub software: String,
+    /// What pointmill says of the making: JSON. Empty: nothing.
+    pub making: String,
 }
 
 impl Heading {
@@ -42,7 +44,15 @@ impl Heading {
             return Err(WriteError::input(format!("point format {point_format}; COPC has 6, 7 and 8")));
         }
         let software = concat!("pointmill ", env!("CARGO_PKG_VERSION")).to_owned();
-        Ok(Self { point_format, extra_bytes: Vec::new(), lattice, wkt: None, is_adjusted_time: false, software })
+        Ok(Self {
+            point_format,
+            extra_bytes: Vec::new(),
+            lattice,
+            wkt: None,
+            is_adjusted_time: false,
+            software,
+            making: String::new(),
+        })
     }
 
     /// Bytes of a point before compression.
@@ -120,6 +130,10 @@ impl Heading {
         let pages = encode_pages(nodes, pages_start, MAX_PAGE_ENTRIES)?;
         records::append_extended(&mut tail, "copc", 1000, pages.bytes.len() as u64);
         tail.extend(&pages.bytes);
+        if !self.making.is_empty() {
+            records::append_extended(&mut tail, "pointmill", 1, self.making.len() as u64);
+            tail.extend(self.making.as_bytes());
+        }
         let too_long = || WriteError::input("records of more than 4 GiB");
         let fields = Fields {
             is_1_4: true,
@@ -132,7 +146,7 @@ impl Heading {
             is_wkt: true,
             records: count,
             points_start: u32::try_from(chunks_start - TABLE_OFFSET).map_err(|_| too_long())?,
-            extended: (hierarchy_start, 1),
+            extended: (hierarchy_start, 1 + u32::from(!self.making.is_empty())),
             summary,
         };
         let mut head = Vec::with_capacity(LEN_1_4 + records.len());
