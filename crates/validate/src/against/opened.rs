@@ -9,7 +9,7 @@ use super::block::{Block, append_exact_words, append_words};
 use super::distinct::Residue;
 use super::exact::Exact;
 use super::meaning::{Feed, Meaning, feed, fine_angles};
-use super::rules::Conversion::{self, AsStored, FineAngle, Grey, WholeClass};
+use super::rules::Conversion::{self, AsStored, FineAngle, Grey, NotWritten, WholeClass};
 use super::rules::{Rules, grey};
 use super::selection::Selection;
 
@@ -61,8 +61,9 @@ impl Opened {
         let info = scan.info();
         let find = |name: &str| info.attributes.iter().position(|a| a.name == name);
         let attributes = rules.attributes.iter().zip(&rules.conversions);
-        let feed = |(a, c): (&Attribute, &Conversion)| {
-            feed(a, &rules.attributes, &info.attributes, rules.foreign || *c != AsStored)
+        let feed = |(a, c): (&Attribute, &Conversion)| match c {
+            NotWritten => None,
+            c => feed(a, &rules.attributes, &info.attributes, rules.foreign || *c != AsStored),
         };
         let columns = attributes.map(feed).collect();
         let classification = rules.classes.is_some().then(|| find("classification")).flatten();
@@ -82,7 +83,9 @@ impl Opened {
     pub(super) fn look(&self, rules: &Rules) -> Look {
         let info = self.scan.info();
         let feeds = self.columns.iter().map(|feed| Some(info.attributes[feed.as_ref()?.column].ty));
-        let is_absent = |name: &&String| rules.attributes.iter().all(|a| a.name != **name);
+        let written = rules.attributes.iter().zip(&rules.conversions).filter(|(_, c)| **c != NotWritten);
+        let written: Vec<&str> = written.map(|(a, _)| a.name.as_str()).collect();
+        let is_absent = |name: &&String| !written.contains(&name.as_str());
         let pieces = self.scan.pieces();
         Look {
             pieces: pieces.len(),
@@ -150,7 +153,7 @@ impl Opened {
                 append_feed(feed, batch, start..start + points, (attribute, all.rounds[i]), words);
             }
             match rules.conversions[i] {
-                AsStored | FineAngle => {}
+                AsStored | FineAngle | NotWritten => {}
                 WholeClass => words.iter_mut().for_each(|w| *w = whole_class(*w)),
                 Grey(range) => words.iter_mut().for_each(|w| *w = grey(*w, range)),
             }

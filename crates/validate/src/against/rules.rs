@@ -58,6 +58,8 @@ pub(crate) enum Conversion {
     WholeClass,
     /// An angle in the steps of LAS formats 6 to 10, 0.006 degrees: the nearest to what is meant.
     FineAngle,
+    /// Values of a field that every record has are not those of the sources: they are not compared.
+    NotWritten,
     /// The grey of an integer among values from the first to the second number:
     /// ((v − lo) · 255 + (hi − lo) / 2) / (hi − lo), and 255 if they are the same.
     Grey([u64; 2]),

@@ -165,8 +165,14 @@ fn open_sources(dataset: &Dataset, options: &Options, own: &Value) -> Result<Opt
         return Ok(None);
     }
     let mut rules = Rules::new(dataset.info().attributes.clone(), dataset.lattice(), own);
-    for (attribute, conversion) in rules.attributes.iter().zip(&mut rules.conversions) {
-        if attribute.name == "scan angle" && attribute.ty == AttributeType::Int16 {
+    // every record has all fields of its point format, whatever the sources have
+    let written = own["attributes"].as_array();
+    let is_written = |name: &str| written.is_none_or(|names| names.iter().any(|n| n == name));
+    let stored = dataset.info().attributes.iter();
+    for ((attribute, conversion), stored) in rules.attributes.iter().zip(&mut rules.conversions).zip(stored) {
+        if !is_written(&stored.name) {
+            *conversion = Conversion::NotWritten;
+        } else if attribute.name == "scan angle" && attribute.ty == AttributeType::Int16 {
             *conversion = Conversion::FineAngle;
         }
     }

@@ -67,7 +67,7 @@ impl Nodes<'_> {
     fn gps_times(&self, node: &TreeNode, points: &NodePoints) {
         let [first, last] = self.info.gps_time;
         let times = points.column::<f64>("gps-time").unwrap_or_default();
-        let mut outside = times.iter().filter(|t| !(first..=last).contains(t));
+        let mut outside = times.iter().filter(|t| t.is_finite() && !(first..=last).contains(t));
         if let Some(time) = outside.next() {
             let found = format!("{time}");
             let finding = Finding::new(Check::GpsTime, "GPS time", json!([first, last]), found).at(node.key);

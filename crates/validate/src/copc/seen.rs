@@ -28,6 +28,8 @@ pub(super) struct Seen {
     gps_time: [f64; 2],
     /// Nodes whose GPS times do not ascend.
     unsorted: u64,
+    /// GPS times that are no finite numbers.
+    odd_times: u64,
     /// The greatest value of a colour; `None` without colours.
     colour: Option<u16>,
     /// Of each attribute of one value.
@@ -43,6 +45,7 @@ impl Seen {
             odd_returns: 0,
             gps_time: NOTHING,
             unsorted: 0,
+            odd_times: 0,
             colour: None,
             ranges: vec![NOTHING; attributes.len()],
         }
@@ -61,8 +64,10 @@ impl Seen {
             self.odd_returns += u64::from(*number == 0 || number > of);
         }
         let times = points.column::<f64>("gps-time").unwrap_or_default();
-        self.gps_time = times.iter().fold(self.gps_time, |[min, max], t| [min.min(*t), max.max(*t)]);
-        self.unsorted += u64::from(!times.is_sorted());
+        let finite = times.iter().filter(|t| t.is_finite());
+        self.gps_time = finite.fold(self.gps_time, |[min, max], t| [min.min(*t), max.max(*t)]);
+        self.unsorted += u64::from(!times.is_sorted_by(|a, b| a <= b || a.total_cmp(b).is_le()));
+        self.odd_times += times.iter().filter(|t| !t.is_finite()).count() as u64;
         for colour in ["rgb", "nir"].into_iter().filter_map(|name| points.column::<u16>(name)) {
             self.colour = self.colour.max(colour.iter().copied().max());
         }
@@ -77,6 +82,7 @@ impl Seen {
         self.points += other.points;
         self.odd_returns += other.odd_returns;
         self.unsorted += other.unsorted;
+        self.odd_times += other.odd_times;
         self.colour = self.colour.max(other.colour);
         self.returns.iter_mut().zip(other.returns).for_each(|(a, b)| *a += b);
         for (a, b) in self.position.iter_mut().zip(other.position) {
@@ -177,9 +183,13 @@ impl Judged<'_> {
         } else if self.is_complete && stated != found && found[0] <= found[1] {
             self.push_ours(finding);
         }
-        if seen.unsorted > 0 && !self.front.is_ours() {
+        if seen.unsorted > 0 {
             let subject = "nodes whose GPS times do not ascend";
-            self.findings.push(Finding::new(Check::GpsTime, subject, 0, seen.unsorted).warning());
+            self.push_ours(Finding::new(Check::GpsTime, subject, 0, seen.unsorted));
+        }
+        if seen.odd_times > 0 {
+            let finding = Finding::new(Check::GpsTime, "GPS times", "finite numbers", "others");
+            self.findings.push(finding.points(seen.odd_times).warning());
         }
     }
 

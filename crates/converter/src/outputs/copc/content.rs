@@ -1,6 +1,6 @@
 //! What the records of a file are made of.
 
-use pointmill_format::scan::las::write::{RecordLayout, StridedColumn};
+use pointmill_format::scan::las::write::{FieldPlace, RecordLayout, StridedColumn};
 use pointmill_format::{Attribute, AttributeType, DatasetKind, Lattice};
 
 use crate::cloud::{Cloud, RecordFrame};
@@ -79,10 +79,26 @@ impl Content {
         self.layout.put(&positions, &columns, out, changes);
     }
 
+    /// What readers of the file call the attributes that are in it as they are: the other fields of a record are filled up.
+    pub(super) fn written(&self, schema: &Schema) -> Vec<String> {
+        let mut extra = self.layout.extra_bytes().iter();
+        let name = |(&i, place): (&usize, &FieldPlace)| {
+            let Attribute { name, elements, .. } = &schema.attributes[i];
+            match place {
+                FieldPlace::Field => Some(name.clone()),
+                FieldPlace::AngleField => Some("scan angle".to_owned()),
+                _ if *elements > 3 => {
+                    extra.by_ref().take(*elements).for_each(drop);
+                    None
+                }
+                _ => extra.next().map(|a| a.name.clone()),
+            }
+        };
+        self.choice.kept.iter().zip(self.layout.places()).filter_map(name).collect()
+    }
+
     /// Attributes that are called otherwise in the file, or are several there.
     pub(super) fn renamed(&self, schema: &Schema) -> Vec<RenamedAttribute> {
-        use pointmill_format::scan::las::write::FieldPlace;
-
         let mut extra = self.layout.extra_bytes().iter();
         let kept = self.choice.kept.iter().zip(self.layout.places());
         let outside = kept.filter(|(_, place)| **place == FieldPlace::ExtraBytes);

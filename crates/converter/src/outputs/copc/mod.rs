@@ -133,6 +133,7 @@ impl CopcSettings {
             let renamed = renamed.into_iter().map(|r| (r.stored_as, r.name.into()));
             own.insert("attributesRenamed".into(), renamed.collect::<Map<_, _>>().into());
         }
+        own.insert("attributes".into(), content.written(cloud.schema()).into());
         own.insert("sampling".into(), self.sampling.name().into());
         own.insert("leafCapacity".into(), self.leaf_capacity.into());
         Value::from(own).to_string()
