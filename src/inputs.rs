@@ -1,8 +1,10 @@
 //! Finds the scans: files, folders, globs and lists become one sorted list of files.
 //!
 //! The file type is detected from the content, or from the extension if the content is not recognised. A file that was
-//! named must be a scan; other files in a folder or a glob are skipped and reported.
+//! named must be a scan; other files in a folder or a glob are skipped and reported. A dataset is one input: a folder that is
+//! one is not searched, and what a run makes is none of its inputs.
 
+mod dataset;
 mod found;
 mod identity;
 mod kind;
@@ -32,14 +34,14 @@ impl InputArgs {
         self.reading.options()
     }
 
-    /// Finds the scans.
-    pub(crate) fn expand(&self) -> Result<Inputs, Failure> {
+    /// Finds the scans. `output`: where the run puts its datasets.
+    pub(crate) fn expand(&self, output: &Path) -> Result<Inputs, Failure> {
         let options = self.options()?;
         let mut typed = self.inputs.clone();
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        let found = expand(&typed, &options)?;
+        let found = expand(&typed, &options, Some(output))?;
         scan_choice::check(&found.files, &options)?;
         text_choice::check(&found.files, &options)?;
         Ok(found)
@@ -47,12 +49,12 @@ impl InputArgs {
 }
 
 /// Finds the scans that `typed` means: files, folders (recursive), globs where no such path exists. A file that is
-/// named together with its columns is text, whatever it looks like.
-pub(crate) fn expand(typed: &[PathBuf], options: &OpenOptions) -> Result<Inputs, Failure> {
+/// named together with its columns is text, whatever it looks like. `output`: a dataset in it is no input, unless it is named.
+pub(crate) fn expand(typed: &[PathBuf], options: &OpenOptions, output: Option<&Path>) -> Result<Inputs, Failure> {
     if typed.is_empty() {
         return Err(Failure::Usage("no input: pass scans, folders or globs, or --files-from LIST".to_owned()));
     }
-    let mut search = Search::new(options);
+    let mut search = Search::new(options, output);
     for path in typed {
         search.add_typed(path)?;
     }
@@ -117,7 +119,7 @@ mod tests {
     }
 
     fn find(typed: &[PathBuf]) -> Result<Inputs, Failure> {
-        expand(typed, &OpenOptions::default())
+        expand(typed, &OpenOptions::default(), None)
     }
 
     fn names(inputs: &Inputs) -> Vec<&str> {
@@ -157,7 +159,7 @@ mod tests {
         assert_eq!(names(&inputs), ["broken.pts", "cut.xyz", "scan.csv", "scan.xyz", "tile.las"]);
         assert_eq!(inputs.other_files.len(), 7, "{:?}", inputs.other_files);
         let named = OpenOptions::default().columns(["t", "x", "y"]);
-        assert!(names(&expand(&[dir.path().to_path_buf()], &named).unwrap()).contains(&"weather.csv"));
+        assert!(names(&expand(&[dir.path().to_path_buf()], &named, None).unwrap()).contains(&"weather.csv"));
         let Err(Failure::Unsupported(line)) = find(&[dir.path().join("dem.asc")]) else { panic!("a raster") };
         assert!(line.contains("an Arc/Info ASCII grid, a raster, not a scan"), "{line}");
     }
@@ -181,10 +183,14 @@ mod tests {
         let dir = folder();
         fs::write(dir.path().join("flat.dat"), "1 2\n3 4\n").unwrap();
         let named = OpenOptions::default().columns(["x", "y"]);
-        let code = |name: &str| expand(&[dir.path().join(name)], &named).map_err(|e| e.code());
+        let code = |name: &str| expand(&[dir.path().join(name)], &named, None).map_err(|e| e.code());
         assert_eq!(names(&code("flat.dat").unwrap()), ["flat.dat"]);
         assert_eq!(code("notes.txt").unwrap_err(), 3);
-        assert_eq!(names(&expand(&[dir.path().join("*.dat")], &named).unwrap()), ["b.dat"], "a glob brings others");
+        assert_eq!(
+            names(&expand(&[dir.path().join("*.dat")], &named, None).unwrap()),
+            ["b.dat"],
+            "a glob brings others"
+        );
         assert_eq!(find(&[dir.path().join("flat.dat")]).unwrap_err().code(), 3, "without columns");
     }
 
@@ -224,7 +230,7 @@ mod tests {
         let list = dir.path().join("list");
         fs::write(&list, format!("\u{feff}# scans\r\n\n{}\r\n", dir.path().join("b.dat").display())).unwrap();
         let args = InputArgs { inputs: Vec::new(), files_from: Some(list), ..InputArgs::default() };
-        assert_eq!(names(&args.expand().unwrap()), ["b.dat"]);
+        assert_eq!(names(&args.expand(Path::new("out")).unwrap()), ["b.dat"]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use pointmill_format::{Decimal, OpenOptions, ScanKind};
+use pointmill_format::{DatasetKind, Decimal, OpenOptions, ScanKind};
 
 use crate::exit::Failure;
 
@@ -20,8 +20,10 @@ pub(crate) fn check(files: &[PathBuf], options: &OpenOptions) -> Result<(), Fail
     ];
     let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) else { return Ok(()) };
     // what is of no kind, or cannot be read, is reported by its reader, or is made text by its columns
-    let is_other =
-        |file: &PathBuf| matches!(ScanKind::of_file(file), Ok(Some(kind)) if !matches!(kind, ScanKind::Text(_)));
+    let is_other = |file: &PathBuf| match ScanKind::of_file(file) {
+        Ok(Some(kind)) => !matches!(kind, ScanKind::Text(_)),
+        _ => DatasetKind::detect(file).is_some(),
+    };
     if !files.iter().all(is_other) {
         return Ok(());
     }

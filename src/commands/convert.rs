@@ -23,7 +23,7 @@ use crate::interrupt::{no_more_checks, stop_flag};
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let targets = targets(args)?;
-    let inputs = args.inputs.expand()?;
+    let inputs = args.inputs.expand(&args.output)?;
     if args.unreadable == FaultArg::Fail
         && let Some(failure) = inputs.unread_failure("; pass --unreadable skip to convert the rest")
     {

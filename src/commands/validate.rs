@@ -127,7 +127,7 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(Outcome, Result<(), Failu
         ..Options::default()
     };
     if !args.against.is_empty() {
-        let found = inputs::expand(&args.against, &options.open)?;
+        let found = inputs::expand(&args.against, &options.open, Some(dataset))?;
         scan_choice::check(&found.files, &options.open)?;
         text_choice::check(&found.files, &options.open)?;
         if !args.talk.quiet {

@@ -9,6 +9,7 @@ use std::{fmt, fs};
 
 use pointmill_format::{OpenOptions, supported_scans, system_reason};
 
+use super::dataset::{self, Met};
 use super::found::{Inputs, Unread, other_files};
 use super::identity::Identity;
 use super::kind::{Kind, is_other, kind, kind_by_ending, kind_in_folder};
@@ -27,18 +28,28 @@ pub(super) struct Search {
     unread: Vec<Unread>,
     /// Links that lead back to a folder above them: what is there is found anyway.
     loops: Vec<PathBuf>,
+    /// Scans in the folders of datasets, beside their files.
+    beside: Vec<PathBuf>,
+    /// A dataset there is none of the inputs, unless it is named.
+    output: Option<PathBuf>,
     options: OpenOptions,
 }
 
 impl Search {
-    pub(super) fn new(options: &OpenOptions) -> Self {
-        Self { options: options.clone(), ..Self::default() }
+    /// `output`: what is in it, and is no scan that was named, is not taken.
+    pub(super) fn new(options: &OpenOptions, output: Option<&Path>) -> Self {
+        let output = output.and_then(|output| fs::canonicalize(output).ok());
+        Self { options: options.clone(), output, ..Self::default() }
     }
 
     /// Adds a file, a folder, or what a glob finds.
     pub(super) fn add_typed(&mut self, path: &Path) -> Result<(), Failure> {
+        if let Some(found) = dataset::named(path) {
+            self.add_dataset(&found);
+            return Ok(());
+        }
         match fs::metadata(path) {
-            Ok(meta) if meta.is_dir() => self.add_folder(path),
+            Ok(meta) if meta.is_dir() => return self.add_folder(path),
             Ok(_) => return self.add_named_file(path),
             Err(e) if e.kind() == io::ErrorKind::NotFound => return self.add_glob(path),
             // its reader reports why, and --unreadable decides
@@ -65,14 +76,28 @@ impl Search {
         let is_other = || is_other(path, self.options.columns.is_some()).unwrap_or(false);
         match kind(path).unwrap_or_else(|_| kind_by_ending(path)) {
             Kind::Scan if !is_other() => self.add_scan(path),
+            _ if dataset::is_file(path) => {
+                if !dataset::is_in(path, self.output.as_deref()) {
+                    self.add_scan(path);
+                }
+            }
             _ => self.no_scans.push(path.to_path_buf()),
         }
     }
 
-    fn add_folder(&mut self, folder: &Path) {
-        for entry in walkdir::WalkDir::new(folder).follow_links(true).sort_by_file_name() {
+    fn add_folder(&mut self, folder: &Path) -> Result<(), Failure> {
+        let mut entries = walkdir::WalkDir::new(folder).follow_links(true).sort_by_file_name().into_iter();
+        while let Some(entry) = entries.next() {
             match entry {
-                Ok(entry) if entry.file_type().is_dir() => {}
+                Ok(entry) if entry.file_type().is_dir() => match dataset::met(entry.path(), self.output.as_deref()) {
+                    Met::Folder => {}
+                    Met::Dataset(path) => {
+                        self.add_dataset(&path);
+                        entries.skip_current_dir();
+                    }
+                    Met::NoInput => entries.skip_current_dir(),
+                    Met::Several(kinds) => return Err(several(entry.path(), &kinds)),
+                },
                 Ok(entry) => self.add_met_file(entry.path(), kind_in_folder),
                 Err(e) => match (e.path(), e.io_error()) {
                     (Some(path), Some(error)) => self.add_closed(path, error),
@@ -81,6 +106,13 @@ impl Search {
                 },
             }
         }
+        Ok(())
+    }
+
+    /// A dataset is one input, whatever files it has.
+    fn add_dataset(&mut self, path: &Path) {
+        self.beside.extend(dataset::scans_beside(path));
+        self.add_scan(path);
     }
 
     /// A place that the operating system does not let us see.
@@ -107,7 +139,7 @@ impl Search {
         for found in matches {
             any = true;
             match found {
-                Ok(found) if found.is_dir() => self.add_folder(&found),
+                Ok(found) if found.is_dir() => self.add_folder(&found)?,
                 Ok(found) => self.add_met_file(&found, kind),
                 Err(e) => self.add_closed(e.path(), e.error()),
             }
@@ -136,6 +168,7 @@ impl Search {
         let notes = [
             note(&self.repeated, "input", "named more than once, read once"),
             note(&self.loops, "link", "back to a folder above, not followed again"),
+            note(&self.beside, "scan", "in the folder of a dataset, not read"),
         ];
         let mut files: Vec<PathBuf> = self.found.into_values().collect();
         files.sort();
@@ -161,6 +194,12 @@ fn nothing(typed: &[PathBuf], inputs: &Inputs) -> Failure {
         supported_scans(),
         others.unwrap_or_default()
     ))
+}
+
+/// The same points twice or more.
+fn several(folder: &Path, kinds: &[&str]) -> Failure {
+    let (folder, kinds) = (folder.display(), kinds.join(", "));
+    Failure::Usage(format!("{folder}: one conversion made {kinds} in it, of the same points; name one of them"))
 }
 
 /// The first paths, and whether there are more.
@@ -189,7 +228,7 @@ mod tests {
     use super::*;
 
     fn expand(typed: &[PathBuf]) -> Result<Inputs, Failure> {
-        let mut search = Search::new(&OpenOptions::default());
+        let mut search = Search::new(&OpenOptions::default(), None);
         typed.iter().try_for_each(|path| search.add_typed(path))?;
         search.finish(typed)
     }

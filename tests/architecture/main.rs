@@ -38,7 +38,8 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
             &["scan", "octree"],
             &["copc", "potree1", "potree2", "bintree", "batches"],
             &["dataset_kind"],
-            &["open_octree"],
+            &["dataset_scan"],
+            &["open_octree", "open_scan"],
         ],
     ),
     (

@@ -11,6 +11,8 @@ mod cut_short;
 mod extract;
 mod folders;
 mod formats;
+mod from_datasets;
+mod from_datasets_places;
 mod hostile;
 mod inputs;
 mod interrupted;

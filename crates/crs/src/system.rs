@@ -97,7 +97,10 @@ impl System {
             (Some(wkt), Some(keys)) => Self::parse(wkt).or_else(|error| keys.map_err(|_| error)),
             (Some(wkt), None) => Self::parse(wkt),
             (None, Some(keys)) => keys,
-            (None, None) => return Ok(None),
+            (None, None) => match crs.proj4.as_deref() {
+                Some(definition) => Self::parse(definition),
+                None => return Ok(None),
+            },
         };
         system.map(Some)
     }

@@ -181,7 +181,7 @@ impl DatasetKind {
     }
 
     /// The kind of the dataset at `path`, a folder or its marker file, by name and content: the marker file is there
-    /// and has its mark. `None` for anything else, and for what cannot be read.
+    /// and has its mark; or of the one in an archive (feature `zip`). `None` for anything else, and for what cannot be read.
     ///
     /// ```
     /// use pointmill_format::DatasetKind;
@@ -192,8 +192,11 @@ impl DatasetKind {
     /// ```
     #[must_use]
     pub fn detect(path: impl AsRef<Path>) -> Option<Self> {
-        let located = find(path.as_ref())?;
-        starts_as(located.kind, &located.marker_path()).then_some(located.kind)
+        let path = path.as_ref();
+        let located = find(path)?;
+        // an archive was looked into
+        let is_archive = located.path == path && !located.kind.is_single_file() && path.is_file();
+        (is_archive || starts_as(located.kind, &located.marker_path())).then_some(located.kind)
     }
 }
 

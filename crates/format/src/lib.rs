@@ -58,11 +58,13 @@
 #![deny(unsafe_code)] // but for the memory map of `batches` (feature `mmap`): one call, in a separate module
 
 mod dataset_kind;
+mod dataset_scan;
 mod error;
 mod geometry;
 mod json;
 mod names;
 mod open_octree;
+mod open_scan;
 mod points;
 mod write_error;
 
@@ -81,11 +83,12 @@ pub use error::{Advice, ErrorKind, Fault, ReadError, system_reason};
 pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Lattice, NodeKey};
 pub use names::UnknownName;
 pub use open_octree::open_octree;
+pub use open_scan::open_scan;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Batches, Blob, Counted, Crs, Decimal, ImageEncoding, ImageGeometry, ImageKind, ImagePose, MAX_BATCH_BYTES,
-    MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, PointMap, Resolution, Scan, ScanImage, ScanInfo, ScanKind,
-    ScanMap, ScanMaps, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, open_scan, scans_named,
+    Batches, Blob, Counted, Crs, DatasetNote, Decimal, ImageEncoding, ImageGeometry, ImageKind, ImagePose,
+    MAX_BATCH_BYTES, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, PointMap, Resolution, Scan, ScanImage, ScanInfo,
+    ScanKind, ScanMap, ScanMaps, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, scans_named,
     supported_scans,
 };
 pub use write_error::WriteError;

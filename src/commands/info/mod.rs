@@ -35,6 +35,14 @@ fn describe_dataset(dataset: &Located, options: &OpenOptions, deep: bool) -> Res
     }
 }
 
+/// Describes what a search has found.
+fn describe(path: &Path, options: &OpenOptions, deep: bool) -> Result<Description, Failure> {
+    match DatasetKind::detect(path).filter(|kind| *kind != DatasetKind::Copc).and_then(|_| locate(path).ok()) {
+        Some(dataset) => describe_dataset(&dataset, options, deep),
+        None => scan::describe(path, options, deep),
+    }
+}
+
 /// The datasets at `path`: the one that it is, or those that one conversion has put into it. A COPC file is found as the scan
 /// that it is, among others of its folder.
 fn datasets(path: &Path) -> Vec<Located> {
@@ -69,13 +77,13 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
         if !datasets.is_empty() {
             continue;
         }
-        match inputs::expand(std::slice::from_ref(path), &options) {
+        match inputs::expand(std::slice::from_ref(path), &options, None) {
             Err(failure) => out.fail(failure),
             Ok(found) => {
                 found.all_notes().for_each(|note| print_line(&note));
                 found.unread_failure("").into_iter().for_each(|failure| out.fail(failure));
                 for file in &found.files {
-                    out.show(scan::describe(file, &options, args.deep))?;
+                    out.show(describe(file, &options, args.deep))?;
                 }
             }
         }
@@ -90,7 +98,7 @@ fn check_choice(paths: &[PathBuf], options: &OpenOptions) -> Result<(), Failure>
         return Ok(());
     }
     // what cannot be found is reported in its turn
-    let expanded = paths.iter().filter_map(|path| inputs::expand(std::slice::from_ref(path), options).ok());
+    let expanded = paths.iter().filter_map(|path| inputs::expand(std::slice::from_ref(path), options, None).ok());
     let files: Vec<PathBuf> = expanded.flat_map(|found| found.files).collect();
     scan_choice::check(&files, options)?;
     if files.is_empty() { Ok(()) } else { text_choice::check(&files, options) }

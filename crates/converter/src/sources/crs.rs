@@ -24,7 +24,8 @@ use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::warning::{CrsNote, Warning};
 
 use printable::printable;
-use resolved::{from_code, unzip};
+use records::from_proj4;
+use resolved::from_code;
 
 pub use records::resolve_crs;
 pub use resolved::ResolvedCrs;
@@ -99,11 +100,7 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
             let fault = PlanFault::Definition { text: printable(text), what: printable(&what) };
             return Err(PlanError::new(Setting::Crs, fault));
         }
-        let unit = proj4::unit(text);
-        let (projection, notes) = unzip(proj4::for_viewers(text, unit), None);
-        let (unit, vertical_unit) = (Some(unit), proj4::vertical_unit(text));
-        let (label, is_geocentric) = (printable(text), proj4::is_geocentric(text));
-        return Ok(ResolvedCrs { projection, wkt: None, label, unit, vertical_unit, is_geocentric, notes });
+        return Ok(from_proj4(text));
     }
     match wkt::is_wkt(text) {
         true if !wkt::is_whole(text) => fault(PlanFault::CutWkt),

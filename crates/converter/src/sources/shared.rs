@@ -25,7 +25,7 @@ impl Shared {
 
     pub(super) fn crs(&mut self, crs: &Crs) -> Arc<Crs> {
         let hash = hash_of(|h| {
-            (&crs.wkt, crs.epsg, crs.vertical_epsg, &crs.citation).hash(h);
+            (&crs.wkt, crs.epsg, crs.vertical_epsg, &crs.citation, &crs.proj4).hash(h);
             format!("{:?}{:?}", crs.unit, crs.vertical_unit).hash(h);
         });
         self.systems.share(hash, crs, || Arc::new(crs.clone()))

@@ -104,13 +104,11 @@ impl PointBatch {
     }
 
     /// True if the columns have the types of these attributes.
-    #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
     pub(crate) fn fits(&self, attributes: &[Attribute]) -> bool {
         self.columns.iter().map(Column::ty).eq(attributes.iter().map(|a| a.ty))
     }
 
     /// Renames the columns; their types fit.
-    #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
     pub(crate) fn set_attributes(&mut self, attributes: &Arc<[Attribute]>) {
         if !Arc::ptr_eq(&self.attributes, attributes) {
             self.attributes = Arc::clone(attributes);

@@ -1,7 +1,9 @@
 //! What `cloud.js` says.
 
+use serde_json::Value;
+
 use crate::octree::OctreeInfo;
-use crate::{Aabb, NodeKey};
+use crate::{Aabb, Attribute, NodeKey};
 
 use super::path::node_path;
 use super::{OCTREE_DIR, PointAttribute};
@@ -121,11 +123,24 @@ impl Metadata {
 
     /// What is the same in all octrees. LAS files have their own attributes.
     pub(super) fn octree_info(&self) -> OctreeInfo {
-        let attributes = self.attributes.iter().flat_map(PointAttribute::columns).collect();
+        let attributes = self.attributes.iter().flat_map(PointAttribute::columns).map(|a| self.scaled(a)).collect();
         let mut info = OctreeInfo::new(format!("Potree 1.{}", self.minor), self.cube, self.spacing, attributes);
         info.points = self.points;
         info.projection.clone_from(&self.projection);
         info
+    }
+
+    /// The attribute with the scale and offset that the key `pointmill` gives it: the format has no other place for them.
+    fn scaled(&self, mut attribute: Attribute) -> Attribute {
+        let scaled = self.extra.get("pointmill").and_then(|own| own.get("attributeScales")?.get(&attribute.name));
+        let numbers = |key| {
+            let numbers = scaled?.get(key)?.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?;
+            (numbers.len() == attribute.elements && numbers.iter().all(|n| n.is_finite())).then_some(numbers)
+        };
+        if let (Some(scale), Some(offset)) = (numbers("scale"), numbers("offset")) {
+            (attribute.scale, attribute.offset) = (scale, offset);
+        }
+        attribute
     }
 
     /// The file with the points of a node, relative to the folder of `cloud.js`.

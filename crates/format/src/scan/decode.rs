@@ -14,13 +14,13 @@ pub const MAX_BATCH_POINTS: usize = 65_536;
 pub const MAX_BATCH_BYTES: usize = 4 << 20;
 
 /// Points of a full batch, where each takes `point_bytes` (> 0) bytes.
-pub(super) fn batch_points(point_bytes: usize) -> usize {
+pub(crate) fn batch_points(point_bytes: usize) -> usize {
     MAX_BATCH_BYTES.checked_div(point_bytes).unwrap_or(MAX_BATCH_POINTS).clamp(1, MAX_BATCH_POINTS)
 }
 
 /// Bytes that a point takes in a batch: its position and all attributes, whether they are wanted or not, so that
 /// batches are the same whatever is wanted.
-pub(super) fn point_bytes(attributes: &[crate::Attribute], is_quantized: bool) -> usize {
+pub(crate) fn point_bytes(attributes: &[crate::Attribute], is_quantized: bool) -> usize {
     let axis = if is_quantized { size_of::<i32>() } else { size_of::<f64>() };
     attributes.iter().fold(3 * axis, |sum, attribute| sum.saturating_add(attribute.size()))
 }
@@ -42,14 +42,12 @@ pub struct Scratch {
     /// take less time for two consecutive pieces that they decode in turn. Forgotten by each decode.
     pub next_piece: Option<usize>,
     /// What else the reader that decoded last wants to find again.
-    #[cfg_attr(not(feature = "las"), allow(dead_code))]
-    pub(super) kept: Option<Box<dyn Any + Send + Sync>>,
+    pub(crate) kept: Option<Box<dyn Any + Send + Sync>>,
 }
 
 /// The batch of the scratch memory with these columns and, if `is_quantized`, integer positions; its memory is kept
 /// where the types agree.
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
-pub(super) fn fitting_batch<'a>(
+pub(crate) fn fitting_batch<'a>(
     batch: &'a mut Option<PointBatch>,
     attributes: &std::sync::Arc<[crate::Attribute]>,
     is_quantized: bool,
@@ -74,7 +72,7 @@ pub(super) fn fitting_batch<'a>(
 const COLUMN_BYTES: u64 = 256;
 
 /// Memory of a batch of at most `points` points with the wanted columns: [`resize`] gives them no more room than they need.
-pub(super) fn batch_bytes(attributes: &[crate::Attribute], is_quantized: bool, wanted: &Wanted, points: u64) -> u64 {
+pub(crate) fn batch_bytes(attributes: &[crate::Attribute], is_quantized: bool, wanted: &Wanted, points: u64) -> u64 {
     let sizes = attributes.iter().enumerate().filter(|(i, _)| wanted.is_wanted(*i)).map(|(_, a)| a.size() as u64);
     let each = point_bytes(&[], is_quantized) as u64 + sizes.sum::<u64>();
     points * each + COLUMN_BYTES * (attributes.len() as u64 + 4)
@@ -82,8 +80,7 @@ pub(super) fn batch_bytes(attributes: &[crate::Attribute], is_quantized: bool, w
 
 /// Makes a column `len` values long, without room for more. Values that it had stay, so that a column that was as long
 /// before is not written twice.
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
-pub(super) fn resize<T: Clone + Default>(column: &mut Vec<T>, len: usize) {
+pub(crate) fn resize<T: Clone + Default>(column: &mut Vec<T>, len: usize) {
     column.reserve_exact(len.saturating_sub(column.len()));
     column.resize(len, T::default());
 }

@@ -27,6 +27,8 @@ pub struct Crs {
     pub is_user_defined: bool,
     /// There are WKT and GeoTIFF keys, and the file says that the keys count.
     pub keys_first: bool,
+    /// A proj4 definition, as datasets have it; it counts where neither WKT nor a code says more.
+    pub proj4: Option<String>,
 }
 
 impl Crs {

@@ -3,6 +3,7 @@
 mod archive;
 mod batches;
 mod chosen;
+mod dataset_note;
 mod decimal;
 mod decode;
 mod image;
@@ -38,12 +39,16 @@ pub mod text;
 
 pub use batches::Batches;
 pub use chosen::scans_named;
+pub use dataset_note::DatasetNote;
 pub use decimal::Decimal;
 pub use decode::{MAX_BATCH_BYTES, MAX_BATCH_POINTS, Scan, Scratch, Sink};
+pub(crate) use decode::{batch_bytes, batch_points, fitting_batch, point_bytes, resize};
 pub use image::{Blob, ImageEncoding, ImageGeometry, ImageKind, ImagePose, ScanImage};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
+pub(crate) use mapped::mapped;
 pub use mapped::{PointMap, ScanMap, ScanMaps};
-pub use open::{OpenOptions, ScanKind, open_scan, supported_scans};
+pub(crate) use open::open_file;
+pub use open::{OpenOptions, ScanKind, supported_scans};
 pub use other_kind::OtherKind;
 pub use unit::Unit;
 pub use wanted::{UnknownAttribute, Wanted};

@@ -8,7 +8,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use super::archive::archive;
-use super::mapped::{ScanMaps, mapped};
+use super::mapped::ScanMaps;
 use super::other_kind::OtherKind;
 use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
 
@@ -61,6 +61,12 @@ pub struct OpenOptions {
     /// Bytes of memory that the description of a file's scans may take while it is opened (the XML section of E57);
     /// `None`: 1 GiB.
     pub description_bytes: Option<u64>,
+    /// Octrees (Potree, COPC): the deepest level that is read, 0 for the root; `None`: all. What has no levels is refused
+    /// then.
+    pub max_level: Option<u8>,
+    /// Octrees: levels whose points are closer to each other than this are not read, but for the root; world units. Leaves
+    /// hold whatever points remain, at any distance. What has no levels is refused.
+    pub min_spacing: Option<f64>,
     /// What becomes of the points; `None`: they stay where they are.
     pub maps: Option<Arc<dyn ScanMaps>>,
 }
@@ -106,6 +112,25 @@ impl OpenOptions {
     pub fn description_bytes(mut self, bytes: u64) -> Self {
         self.description_bytes = Some(bytes);
         self
+    }
+
+    /// Sets [`Self::max_level`].
+    #[must_use]
+    pub fn max_level(mut self, level: u8) -> Self {
+        self.max_level = Some(level);
+        self
+    }
+
+    /// Sets [`Self::min_spacing`].
+    #[must_use]
+    pub fn min_spacing(mut self, spacing: f64) -> Self {
+        self.min_spacing = Some(spacing);
+        self
+    }
+
+    /// True if some levels of an octree are chosen.
+    pub(crate) const fn has_levels(&self) -> bool {
+        self.max_level.is_some() || self.min_spacing.is_some()
     }
 
     /// Sets [`Self::maps`].
@@ -229,20 +254,12 @@ pub fn supported_scans() -> String {
 }
 
 /// Opens a scan of any kind that this build reads; the kind is detected from the content, the extension is ignored.
+/// [`OpenOptions::maps`] are not applied.
 ///
 /// # Errors
-/// A file that is empty, or of no kind that is read here, those of the reader of its kind, and of
-/// [`OpenOptions::maps`].
-pub fn open_scan(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
-    let scan = open_as_it_is(path.as_ref(), options)?;
-    match &options.maps {
-        Some(maps) => mapped(scan, &**maps),
-        None => Ok(scan),
-    }
-}
-
+/// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
 #[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
-fn open_as_it_is(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+pub(crate) fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
@@ -341,6 +358,7 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 mod tests {
     use pointmill_testkit::scans::{SCAN_FOLDERS, scan_fixtures};
 
+    use super::open_file as open_scan;
     use super::*;
     use crate::ErrorKind;
 
@@ -354,7 +372,7 @@ mod tests {
 
     #[test]
     fn what_is_no_scan_is_refused_with_what_is_supported() {
-        let error = open_scan(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"), &OpenOptions::default());
+        let error = open_scan(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"), &OpenOptions::default());
         let error = error.err().unwrap();
         assert!(matches!(error.kind(), ErrorKind::Unsupported));
         assert!(error.to_string().contains("LAS, LAZ, E57, PLY, PCD, text"), "{error}");
@@ -384,7 +402,7 @@ mod tests {
             assert!(matches!(error.kind(), ErrorKind::Broken) && error.offset() == Some(0), "{error}");
         }
         fs::write(dir.path().join("a.txt"), "1 gallon\n").unwrap();
-        let error = open_scan(dir.path().join("a.txt"), &OpenOptions::default()).err().unwrap();
+        let error = open_scan(&dir.path().join("a.txt"), &OpenOptions::default()).err().unwrap();
         assert!(matches!(error.kind(), ErrorKind::Broken), "{error}");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::dataset_note::DatasetNote;
 use crate::error::one_line;
 
 /// Scans that are named in a line; of more, the number is given.
@@ -154,6 +155,8 @@ pub enum ScanWarning {
     NoneChosen { scans: usize },
     /// E57: the file has no scans.
     NoScans,
+    /// What a dataset, read as a scan, does not say or have.
+    Dataset(DatasetNote),
     /// Anything else, as text.
     Other(String),
 }
@@ -259,6 +262,7 @@ impl ScanWarning {
                     .to_owned()
             }
             Self::PlyVersion { version } => format!("the format version {version:?} is read as 1.0"),
+            Self::Dataset(note) => note.to_string(),
             Self::Other(text) => text.clone(),
             las_or_e57 => las_or_e57.las_line().unwrap_or_else(|| las_or_e57.e57_line()),
         }

@@ -12,6 +12,32 @@ use crate::warning::CrsNote;
 ///
 /// The WKT goes before the GeoTIFF keys, unless they contradict each other and the scan says that the keys count.
 pub fn resolve_crs(found: &Crs) -> ResolvedCrs {
+    let mut out = from_records(found);
+    // datasets have a definition beside the WKT, or alone
+    if let Some(definition) = found.proj4.as_deref().filter(|_| out.projection.is_empty()) {
+        let own = from_proj4(definition);
+        let is_named = !out.label.is_empty();
+        out.projection = own.projection;
+        out.notes.retain(|note| !matches!(note, CrsNote::NoCode { .. } | CrsNote::NoSystem));
+        out.notes.extend(own.notes);
+        out.unit = out.unit.or(own.unit);
+        out.vertical_unit = out.vertical_unit.or(own.vertical_unit);
+        out.is_geocentric |= own.is_geocentric;
+        out.label = if is_named { out.label } else { own.label };
+    }
+    out
+}
+
+/// The system of a proj4 definition.
+pub(super) fn from_proj4(text: &str) -> ResolvedCrs {
+    let unit = proj4::unit(text);
+    let (projection, notes) = unzip(proj4::for_viewers(text, unit), None);
+    let (unit, vertical_unit) = (Some(unit), proj4::vertical_unit(text));
+    let (label, is_geocentric) = (printable(text), proj4::is_geocentric(text));
+    ResolvedCrs { projection, wkt: None, label, unit, vertical_unit, is_geocentric, notes }
+}
+
+fn from_records(found: &Crs) -> ResolvedCrs {
     let Some(text) = found.wkt.as_deref().filter(|text| !text.trim().is_empty()) else { return from_keys(found) };
     let Some(system) = wkt::read(text) else {
         let mut out = from_keys(found);

@@ -15,4 +15,4 @@ mod scan;
 mod tests;
 
 pub use map::{PointMap, ScanMap, ScanMaps};
-pub(super) use scan::mapped;
+pub(crate) use scan::mapped;

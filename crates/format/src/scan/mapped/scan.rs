@@ -10,7 +10,7 @@ use crate::scan::decode::{batch_bytes, batch_points, point_bytes};
 use crate::{Piece, PointBatch, ReadError, Scan, ScanInfo, Scratch, Sink, Wanted};
 
 /// The scan with its points where `maps` takes them.
-pub(in crate::scan) fn mapped(inner: Box<dyn Scan>, maps: &dyn ScanMaps) -> Result<Box<dyn Scan>, ReadError> {
+pub(crate) fn mapped(inner: Box<dyn Scan>, maps: &dyn ScanMaps) -> Result<Box<dyn Scan>, ReadError> {
     let map = maps.of(&*inner)?;
     Ok(Box::new(MappedScan::new(inner, &map)))
 }

@@ -1,0 +1,6 @@
+//! Datasets as scans: the golden datasets give their points, levels are chosen, and what lies is refused.
+
+mod damage;
+mod golden;
+mod levels;
+mod util;

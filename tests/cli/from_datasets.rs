@@ -1,0 +1,121 @@
+//! Datasets as inputs: what a dataset holds comes back, whichever format it went through.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use pointmill_format::potree2::Dataset;
+use pointmill_format::{NodePoints, with_column};
+use pointmill_testkit::files::{assert_same_dataset, dataset, fixture_bytes};
+use pointmill_testkit::las::Las;
+
+use crate::support::Dir;
+
+/// Scans of all kinds of values: colours, times, scaled extra bytes, a WKT.
+fn with_scans() -> Dir {
+    let dir = Dir::new();
+    dir.write("terrain.las", &Las::terrain(30_000, 1).bytes());
+    dir.write("format7.laz", &fixture_bytes("las/format7.laz"));
+    dir.write("pages.copc.laz", &fixture_bytes("copc/pages.copc.laz"));
+    dir
+}
+
+fn convert(dir: &Dir, input: &str, output: &str, options: &[&str]) {
+    let args = ["convert", input, "-o", output, "-q", "--name", "same", "--leaf-capacity", "500"];
+    dir.succeed(args.iter().chain(options));
+}
+
+/// All points of a Potree 2.0 dataset, sorted: world coordinates in steps, then the bits of all columns.
+fn records(dataset: &Path) -> BTreeMap<Vec<i128>, u64> {
+    let dataset = Dataset::open(dataset).unwrap();
+    let mut points = NodePoints::default();
+    let mut records = BTreeMap::new();
+    for node in dataset.read_hierarchy().unwrap() {
+        dataset.read_points(&node, &mut points).unwrap();
+        let scale = dataset.metadata().lattice.scale;
+        for i in 0..points.len() {
+            let world = points.world(i).unwrap();
+            let mut record: Vec<i128> = (0..3).map(|a| (world[a] / scale[a]).round() as i128).collect();
+            for column in points.columns() {
+                with_column!(column, values => {
+                    let elements = values.len() / points.len();
+                    record.extend(values[i * elements..(i + 1) * elements].iter().map(|v| bits(*v as f64)));
+                });
+            }
+            *records.entry(record).or_insert(0) += 1;
+        }
+    }
+    records
+}
+
+fn bits(value: f64) -> i128 {
+    value.to_bits().into()
+}
+
+#[test]
+fn an_octree_converted_again_is_the_same_byte_for_byte() {
+    let dir = with_scans();
+    for scan in ["terrain.las", "format7.laz", "pages.copc.laz"] {
+        convert(&dir, scan, "direct", &["--overwrite"]);
+        for encoding in ["default", "brotli"] {
+            convert(&dir, scan, "first", &["--overwrite", "--encoding", encoding]);
+            convert(&dir, "first", "second", &["--overwrite"]);
+            let what = format!("{scan}, {encoding}");
+            assert_same_dataset(&dataset(&dir.path("second")), &dataset(&dir.path("direct")), &what);
+            dir.validate("second", &["first"]);
+            // its report is about the dataset that it was made from
+            fs::remove_file(dir.path("second/report.json")).unwrap();
+            dir.validate("second", &[scan]);
+        }
+        assert_eq!(records(&dir.path("second")), records(&dir.path("direct")), "{scan}");
+    }
+}
+
+#[test]
+fn potree_1_gives_all_points_back() {
+    let dir = with_scans();
+    for scan in ["terrain.las", "format7.laz", "pages.copc.laz"] {
+        convert(&dir, scan, "direct", &["--overwrite", "--attributes", "intensity,classification,gps-time"]);
+        let options = ["--overwrite", "--to", "potree1", "--potree1-version", "1.8"];
+        let attributes = ["--attributes", "intensity,classification,gps-time"];
+        convert(&dir, scan, "first", &[&options[..], &attributes].concat());
+        convert(&dir, "first", "second", &[&["--overwrite"][..], &attributes].concat());
+        assert_eq!(records(&dir.path("second")), records(&dir.path("direct")), "{scan}");
+        // the marker file stands for the folder
+        dir.validate("second", &["first/cloud.js"]);
+        dir.validate("second", &["first"]);
+    }
+}
+
+#[test]
+fn every_attribute_of_version_1_8_comes_back_under_its_name() {
+    let dir = with_scans();
+    convert(&dir, "format7.laz", "first", &["--to", "potree1", "--potree1-version", "1.8", "--attributes", "all"]);
+    convert(&dir, "first", "second", &[]);
+    // colours have 8 bits there
+    let ended = dir.run(["validate", "second", "--against", "format7.laz", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&ended.stdout()).unwrap();
+    let names = |name: &str| {
+        let dataset = Dataset::open(dir.path(name)).unwrap();
+        let mut names: Vec<_> = dataset.metadata().attributes.iter().map(|a| a.attribute.clone()).collect();
+        names.sort_by(|a, b| a.name.cmp(&b.name));
+        names.into_iter().map(|a| (a.name, a.scale, a.offset)).collect::<Vec<_>>()
+    };
+    convert(&dir, "format7.laz", "direct", &[]);
+    assert_eq!(names("second"), names("direct"), "{report}");
+}
+
+#[test]
+fn a_projection_without_more_is_kept() {
+    let dir = with_scans();
+    let system = "+proj=tmerc +lat_0=1 +lon_0=9 +k=0.9 +x_0=5 +y_0=6 +ellps=GRS80 +units=m +no_defs";
+    for format in ["potree2", "potree1"] {
+        convert(&dir, "terrain.las", "first", &["--overwrite", "--to", format, "--crs", system]);
+        convert(&dir, "first", "second", &["--overwrite"]);
+        assert_eq!(Dataset::open(dir.path("second")).unwrap().metadata().projection, system, "{format}");
+    }
+    // the points are where they were said to be
+    let args = ["convert", "first", "-o", "moved", "-q", "--reproject", "EPSG:25832"];
+    let ended = dir.run(args);
+    assert!(!ended.stderr().contains("no coordinate reference system"), "{}", ended.stderr());
+}
