@@ -8,7 +8,10 @@ use pointmill_format::Aabb;
 
 use super::common::{InputArgs, TalkArgs};
 use super::convert::FaultArg;
-use super::values::{Attributes, Scale, parse_attributes, parse_bounds, parse_bytes, parse_class, parse_scale, parse_threads, whole};
+use super::values::{
+    Attributes, Scale, parse_attributes, parse_bounds, parse_bytes, parse_class, parse_scale, parse_spacing,
+    parse_threads, whole,
+};
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ExportArgs {
@@ -31,6 +34,14 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "all|LIST", default_value = "all", value_parser = parse_attributes,
           help_heading = "Selecting data")]
     pub(crate) attributes: Attributes,
+    /// Reads an octree down to this level alone, 0 for its root: the cloud thinned
+    #[arg(long, value_name = "N", value_parser = whole::<u8>(0..=u64::from(u8::MAX)), allow_negative_numbers = true,
+          help_heading = "Selecting data")]
+    pub(crate) level: Option<u8>,
+    /// Reads an octree down to the last level whose points are at least this far apart, in units of the CRS: the cloud thinned
+    #[arg(long, value_name = "STEP", value_parser = parse_spacing, allow_negative_numbers = true,
+          help_heading = "Selecting data")]
+    pub(crate) spacing: Option<f64>,
     /// Keeps only points inside this box, in world coordinates
     #[arg(long, value_name = "X,Y,Z..X,Y,Z", value_parser = parse_bounds, allow_hyphen_values = true,
           help_heading = "Selecting data")]

@@ -14,7 +14,7 @@ use crate::interrupt::{no_more_checks, stop_flag};
 
 pub(crate) fn run(args: &ExportArgs) -> Result<(), Failure> {
     let format = format(&args.output)?;
-    let inputs = args.inputs.expand()?;
+    let inputs = args.inputs.expand(&args.output)?;
     if args.unreadable == FaultArg::Fail
         && let Some(failure) = inputs.unread_failure("; pass --unreadable skip to export the rest")
     {
@@ -81,6 +81,7 @@ fn plan(args: &ExportArgs, inputs: Inputs) -> Result<Plan, Failure> {
     plan.other_files = inputs.other_files;
     plan.skipped_inputs = inputs.unread.into_iter().map(|unread| (unread.path, unread.why)).collect();
     plan.open = args.inputs.options()?;
+    (plan.open.max_level, plan.open.min_spacing) = (args.level, args.spacing);
     plan.attributes = match &args.attributes {
         Attributes::All => AttributeChoice::All,
         Attributes::Scene => {

@@ -1,6 +1,7 @@
 //! The account of an export as text. No figure is computed here.
 
-use pointmill_converter::{ExportReport, ExportedAttribute, ExportedPoints};
+use pointmill_converter::{ChangedValues, ExportReport, ExportedAttribute, ExportedPoints};
+use pointmill_format::Changes;
 
 use super::quantities::{at_most, bytes, count, number, plural, rate, seconds};
 
@@ -68,11 +69,17 @@ fn attributes_lines(attributes: &[ExportedAttribute]) -> Vec<String> {
     }
     for a in attributes {
         if let Some(changed) = &a.changed {
-            lines.push(format!("{}: {}", a.name, changed.to_string()));
+            lines.push(format!("{}: {}", a.name, words(changed)));
         }
         if let Some(missing) = &a.missing {
             lines.push(format!("{}: {} without it have 0", a.name, plural(missing.points, "point")));
         }
     }
     lines
+}
+
+/// What became of values.
+fn words(changed: &ChangedValues) -> Changes {
+    let ChangedValues { clamped, rounded, not_finite, out_of_range, extremes, .. } = *changed;
+    Changes { clamped, rounded, not_finite, out_of_range, extremes, missing: 0 }
 }
