@@ -78,7 +78,7 @@ fn threads_and_memory_change_no_byte() {
     for ending in ["las", "laz", "ply", "csv"] {
         let one = format!("one.{ending}");
         dir.succeed(["export", "a.las", "b.las", "-o", &one, "-q", "--threads", "1"]);
-        for (i, options) in [["--threads", "2"], ["--threads", "7"], ["--memory", "100MiB"]].iter().enumerate() {
+        for (i, options) in [["--threads", "2"], ["--threads", "7"], ["--memory", "160MiB"]].iter().enumerate() {
             let other = format!("{i}.{ending}");
             dir.succeed(["export", "b.las", "a.las", "-o", &other, "-q"].iter().chain(options));
             assert!(fs::read(dir.path(&one)).unwrap() == fs::read(dir.path(&other)).unwrap(), "{ending} {options:?}");
@@ -129,9 +129,9 @@ fn points_that_are_not_written_are_counted_by_cause() {
     let out = report(&dir, &["in.las", "-o", "out.las", "--class", "2,6", "--bounds", "10,-1,-1..89,1,1"]);
     let p = &out["points"];
     let counts = ["read", "written", "outsideBounds", "otherClass"].map(|name| p[name].as_u64().unwrap());
-    assert_eq!(counts, [100, 54, 20, 26]);
+    assert_eq!(counts, [100, 53, 20, 27]);
     let scan = open_scan(dir.path("out.las"), &OpenOptions::default()).unwrap();
-    assert_eq!(scan.info().points_declared, 54);
+    assert_eq!(scan.info().points_declared, 53);
     let every = report(&dir, &["in.las", "-o", "every.las", "--every", "10", "--attributes", "classification"]);
     assert_eq!((&every["points"]["written"], &every["points"]["thinned"]), (&10.into(), &90.into()));
     assert_eq!(every["attributes"].as_array().unwrap().len(), 1);
@@ -151,10 +151,10 @@ fn one_point_is_a_cloud_and_none_is_none() {
         let info = dir.succeed(["info", &format!("out.{ending}"), "--deep", "--json"]).stdout();
         let info: Value = serde_json::from_str(&info).unwrap();
         assert!(info.to_string().contains("\"points\":1") || info[0].to_string().contains(":1,"), "{info}");
-        let none = dir.run(["export", "none.las", "-o", &format!("none.{ending}")]);
+        let none = dir.run(["export", "none.las", "-o", &format!("nothing.{ending}")]);
         none.failed_with(3, &["none.las", "holds no points"]);
-        assert!(!dir.path(&format!("none.{ending}")).exists() || ending == "las");
     }
+    assert_eq!(dir.names(), ["none.las", "one.las", "out.csv", "out.las", "out.laz", "out.ply"]);
 }
 
 #[test]
@@ -241,8 +241,8 @@ fn the_memory_ceiling_is_kept() {
     let dir = Dir::new();
     dir.write("in.las", &Las::terrain(3_000_000, 1).bytes());
     for ending in ["las", "laz"] {
-        let args = ["in.las", "-o", &format!("out.{ending}"), "--memory", "96MiB", "--threads", "2"];
+        let args = ["in.las", "-o", &format!("out.{ending}"), "--memory", "100MiB", "--threads", "2"];
         let peak = report(&dir, &args)["memory_bytes"].as_u64();
-        assert!(peak.is_none_or(|peak| peak <= 96 << 20), "{peak:?}");
+        assert!(peak.is_none_or(|peak| peak <= 100 << 20), "{peak:?}");
     }
 }

@@ -26,9 +26,28 @@ fn records_come_back_from_octrees_that_kept_all_attributes() {
             let report = export(&dir, "dataset", "out.las", &[]);
             assert_eq!(report["points"]["written"], 2500, "{report}");
             let out = fs::read(dir.path("out.las")).unwrap();
-            assert!(records(&out) == records(&las), "{format} {to:?}: {report}");
+            let (mut found, mut expected) = (records(&out), records(&las));
+            if to[0] == "potree1" {
+                // which has 8 bits for a colour
+                without_colours(&mut found, format);
+                without_colours(&mut expected, format);
+            }
+            let first = found.iter().zip(&expected).find(|(a, b)| a != b);
+            assert!(found == expected, "{format} {to:?}: {first:?}");
         }
     }
+}
+
+/// Zeros for colours.
+fn without_colours(records: &mut [(Vec<i64>, Vec<u8>)], format: u8) {
+    let at = match format {
+        2 => 8,
+        3 | 5 => 16,
+        7 | 8 | 10 => 18,
+        _ => return,
+    };
+    records.iter_mut().for_each(|(_, fields)| fields[at..at + 6].fill(0));
+    records.sort_unstable();
 }
 
 #[test]

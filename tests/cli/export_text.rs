@@ -73,7 +73,9 @@ fn every_value_comes_back_from_ply_and_text() {
             // what stored values mean
             let amplitude: Vec<f64> = scan.column("Amplitude").iter().map(|v| v * 0.01).collect();
             assert_eq!(found.column("Amplitude"), amplitude, "{out}");
-            assert_eq!(found.column("beam_2"), scan.column("beam 2"), "{out}");
+            // text has as many digits as single precision needs
+            let single = |table: &Table, name: &str| table.column(name).iter().map(|v| *v as f32).collect::<Vec<_>>();
+            assert_eq!(single(&found, "beam_2"), single(&scan, "beam 2"), "{out}");
             if format == 8 {
                 let degrees: Vec<f64> = scan.column("scan angle").iter().map(|v| v * 0.006).collect();
                 assert_eq!(found.column("scan angle"), degrees, "{out}");

@@ -27,9 +27,9 @@ impl Depth {
         }
     }
 
-    /// What a sample of colours says; nothing is certain but 16 bits.
-    pub(super) fn of(sample: impl Iterator<Item = u16> + Clone) -> Self {
-        if sample.clone().all(|v| v <= 255) {
+    /// What a sample of colours says; nothing is certain but 16 bits. `is_16_bit`: small values are dark, as some file says.
+    pub(super) fn of(sample: impl Iterator<Item = u16> + Clone, is_16_bit: bool) -> Self {
+        if sample.clone().all(|v| v <= 255) && !is_16_bit {
             Self::Eight
         } else if sample.clone().all(|v| v % 257 == 0) {
             Self::EightTimes257

@@ -165,7 +165,7 @@ impl Job<'_> {
             file.set_len(0, "making the file empty")?;
             let order = Order::new(file, start, self.room.window);
             let reading = Reading::new(plan, sources, intake, None, lattice.lattice);
-            let pass = Pass::new(&reading, &*encoder, target, &order, workers, self.room.part_points);
+            let pass = Pass::new(&reading, &*encoder, target, &order, workers, self.room);
             let counted = pass.run()?;
             drop(pass);
             let (end, parts) = order.end();

@@ -9,6 +9,7 @@ use pointmill_format::{Advice, Changes, PointBatch, Scratch};
 
 use super::encoder::Encoder;
 use super::order::{Order, Part};
+use super::room::Room;
 use super::rows::{Block, Target};
 use super::units::Units;
 use crate::cloud::Stats;
@@ -17,9 +18,6 @@ use crate::gather::{Reading, Rows, Visit, select, stored_columns};
 use crate::plan::OnFault;
 use crate::runtime::Workers;
 use crate::warning::{Warning, reason_of};
-
-/// Parts that a unit keeps while those before it are not written.
-pub(super) const PARTS_KEPT: usize = 4;
 
 /// What a pass over all points has found.
 pub(super) struct Counted {
@@ -38,8 +36,7 @@ pub(super) struct Pass<'a> {
     pub(super) target: Target,
     pub(super) order: &'a Order<'a>,
     pub(super) workers: &'a Workers<'a>,
-    /// Points that are encoded together.
-    pub(super) part_points: usize,
+    room: Room,
     is_misled: AtomicBool,
 }
 
@@ -62,9 +59,9 @@ impl<'a> Pass<'a> {
         target: Target,
         order: &'a Order<'a>,
         workers: &'a Workers<'a>,
-        part_points: usize,
+        room: Room,
     ) -> Self {
-        Self { reading, encoder, target, order, workers, part_points, is_misled: AtomicBool::new(false) }
+        Self { reading, encoder, target, order, workers, room, is_misled: AtomicBool::new(false) }
     }
 
     /// Reads every point.
@@ -182,12 +179,12 @@ impl<'a> Pass<'a> {
         let all = if filtered { Rows::Selected(&selection) } else { Rows::Consecutive(0..batch.len()) };
         let mut start = 0;
         while start < kept {
-            let end = kept.min(start + self.part_points - worker.block.len().min(self.part_points - 1));
+            let end = kept.min(start + self.room.part_points - worker.block.len().min(self.room.part_points - 1));
             self.add(visit, batch, &columns, &all.slice(start..end), worker);
             start = end;
-            if worker.block.len() >= self.part_points {
+            if worker.block.len() >= self.room.part_points {
                 self.encode(worker)?;
-                if worker.parts.len() >= PARTS_KEPT {
+                if worker.parts.len() >= self.room.parts_kept {
                     self.order.write(unit, std::mem::take(&mut worker.parts))?;
                 }
             }

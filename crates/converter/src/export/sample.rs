@@ -15,8 +15,8 @@ use crate::sources::Sources;
 pub(super) fn colour_depth(format: ExportFormat, sources: &Sources, intake: &Intake) -> Result<Depth, ConvertError> {
     let rgb = intake.schema.rgb();
     let coloured = |i: &usize| intake.of(&sources.all[*i]).has(rgb) && sources.all[*i].pieces > 0;
-    let is_wide = rgb.is_none() || sources.all.iter().any(|source| source.rgb_is_16_bit);
-    let first = (0..sources.all.len()).find(coloured).filter(|_| format == ExportFormat::Ply && !is_wide);
+    let is_16_bit = sources.all.iter().any(|source| source.rgb_is_16_bit);
+    let first = (0..sources.all.len()).find(coloured).filter(|_| format == ExportFormat::Ply && rgb.is_some());
     let Some(first) = first else { return Ok(Depth::Sixteen) };
     let scan = sources.scan(first)?;
     let (Ok(wanted), mut depth) = (Wanted::named(scan.info(), ["rgb"]), Depth::Sixteen) else {
@@ -24,7 +24,8 @@ pub(super) fn colour_depth(format: ExportFormat, sources: &Sources, intake: &Int
     };
     // what cannot be read fails when it is read
     let _ = scan.decode(0, &wanted, &mut Scratch::default(), &mut |batch| {
-        depth = batch.column::<u16>("rgb").map_or(Depth::Sixteen, |colours| Depth::of(colours.iter().copied()));
+        depth =
+            batch.column::<u16>("rgb").map_or(Depth::Sixteen, |colours| Depth::of(colours.iter().copied(), is_16_bit));
         ControlFlow::Break(())
     });
     Ok(depth)
