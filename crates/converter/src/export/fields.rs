@@ -22,16 +22,16 @@ impl Depth {
     pub(super) fn byte(self, value: u16) -> Option<u8> {
         match self {
             Self::Eight => u8::try_from(value).ok(),
-            Self::EightTimes257 => (value % 257 == 0).then_some((value / 257) as u8),
+            Self::EightTimes257 => value.is_multiple_of(257).then_some((value / 257) as u8),
             Self::Sixteen => None,
         }
     }
 
     /// What a sample of colours says; nothing is certain but 16 bits. `is_16_bit`: small values are dark, as some file says.
-    pub(super) fn of(sample: impl Iterator<Item = u16> + Clone, is_16_bit: bool) -> Self {
-        if sample.clone().all(|v| v <= 255) && !is_16_bit {
+    pub(super) fn of(sample: &[u16], is_16_bit: bool) -> Self {
+        if sample.iter().all(|v| *v <= 255) && !is_16_bit {
             Self::Eight
-        } else if sample.clone().all(|v| v % 257 == 0) {
+        } else if sample.iter().all(|v| v.is_multiple_of(257)) {
             Self::EightTimes257
         } else {
             Self::Sixteen

@@ -40,7 +40,7 @@ impl LasFile {
 }
 
 /// What only a fault of our own code can bring about.
-fn internal(error: WriteError) -> ConvertError {
+fn internal(error: &WriteError) -> ConvertError {
     ConvertError::Internal(format!("writing LAS: {error}"))
 }
 
@@ -62,7 +62,7 @@ impl Encoder for LasFile {
     }
 
     fn start(&self) -> Result<u64, ConvertError> {
-        self.heading.points_start().map_err(internal)
+        self.heading.points_start().map_err(|e| internal(&e))
     }
 
     fn encode(
@@ -78,15 +78,15 @@ impl Encoder for LasFile {
         layout.put(&block.positions(), &columns, &mut records, changes);
         tally.add(layout, &records);
         match &self.chunks {
-            Some(chunks) => chunks.encode(&records).map(Some).map_err(internal),
+            Some(chunks) => chunks.encode(&records).map(Some).map_err(|e| internal(&e)),
             None => Ok(Some(records)),
         }
     }
 
     fn finish(&self, file: &DiskFile, tally: &Tally, parts: &[(u32, u32)], end: u64) -> Result<u64, ConvertError> {
-        let table = self.chunks.as_ref().map(|chunks| chunks.table(parts)).transpose().map_err(internal)?;
+        let table = self.chunks.as_ref().map(|chunks| chunks.table(parts)).transpose().map_err(|e| internal(&e))?;
         let summary = tally.summary(&self.heading.lattice);
-        let ending = self.heading.finish(&summary, end, &table.unwrap_or_default()).map_err(internal)?;
+        let ending = self.heading.finish(&summary, end, &table.unwrap_or_default()).map_err(|e| internal(&e))?;
         file.write_at(&ending.head, 0, "writing the header")?;
         file.write_at(&ending.tail, ending.tail_start, "writing the end")?;
         Ok(ending.tail_start + ending.tail.len() as u64)

@@ -165,9 +165,7 @@ impl Job<'_> {
             file.set_len(0, "making the file empty")?;
             let order = Order::new(file, start, self.room.window);
             let reading = Reading::new(plan, sources, intake, None, lattice.lattice);
-            let pass = Pass::new(&reading, &*encoder, target, &order, workers, self.room);
-            let counted = pass.run()?;
-            drop(pass);
+            let counted = Pass::new(&reading, &*encoder, target, &order, workers, self.room).run()?;
             let (end, parts) = order.end();
             if !counted.is_misled {
                 if counted.stats.points == 0 {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::scan::resize;
-use crate::{Attribute, Column, NodePoints, PointBatch, Wanted, with_column};
+use crate::{Attribute, Changes, Column, NodePoints, PointBatch, Wanted, with_column};
 
 /// Colours of 8 bits that a reader of datasets gives as 16: each channel times this.
 const CHANNEL: u16 = 257;
@@ -17,15 +17,36 @@ pub(super) struct Columns {
     sources: Vec<Source>,
 }
 
-/// A column of the dataset.
+/// A column of the dataset, and what becomes of it.
 #[derive(Debug, Clone, Copy)]
 struct Source {
     index: usize,
-    /// Colours are taken back to 8 bits.
-    is_8_bit: bool,
+    becomes: Becomes,
+}
+
+/// What becomes of the values of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Becomes {
+    /// What they are.
+    Same,
+    /// 16-bit channels that were made of 8 bits: these again.
+    Eighths,
+    /// Words whose lower bytes are red, green and blue: three channels of 8 bits.
+    Channels,
+    /// Four bytes, of which the first three are red, green and blue.
+    FirstThree,
+    /// Classes as floats: whole numbers of 8 bits.
+    Class,
 }
 
 impl Columns {
+    /// Columns one by one.
+    pub(super) fn list(columns: impl IntoIterator<Item = (Attribute, usize, Becomes)>) -> Self {
+        let (attributes, sources): (Vec<_>, _) =
+            columns.into_iter().map(|(attribute, index, becomes)| (attribute, Source { index, becomes })).unzip();
+        Self { attributes: attributes.into(), sources }
+    }
+
     /// All columns of a dataset but those that `is_made` says are none of the points that it was made from. `renamed`: name in
     /// the dataset → name of the attribute; `is_8_bit`: the colours of the dataset are of 8 bits.
     pub(super) fn new(
@@ -45,7 +66,8 @@ impl Columns {
             if let Some(name) = own_name {
                 attribute.name.clone_from(name);
             }
-            sources.push(Source { index, is_8_bit: is_8_bit && attribute.name == "rgb" });
+            let becomes = if is_8_bit && attribute.name == "rgb" { Becomes::Eighths } else { Becomes::Same };
+            sources.push(Source { index, becomes });
             attributes.push(attribute);
         }
         Self { attributes: attributes.into(), sources }
@@ -57,16 +79,69 @@ impl Columns {
 
     /// Puts the wanted columns of some points into a batch.
     pub(super) fn fill(&self, points: &NodePoints, range: &Range<usize>, wanted: &Wanted, batch: &mut PointBatch) {
-        for (i, (source, out)) in self.sources.iter().zip(&mut batch.columns).enumerate() {
+        for (i, source) in self.sources.iter().enumerate() {
+            let out = &mut batch.columns[i];
             match points.columns().get(source.index).filter(|_| wanted.is_wanted(i)) {
-                Some(column) => copy(column, self.attributes[i].elements, range, out),
+                Some(column) => {
+                    let changes = source.becomes.put(column, self.attributes[i].elements, range, out);
+                    batch.count_changes(i, &changes);
+                }
                 None => out.clear(),
-            }
-            if let (true, Column::UInt16(channels)) = (source.is_8_bit, out) {
-                channels.iter_mut().for_each(|channel| *channel /= CHANNEL);
             }
         }
     }
+}
+
+impl Becomes {
+    /// Puts values of some points into the column of the attribute, which has the right type.
+    fn put(self, from: &Column, elements: usize, range: &Range<usize>, to: &mut Column) -> Changes {
+        let mut changes = Changes::default();
+        match (self, from, to) {
+            (Self::Channels, Column::UInt32(words), Column::UInt16(to)) => {
+                let words = words.get(range.clone()).unwrap_or_default();
+                resize(to, 3 * words.len());
+                for (to, word) in to.as_chunks_mut::<3>().0.iter_mut().zip(words) {
+                    let [r, g, b, _] = word.to_le_bytes();
+                    *to = [r, g, b].map(u16::from);
+                }
+            }
+            (Self::FirstThree, Column::UInt8(bytes), Column::UInt16(to)) => {
+                let some = bytes.get(4 * range.start..4 * range.end).unwrap_or_default().as_chunks::<4>().0;
+                resize(to, 3 * some.len());
+                for (to, [r, g, b, _]) in to.as_chunks_mut::<3>().0.iter_mut().zip(some) {
+                    *to = [*r, *g, *b].map(u16::from);
+                }
+            }
+            (Self::Class, Column::Float32(classes), Column::UInt8(to)) => {
+                let some = classes.get(range.clone()).unwrap_or_default();
+                resize(to, some.len());
+                to.iter_mut().zip(some).for_each(|(to, class)| *to = class_of(*class, &mut changes));
+            }
+            (becomes, from, to) => {
+                copy(from, elements, range, to);
+                if let (Self::Eighths, Column::UInt16(channels)) = (becomes, to) {
+                    channels.iter_mut().for_each(|channel| *channel /= CHANNEL);
+                }
+            }
+        }
+        changes
+    }
+}
+
+/// A class of 8 bits; what is none is 0, and counted.
+fn class_of(class: f32, changes: &mut Changes) -> u8 {
+    let rounded = class.round();
+    match () {
+        () if !class.is_finite() => changes.not_finite += 1,
+        () if !(0.0..=255.0).contains(&rounded) => changes.leave_out(class.into()),
+        () => {
+            if rounded != class {
+                changes.round(class.into());
+            }
+            return rounded as u8;
+        }
+    }
+    0
 }
 
 /// Values of some points; the columns are of one type.
@@ -83,6 +158,26 @@ fn copy(from: &Column, elements: usize, range: &Range<usize>, to: &mut Column) {
 mod tests {
     use super::*;
     use crate::AttributeType;
+
+    #[test]
+    fn colours_are_taken_from_words_and_from_bytes() {
+        let mut rgb = Column::UInt16(Vec::new());
+        Becomes::Channels.put(&Column::UInt32(vec![0, 0x0332_64c8]), 3, &(1..2), &mut rgb);
+        assert_eq!(rgb, Column::UInt16(vec![200, 100, 50]));
+        Becomes::FirstThree.put(&Column::UInt8(vec![1, 2, 3, 255, 4, 5, 6, 255]), 3, &(0..2), &mut rgb);
+        assert_eq!(rgb, Column::UInt16(vec![1, 2, 3, 4, 5, 6]));
+        Becomes::Eighths.put(&Column::UInt16(vec![257, 65_535, 0]), 3, &(0..1), &mut rgb);
+        assert_eq!(rgb, Column::UInt16(vec![1, 255, 0]));
+    }
+
+    #[test]
+    fn classes_are_whole_numbers_and_others_are_counted() {
+        let mut classes = Column::UInt8(Vec::new());
+        let floats = Column::Float32(vec![9.0, 2.0, 255.0, 256.0, -1.0, f32::NAN, 6.4]);
+        let changes = Becomes::Class.put(&floats, 1, &(1..7), &mut classes);
+        assert_eq!(classes, Column::UInt8(vec![2, 255, 0, 0, 0, 6]));
+        assert_eq!((changes.out_of_range, changes.not_finite, changes.rounded), (2, 1, 1));
+    }
 
     #[test]
     fn names_come_back_unless_another_attribute_has_them() {

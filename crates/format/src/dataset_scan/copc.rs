@@ -8,8 +8,7 @@ use crate::{OpenOptions, ReadError, Scan};
 
 use super::columns::Columns;
 use super::described::{Described, NodeMemory, advised};
-use super::nodes;
-use super::octree_scan::OctreeScan;
+use super::{nodes, octree_nodes};
 
 /// What a decompressor keeps.
 const LAZ_BYTES: u64 = 8 << 20;
@@ -29,7 +28,7 @@ pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, 
         }
     }
     let described = described(path, &dataset);
-    Ok(Box::new(OctreeScan::new(Box::new(dataset), described, nodes)))
+    Ok(octree_nodes::scan(dataset, described, nodes))
 }
 
 fn described(path: &Path, dataset: &Dataset) -> Described {

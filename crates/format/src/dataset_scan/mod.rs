@@ -1,16 +1,19 @@
 //! Datasets as scans: the points of a dataset are decoded in pieces, as those of any other scan, and a converter need not
 //! know where they come from.
 //!
-//! It stands above the readers of datasets, which know nothing of it. `octree_scan.rs` is the scan of any octree; a file for
+//! It stands above the readers of datasets, which know nothing of it. `node_scan.rs` is the scan of them all; a file for
 //! each format says what of it becomes which attribute, and on what lattice its positions are.
 
+mod batches;
+mod bintree;
 mod columns;
 #[cfg(feature = "las")]
 mod copc;
 mod crs;
 mod described;
+mod node_scan;
 mod nodes;
-mod octree_scan;
+mod octree_nodes;
 mod own_key;
 mod pieces;
 mod placing;
@@ -32,7 +35,9 @@ pub(crate) fn open(located: &Located, options: &OpenOptions) -> Result<Box<dyn S
         DatasetKind::Potree2 => potree2::open(path, options),
         DatasetKind::Potree1 => potree1::open(path, options),
         _ if options.has_levels() => Err(no_levels(path)),
-        other => Err(ReadError::unsupported(path, format!("a {}, which is not read as a scan", other.title()))),
+        DatasetKind::Bintree => bintree::open(path, options),
+        DatasetKind::Batches => batches::open(path),
+        DatasetKind::Copc => Err(ReadError::unsupported(path, "a COPC file is read as the LAZ file that it is")),
     }
 }
 

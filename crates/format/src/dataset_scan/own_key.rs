@@ -16,6 +16,11 @@ impl<'a> OwnKey<'a> {
         Self(extra.get("pointmill").and_then(Value::as_object))
     }
 
+    /// The key itself.
+    pub(super) const fn of_map(own: &'a Map<String, Value>) -> Self {
+        Self(Some(own))
+    }
+
     pub(super) fn is_there(self) -> bool {
         self.0.is_some()
     }

@@ -88,8 +88,17 @@ pub(super) fn with_offset(lattice: &Lattice, offset: [f64; 3], bounds: &crate::A
     (moved.is_valid() && (0..3).all(is_whole) && fits(&moved, bounds)).then_some(moved)
 }
 
+/// `lattice`, moved by whole steps where the integers of `bounds` would not fit 32 bits; `None`: they do not fit wherever it is.
+pub(super) fn held(lattice: &Lattice, bounds: &crate::Aabb) -> Option<Lattice> {
+    if fits(lattice, bounds) {
+        return Some(*lattice);
+    }
+    let corner = std::array::from_fn(|axis| lattice.quantize(axis, bounds.min[axis]));
+    with_offset(lattice, lattice.world(corner), bounds)
+}
+
 /// True if all of `bounds` (world units) has 32-bit coordinates.
-pub(super) fn fits(lattice: &Lattice, bounds: &crate::Aabb) -> bool {
+fn fits(lattice: &Lattice, bounds: &crate::Aabb) -> bool {
     let is_i32 = |axis: usize, v: f64| i32::try_from(lattice.quantize(axis, v)).is_ok();
     (0..3).all(|axis| is_i32(axis, bounds.min[axis]) && is_i32(axis, bounds.max[axis]))
 }
@@ -125,6 +134,16 @@ mod tests {
         assert_eq!(placed(&beyond, &scan), None);
         let finer = node(Lattice { scale: [0.000_01; 3], offset: [500_000.0, 0.0, 0.0] }, vec![1_000, 2_249]);
         assert_eq!(placed(&finer, &scan), Some(vec![1, 2]));
+    }
+
+    #[test]
+    fn a_lattice_far_away_is_moved() {
+        let far = Lattice { scale: [0.001; 3], offset: [0.0; 3] };
+        let near = Aabb { min: [4_428_000.0; 3], max: [4_428_100.0; 3] };
+        assert_eq!(held(&far, &near).map(|l| l.offset), Some([4_428_000.0; 3]));
+        let wide = Aabb { min: [0.0; 3], max: [4_428_000.0; 3] };
+        assert_eq!(held(&far, &wide), None);
+        assert_eq!(held(&far, &Aabb { min: [0.0; 3], max: [1.0; 3] }), Some(far));
     }
 
     #[test]

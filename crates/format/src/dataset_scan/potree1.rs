@@ -9,10 +9,9 @@ use crate::{Aabb, Lattice, NodeKey, OpenOptions, ReadError, Scan};
 use super::columns::Columns;
 use super::crs::crs_of;
 use super::described::{Described, NodeMemory, advised, file_bytes};
-use super::nodes;
-use super::octree_scan::OctreeScan;
 use super::own_key::OwnKey;
-use super::placing::{fits, with_offset};
+use super::placing::held;
+use super::{nodes, octree_nodes};
 
 /// What the decompressor of LAZ files keeps.
 const LAZ_BYTES: u64 = 8 << 20;
@@ -32,7 +31,7 @@ pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, 
         let found = nodes.iter().map(|node| node.points).sum();
         described.compare_count(dataset.metadata().points, found);
     }
-    Ok(Box::new(OctreeScan::new(Box::new(dataset), described, nodes)))
+    Ok(octree_nodes::scan(dataset, described, nodes))
 }
 
 /// Where a node stands if each is followed by its descendants: files of one folder are read one after the other.
@@ -102,8 +101,7 @@ fn made_colours(own: OwnKey<'_>, dataset: &Dataset) -> bool {
 /// there.
 fn lattice(metadata: &Metadata, own: OwnKey<'_>, bounds: &Aabb, depth: u8) -> Option<Lattice> {
     if let Some(job) = own.lattice() {
-        let corner = std::array::from_fn(|a| job.quantize(a, metadata.cube.min[a]));
-        return Some(job).filter(|job| fits(job, bounds)).or_else(|| with_offset(&job, job.world(corner), bounds));
+        return held(&job, bounds);
     }
     let steps = metadata.cube.extent().map(|side| side / metadata.scale);
     let is_whole = |steps: &f64| {
@@ -112,7 +110,7 @@ fn lattice(metadata: &Metadata, own: OwnKey<'_>, bounds: &Aabb, depth: u8) -> Op
         nearest > 0.0 && (steps - nearest).abs() <= nearest * 4.0 * f64::EPSILON
     };
     let own = Lattice { scale: [metadata.scale; 3], offset: metadata.cube.min };
-    (steps.iter().all(is_whole) && fits(&own, bounds)).then_some(own)
+    held(&own, bounds).filter(|_| steps.iter().all(is_whole))
 }
 
 #[cfg(test)]

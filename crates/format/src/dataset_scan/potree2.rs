@@ -9,10 +9,9 @@ use crate::{Aabb, Lattice, OpenOptions, ReadError, Scan};
 use super::columns::Columns;
 use super::crs::crs_of;
 use super::described::{Described, NodeMemory, advised, file_bytes};
-use super::nodes;
-use super::octree_scan::OctreeScan;
 use super::own_key::OwnKey;
 use super::placing::with_offset;
+use super::{nodes, octree_nodes};
 
 /// What a decompressor keeps: the window, and its tables.
 const BROTLI_BYTES: u64 = 8 << 20;
@@ -31,7 +30,7 @@ pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, 
         let found = nodes.iter().map(|node| node.points).sum();
         described.compare_count(Some(dataset.metadata().points), found);
     }
-    Ok(Box::new(OctreeScan::new(Box::new(dataset), described, nodes)))
+    Ok(octree_nodes::scan(dataset, described, nodes))
 }
 
 /// No byte is the payload of two nodes: or a small file could be a scan without an end. Payloads are in the file, and records

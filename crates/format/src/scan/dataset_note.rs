@@ -11,11 +11,22 @@ pub enum DatasetNote {
     PointsDiffer { declared: u64, found: u64 },
     /// The projection is neither a proj4 definition nor a code nor WKT; its start.
     ProjectionUnknown { start: String },
+    /// Positions are stored more coarsely than the lattice of the points: off by at most so much on each axis, world units.
+    Inexact { most: [f64; 3] },
+    /// Colours of points of coarse levels are means, and what they were is not in the file.
+    ColoursAveraged,
 }
 
 impl fmt::Display for DatasetNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Inexact { most: [x, y, z] } => write!(
+                f,
+                "its positions are up to {x:e}, {y:e}, {z:e} off in x, y, z: more than half a step of the points' own lattice"
+            ),
+            Self::ColoursAveraged => f.write_str(
+                "the colours of points of its coarse levels are means of their cells; the file does not have their own colours",
+            ),
             Self::PointsDiffer { declared, found } => {
                 write!(f, "its description declares {declared} points; the {found} of its nodes are read")
             }

@@ -7,23 +7,23 @@ use pointmill_format::{OpenOptions, ReadError, Scan, open_scan};
 use pointmill_testkit::files::{dataset, fixture};
 use pointmill_testkit::reader::{Cloud, Reader};
 
-pub const READER: Reader = Reader {
+pub(crate) const READER: Reader = Reader {
     open: |path| open_scan(path, &OpenOptions::default()),
     max_points: |bytes| bytes,
     max_decoded: |bytes| bytes,
 };
 
 /// Opens what is expected to be no scan.
-pub fn refused(path: &Path, options: &OpenOptions) -> ReadError {
+pub(crate) fn refused(path: &Path, options: &OpenOptions) -> ReadError {
     open_scan(path, options).err().unwrap_or_else(|| panic!("{} is opened", path.display()))
 }
 
-pub fn open(name: &str, options: &OpenOptions) -> Box<dyn Scan> {
+pub(crate) fn open(name: &str, options: &OpenOptions) -> Box<dyn Scan> {
     open_scan(fixture(name), options).unwrap()
 }
 
 /// A copy of a dataset, some of whose files are changed.
-pub fn changed(name: &str, change: impl Fn(&str, &mut Vec<u8>)) -> (tempfile::TempDir, PathBuf) {
+pub(crate) fn changed(name: &str, change: impl Fn(&str, &mut Vec<u8>)) -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("dataset");
     for (name, mut bytes) in dataset(&fixture(name)) {
@@ -36,7 +36,7 @@ pub fn changed(name: &str, change: impl Fn(&str, &mut Vec<u8>)) -> (tempfile::Te
 }
 
 /// A point: its integers, then the values of all columns.
-pub fn records(cloud: &Cloud) -> Vec<Vec<f64>> {
+pub(crate) fn records(cloud: &Cloud) -> Vec<Vec<f64>> {
     let columns: Vec<Vec<f64>> = cloud.info.attributes.iter().map(|a| cloud.values(&a.name)).collect();
     let record = |i: usize| {
         let mut record: Vec<f64> = cloud.xyz.iter().map(|axis| axis[i]).collect();

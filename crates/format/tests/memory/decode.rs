@@ -8,7 +8,7 @@ use crate::counting::peak_of;
 use crate::scenes::{self, Scene};
 
 /// The most that decoding one of the first pieces takes, each with memory of its own, when the next one will follow.
-fn taken(scan: &dyn Scan, wanted: &Wanted) -> u64 {
+pub(crate) fn taken(scan: &dyn Scan, wanted: &Wanted) -> u64 {
     let decode = |piece: usize| {
         let decoded = || {
             let scratch = &mut Scratch::default();

@@ -3,6 +3,7 @@
 
 mod batches;
 mod counting;
+mod datasets;
 mod decode;
 mod hostile;
 mod scenes;
