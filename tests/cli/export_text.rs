@@ -22,6 +22,7 @@ impl Table {
     }
 }
 
+#[allow(clippy::unnecessary_cast)] // one body for every type of column
 fn read(dir: &Dir, file: &str) -> Table {
     let scan = open_scan(dir.path(file), &OpenOptions::default()).unwrap();
     let info = scan.info().clone();

@@ -24,8 +24,7 @@ pub(super) fn colour_depth(format: ExportFormat, sources: &Sources, intake: &Int
     };
     // what cannot be read fails when it is read
     let _ = scan.decode(0, &wanted, &mut Scratch::default(), &mut |batch| {
-        depth =
-            batch.column::<u16>("rgb").map_or(Depth::Sixteen, |colours| Depth::of(colours, is_16_bit));
+        depth = batch.column::<u16>("rgb").map_or(Depth::Sixteen, |colours| Depth::of(colours, is_16_bit));
         ControlFlow::Break(())
     });
     Ok(depth)
