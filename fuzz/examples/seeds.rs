@@ -10,6 +10,7 @@ fn main() -> io::Result<()> {
     for (target, folder, endings) in [
         ("las", "las", &["las", "laz"][..]),
         ("copc", "copc", &["laz"]),
+        ("copc_validate", "copc", &["laz"]),
         ("e57", "e57", &["e57"]),
         ("ply", "rows", &["ply"]),
         ("pcd", "rows", &["pcd"]),

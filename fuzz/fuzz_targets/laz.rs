@@ -85,7 +85,7 @@ fn layered_chunk(file: &mut Vec<u8>, input: &[u8], points: u32, record_len: u16,
     file.extend(first);
     file.extend(vec![0; usize::from(record_len) - first.len()]);
     file.extend(points.to_le_bytes());
-    let mut layers_data = Vec::new();
+    let mut layers_data: Vec<u8> = Vec::new();
     for layer in 0..usize::from(layers) {
         let size = sizes.get(layer).map_or(0, |size| usize::from(*size)).min(data.len());
         let (this, behind) = data.split_at(size);

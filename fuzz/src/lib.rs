@@ -28,7 +28,10 @@ pub fn read(bytes: &[u8], open: Open) {
 }
 
 /// The bytes as a file: readers open paths. One file for the process, in memory where the system has a place for that.
-fn write(bytes: &[u8]) -> &'static Path {
+///
+/// # Panics
+/// If the file cannot be written.
+pub fn write(bytes: &[u8]) -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     let path = PATH.get_or_init(|| {
         let memory = Path::new("/dev/shm");

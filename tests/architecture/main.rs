@@ -51,7 +51,7 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
             &["options", "accuracy", "outcome"],
             &["against"],
             &["octree"],
-            &["potree1", "potree2", "bintree", "batches"],
+            &["copc", "potree1", "potree2", "bintree", "batches"],
         ],
     ),
     (

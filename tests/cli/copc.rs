@@ -52,3 +52,31 @@ fn a_broken_hierarchy_is_an_error_of_info_and_no_obstacle_to_reading_the_scan() 
     dir.succeed(["convert", "broken.copc.laz", "-o", "out", "-q"]);
     assert_eq!(dir.report("out")["outputs"][0]["points"], 22);
 }
+
+#[test]
+fn a_copc_file_is_validated_by_its_content_also_against_itself_as_a_scan() {
+    let dir = Dir::new();
+    let bytes = fixture_bytes("copc/pages.copc.laz");
+    dir.write("tile.laz", &bytes);
+    let text = dir.succeed(["validate", "tile.laz", "--against", "tile.laz"]).stdout();
+    for words in ["tile.laz: copc laz, 22 points in 7 nodes", "ok       chunks", "1 scan: 22 points expected, 22 found"]
+    {
+        assert!(text.contains(words), "{words} is not in {text}");
+    }
+    let ended = dir.succeed(["validate", "tile.laz", "--fast", "--json"]);
+    let outcome: Value = serde_json::from_str(&ended.stdout()).unwrap();
+    assert_eq!((&outcome["format"], &outcome["points"], &outcome["nodes"]), (&json!("copc"), &json!(22), &json!(7)));
+    assert_eq!(outcome["checks"].as_array().unwrap().len(), 19);
+
+    let mut broken = bytes;
+    // the header counts another point
+    put(&mut broken, 247, &23u64.to_le_bytes());
+    dir.write("broken.copc.laz", &broken);
+    let ended = dir.run(["validate", "broken.copc.laz", "-q"]);
+    assert_eq!(ended.code(), 7);
+    assert!(ended.stdout().contains("point-count: points: expected 22, found 23"), "{}", ended.stdout());
+    dir.write("none.copc.laz", b"LASF");
+    let ended = dir.run(["validate", "none.copc.laz"]);
+    assert_eq!(ended.code(), 7);
+    assert!(ended.stdout().contains("bytes of the file"), "{}", ended.stdout());
+}

@@ -56,6 +56,13 @@ pub enum Check {
     IndexFiles,
     NodeFiles,
     NodeCounts,
+    Records,
+    OctreeInfo,
+    Pages,
+    Chunks,
+    Returns,
+    GpsTime,
+    ColourDepth,
     Report,
 }
 
@@ -70,6 +77,7 @@ impl Check {
             DatasetKind::Potree1 => Self::POTREE1,
             DatasetKind::Bintree => Self::BINTREE,
             DatasetKind::Batches => Self::BATCHES,
+            DatasetKind::Copc => Self::COPC,
             _ => &[],
         }
     }
@@ -160,6 +168,29 @@ impl Check {
         Self::Accuracy,
     ];
 
+    /// The checks of COPC.
+    pub(crate) const COPC: &[Self] = &[
+        Self::Header,
+        Self::Records,
+        Self::OctreeInfo,
+        Self::Pages,
+        Self::PointCount,
+        Self::Chunks,
+        Self::Payloads,
+        Self::Boxes,
+        Self::TightBox,
+        Self::Returns,
+        Self::GpsTime,
+        Self::ColourDepth,
+        Self::AttributeRanges,
+        Self::Spacing,
+        Self::Seams,
+        Self::Coverage,
+        Self::Against,
+        Self::Report,
+        Self::Accuracy,
+    ];
+
     /// Its place among all checks.
     pub(crate) const fn index(self) -> usize {
         self as usize
@@ -217,6 +248,13 @@ impl Check {
             Self::IndexFiles => "index-files",
             Self::NodeFiles => "node-files",
             Self::NodeCounts => "node-counts",
+            Self::Records => "records",
+            Self::OctreeInfo => "info",
+            Self::Pages => "pages",
+            Self::Chunks => "chunks",
+            Self::Returns => "returns",
+            Self::GpsTime => "gps-time",
+            Self::ColourDepth => "colour-depth",
             Self::Report => "report",
         }
     }
@@ -278,6 +316,15 @@ impl Check {
             }
             Self::NodeFiles => "every node has a file of whole records, and no other file is there",
             Self::NodeCounts => "the index states as many points of a node as its file holds",
+            Self::Records => "records are whole, the info record is the first, and LASzip's has what the header says",
+            Self::OctreeInfo => {
+                "the info record has a cube that holds the bounds, a spacing, and zeros behind its fields"
+            }
+            Self::Pages => "hierarchy pages are disjoint, and every node is in them once, with its parent",
+            Self::Chunks => "every chunk is that of one node, without gaps, and the chunk table says the same of it",
+            Self::Returns => "the header counts the points of every return",
+            Self::GpsTime => "the GPS times of the info record bound those of the points and are attained",
+            Self::ColourDepth => "colours have 16 bits",
             Self::Report => "the report of the conversion names this dataset, with its points and nodes",
             Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }

@@ -29,6 +29,7 @@ mod against;
 mod batches;
 mod bintree;
 mod check;
+mod copc;
 mod finding;
 mod memory;
 mod octree;
@@ -66,6 +67,7 @@ pub fn validate(dataset: &Path, options: &Options, progress: &ProgressFn<'_>) ->
         DatasetKind::Potree1 => potree1::run(&path, options, progress),
         DatasetKind::Bintree => bintree::run(&path, options, progress),
         DatasetKind::Batches => batches::run(&path, options, progress),
+        DatasetKind::Copc => copc::run(&path, options, progress),
         other => Err(ReadError::unsupported(&path, format!("datasets of kind {other} cannot be validated"))),
     })
 }

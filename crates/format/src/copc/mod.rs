@@ -29,6 +29,7 @@ mod octree;
 mod page;
 mod write;
 
+pub use crate::scan::las::chunk_table_entries;
 pub use dataset::Dataset;
 pub use detect::{FIRST_BYTES, detect, is_copc};
 pub use entry::Entry;

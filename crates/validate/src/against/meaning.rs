@@ -16,6 +16,15 @@ pub(super) struct Feed {
     pub(super) exact: bool,
 }
 
+/// Degrees of a step of angles in LAS formats 6 to 10.
+const FINE: f64 = 0.006;
+
+/// Angles in degrees as the nearest steps of 0.006.
+pub(super) fn fine_angles(degrees: &Column) -> Column {
+    let degrees = degrees.values::<f64>().unwrap_or_default();
+    Column::Int16(degrees.iter().map(|d| (d / FINE).round() as i16).collect())
+}
+
 /// What stored values mean: (stored · scale + offset) · unit.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Meaning {
@@ -30,7 +39,7 @@ impl Meaning {
         // LAS formats 6 to 10 count angles in steps of 0.006 degrees
         let is_fine = attribute.name == "scan angle" && attribute.ty == AttributeType::Int16;
         let is_plain = attribute.scale.iter().all(|s| *s == 1.0) && attribute.offset.iter().all(|o| *o == 0.0);
-        let unit = if is_fine && is_plain { 0.006 } else { 1.0 };
+        let unit = if is_fine && is_plain { FINE } else { 1.0 };
         Self { scale: attribute.scale.clone(), offset: attribute.offset.clone(), unit }
     }
 
@@ -112,6 +121,17 @@ mod tests {
         assert_eq!(column(&Attribute::new("scan angle", T::Float64, 1), &columns), Some(1));
         assert_eq!(column(&Attribute::new("rgb", T::UInt16, 3), &columns), Some(2));
         assert_eq!(column(&Attribute::new("rgb (2)", T::Float32, 3), &columns), None);
+    }
+
+    #[test]
+    fn angles_become_fine_from_whole_degrees_and_stay_so() {
+        let rank = Meaning::of(&Attribute::new("scan angle rank", T::Int8, 1));
+        let meant = rank.values(&Column::Int8(vec![-10, 4, 0, 127]), 0, 4);
+        assert_eq!(fine_angles(&meant), Column::Int16(vec![-1667, 667, 0, 21_167]));
+        let fine = Meaning::of(&Attribute::new("scan angle", T::Int16, 1));
+        let all: Vec<i16> = (-30_000..=30_000).collect();
+        let meant = fine.values(&Column::Int16(all.clone()), 0, all.len());
+        assert_eq!(fine_angles(&meant), Column::Int16(all));
     }
 
     #[test]

@@ -8,8 +8,8 @@ use pointmill_format::{Attribute, AttributeType, AxisGrid, Column, PointBatch, P
 use super::block::{Block, append_exact_words, append_words};
 use super::distinct::Residue;
 use super::exact::Exact;
-use super::meaning::{Feed, Meaning, feed};
-use super::rules::Conversion::{self, AsStored, Grey, WholeClass};
+use super::meaning::{Feed, Meaning, feed, fine_angles};
+use super::rules::Conversion::{self, AsStored, FineAngle, Grey, WholeClass};
 use super::rules::{Rules, grey};
 use super::selection::Selection;
 
@@ -142,11 +142,15 @@ impl Opened {
             if rules.conversions[i] == WholeClass {
                 let class = Attribute::new("classification", AttributeType::Float64, 1);
                 append_words(feed.map(|f| (&batch.columns[f.column], f.elements)), start, points, &class, words);
+            } else if let (FineAngle, Some(f)) = (rules.conversions[i], feed) {
+                let meaning = Meaning::of(&self.scan.info().attributes[f.column]);
+                let fine = fine_angles(&meaning.values(&batch.columns[f.column], start, points));
+                append_words(Some((&fine, f.elements)), 0, points, attribute, words);
             } else {
                 append_feed(feed, batch, start..start + points, (attribute, all.rounds[i]), words);
             }
             match rules.conversions[i] {
-                AsStored => {}
+                AsStored | FineAngle => {}
                 WholeClass => words.iter_mut().for_each(|w| *w = whole_class(*w)),
                 Grey(range) => words.iter_mut().for_each(|w| *w = grey(*w, range)),
             }

@@ -56,6 +56,8 @@ pub(crate) enum Conversion {
     AsStored,
     /// A class as a float: rounded to a whole number; 0 where there is none, it is not finite or beyond ±2²⁴.
     WholeClass,
+    /// An angle in the steps of LAS formats 6 to 10, 0.006 degrees: the nearest to what is meant.
+    FineAngle,
     /// The grey of an integer among values from the first to the second number:
     /// ((v − lo) · 255 + (hi − lo) / 2) / (hi − lo), and 255 if they are the same.
     Grey([u64; 2]),

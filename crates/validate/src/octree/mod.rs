@@ -3,11 +3,13 @@
 //!
 //! A format reads its index into a [`tree::Tree`], implements [`walk::Nodes`], and has its nodes looked at ([`look::Look`]).
 
+pub(crate) mod blocks;
 mod cache;
 pub(crate) mod coverage;
 pub(crate) mod expect;
 pub(crate) mod first_view;
 pub(crate) mod grid;
+pub(crate) mod lattices;
 pub(crate) mod look;
 pub(crate) mod node_points;
 pub(crate) mod quality;

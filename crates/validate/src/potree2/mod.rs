@@ -16,7 +16,6 @@
 //! [`Options::memory_bytes`]. Fewer threads work where all do not fit.
 
 mod checks;
-mod lattices;
 mod nodes;
 mod records;
 mod tree;
@@ -35,13 +34,13 @@ use crate::finding::{Finding, Findings};
 use crate::memory::{self, Budget};
 use crate::octree::expect::Geometry;
 use crate::octree::first_view;
+use crate::octree::lattices::Lattices;
 use crate::octree::look::Look;
 use crate::octree::spacing::Sampling;
 use crate::octree::tree::{NODE_BYTES, Tree, TreeNode};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::Outcome;
 use crate::report;
-use lattices::Lattices;
 use nodes::Nodes;
 use records::Records;
 

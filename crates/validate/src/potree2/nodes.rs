@@ -6,12 +6,12 @@ use pointmill_format::potree2::{Dataset, Encoding, Node};
 use pointmill_format::{NodePoints, ReadError};
 
 use super::checks::ranges::Seen;
-use super::lattices::Lattices;
-use super::records::fill_blocks;
 use crate::accuracy::{Deviation, Ordered};
 use crate::against::Sums;
 use crate::finding::Findings;
+use crate::octree::blocks::fill_blocks;
 use crate::octree::expect::Geometry;
+use crate::octree::lattices::Lattices;
 use crate::octree::node_points;
 use crate::octree::tree::TreeNode;
 use crate::octree::walk;

@@ -4,8 +4,9 @@ use pointmill_format::potree2::{Dataset, Node};
 use pointmill_format::{NodePoints, ReadError};
 use rayon::prelude::*;
 
-use crate::against::block::{BLOCK_POINTS, Block, append_words};
-use crate::against::{self, Rules, Sink};
+use crate::against::block::Block;
+use crate::against::{self, Rules};
+use crate::octree::blocks::fill_blocks;
 use crate::octree::tree::Tree;
 use crate::place::Place;
 
@@ -26,22 +27,5 @@ impl against::Records for Records<'_> {
             fill_blocks(points, rules, block, &mut |block| work(block, node.key.into()));
             Ok(())
         })
-    }
-}
-
-/// Hands over a node's records in blocks.
-pub(crate) fn fill_blocks(points: &NodePoints, rules: &Rules, block: &mut Block, sink: &mut Sink<'_>) {
-    for start in (0..points.len()).step_by(BLOCK_POINTS) {
-        let n = (points.len() - start).min(BLOCK_POINTS);
-        block.reset(rules.attributes.len());
-        block.keep.resize(n, true);
-        for (to, from) in block.positions.iter_mut().zip(points.quantized().unwrap_or_default()) {
-            to.extend(from[start..start + n].iter().map(|v| i64::from(*v)));
-        }
-        for (i, attribute) in rules.attributes.iter().enumerate() {
-            let column = points.columns().get(i).map(|c| (c, attribute.elements));
-            append_words(column, start, n, attribute, &mut block.words[i]);
-        }
-        sink(block);
     }
 }

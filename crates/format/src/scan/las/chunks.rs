@@ -264,7 +264,8 @@ impl ChunkFile {
 
 /// Points and bytes of the chunks of a chunk table that gives both, its head of 8 bytes included; `None` if it is none, or
 /// has more entries than bytes allow.
-pub(crate) fn chunk_table_entries(table: &[u8]) -> Option<Vec<(u32, u32)>> {
+#[must_use]
+pub fn chunk_table_entries(table: &[u8]) -> Option<Vec<(u32, u32)>> {
     let (head, coded) = table.split_first_chunk::<8>()?;
     let (version, count) = (u32_at(head, 0), u32_at(head, 4) as usize);
     (version == 0 && count <= MAX_CHUNKS as usize).then(|| decode_entries(coded, count, true)).flatten()

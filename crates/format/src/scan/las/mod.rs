@@ -68,7 +68,8 @@ use front::Front;
 use laszip::LaszipRecord;
 use pieces::Planner;
 
-pub(crate) use chunks::{ChunkFile, ChunkPlace, chunk_table_entries};
+pub use chunks::chunk_table_entries;
+pub(crate) use chunks::{ChunkFile, ChunkPlace};
 pub use header::is_las;
 
 /// Scans opened so far: each has a number of its own.
