@@ -116,9 +116,10 @@ impl RecordLayout {
         }
     }
 
-    /// The name in its 32 bytes, with a number if another one has it.
+    /// The name in its 32 bytes, with a number if another one has it, or a field of the point format, which is there in any case.
     fn free_name(&self, wanted: &str) -> String {
-        let is_free = |name: &str| self.extra.iter().all(|other| other.name != name);
+        let fields = Schema::of_format(self.point_format).attributes;
+        let is_free = |name: &str| self.extra.iter().chain(&fields).all(|other| other.name != name);
         let cut = cut_name(wanted, MAX_NAME);
         if is_free(cut) {
             return cut.to_owned();
