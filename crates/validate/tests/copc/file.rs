@@ -51,12 +51,14 @@ pub(crate) struct Writer {
     pub(crate) has_extra: bool,
     /// Planted: the chunk table has the first two chunks the other way round.
     pub(crate) turns_table: bool,
+    /// Planted: points of a node stay in the order of the cloud, whatever their times are.
+    pub(crate) is_unsorted: bool,
 }
 
 impl Default for Writer {
     fn default() -> Self {
         let own = json!({ "version": "0.1.0", "sampling": "poisson", "rgbDepth": "auto", "duplicates": "keep" });
-        Self { software: "pointmill 0.1.0", own: Some(own), has_extra: false, turns_table: false }
+        Self { software: "pointmill 0.1.0", own: Some(own), has_extra: false, turns_table: false, is_unsorted: false }
     }
 }
 
@@ -145,7 +147,13 @@ impl Writer {
             .nodes
             .iter()
             .filter(|(_, points)| !points.is_empty())
-            .map(|(k, p)| (*k, p.len() as i32, p.iter().flat_map(|p| record(p, self.has_extra)).collect()))
+            .map(|(k, p)| {
+                let mut points = p.clone();
+                if !self.is_unsorted {
+                    points.sort_by(|a, b| a.gps_time.total_cmp(&b.gps_time));
+                }
+                (*k, p.len() as i32, points.iter().flat_map(|p| record(p, self.has_extra)).collect())
+            })
             .collect();
         let mut bytes = vec![0; 375];
         let mut records = head("copc", 1, 160, false);

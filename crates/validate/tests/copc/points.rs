@@ -75,6 +75,31 @@ fn the_range_of_gps_times() {
 }
 
 #[test]
+fn points_of_a_node_are_in_the_order_of_time() {
+    let mut cloud = Cloud::new(Sampler::Poisson);
+    for points in cloud.nodes.values_mut() {
+        points.sort_by(|a, b| b.gps_time.total_cmp(&a.gps_time));
+    }
+    let ours = Writer { is_unsorted: true, ..Writer::default() };
+    assert_only(&ours.encode(&cloud).validate(), Check::GpsTime, 1);
+    let theirs = Writer { software: "another", own: None, ..ours };
+    let outcome = theirs.encode(&cloud).validate();
+    assert!(outcome.ok && outcome.problems.iter().any(|p| p.check == Check::GpsTime), "{:#?}", outcome.problems);
+}
+
+#[test]
+fn gps_times_that_are_no_numbers_are_a_warning() {
+    let mut cloud = Cloud::new(Sampler::Poisson);
+    let mut times = cloud.nodes.values_mut().flatten().map(|p| &mut p.gps_time);
+    *times.nth(3).unwrap() = f64::NAN;
+    *times.nth(3).unwrap() = f64::NEG_INFINITY;
+    let outcome = Writer::default().encode(&cloud).validate();
+    assert!(outcome.ok, "{:#?}", outcome.problems);
+    let found: Vec<_> = outcome.problems.iter().map(|p| (p.check, p.severity, p.points)).collect();
+    assert_eq!(found, [(Check::GpsTime, Severity::Warning, Some(2))]);
+}
+
+#[test]
 fn colours_of_8_bits_are_a_warning() {
     let mut cloud = Cloud::new(Sampler::Poisson);
     cloud.nodes.values_mut().flatten().for_each(|p| p.rgb = p.rgb.map(|v| v >> 8));
