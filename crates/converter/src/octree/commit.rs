@@ -126,7 +126,7 @@ impl<'a, S: NodeSink> Committer<'a, S> {
             loop {
                 let next = state.next;
                 let Some(unit) = state.waiting.remove(&next) else { break };
-                state.append(unit, encoder.row_bytes(), &mut ready)?;
+                state.append(unit, &*encoder, &mut ready)?;
                 state.next += 1;
             }
         }
@@ -184,7 +184,12 @@ impl<'a, S: NodeSink> Committer<'a, S> {
 }
 
 impl State {
-    fn append(&mut self, unit: BuiltUnit, row_bytes: Option<u64>, ready: &mut Vec<Placed>) -> Result<(), ConvertError> {
+    fn append(
+        &mut self,
+        unit: BuiltUnit,
+        encoder: &impl NodeEncoder,
+        ready: &mut Vec<Placed>,
+    ) -> Result<(), ConvertError> {
         let BuiltUnit { pieces, root, ledger, overfull_leaves } = unit;
         self.ledger.merge(&ledger);
         self.overfull_leaves += overfull_leaves;
@@ -199,7 +204,8 @@ impl State {
                 }
                 Piece::Large(key, points) => {
                     let too_many = || Unsupported::CrowdedNode { points: points.count(), max: u64::MAX };
-                    let byte_size = row_bytes.and_then(|b| points.count().checked_mul(b)).ok_or_else(too_many)?;
+                    let rows = encoder.row_bytes().and_then(|b| points.count().checked_mul(b));
+                    let byte_size = rows.and_then(|b| b.checked_add(encoder.head_bytes(key))).ok_or_else(too_many)?;
                     let node = FinishedNode { key, points: points_of(points.count())?, byte_offset: offset, byte_size };
                     self.nodes.push(node);
                     self.bytes += byte_size;

@@ -3,6 +3,7 @@
 //! [`content`] decides what a record is made of, [`column`] fills what follows the colour; [`steps`] turns positions into
 //! integers of the box of their node, [`errors`] says how far these are from the lattice. [`files`] is a `NodeSink`.
 
+mod archive;
 mod column;
 mod content;
 mod encoder;
@@ -16,7 +17,7 @@ mod steps;
 use std::sync::PoisonError;
 
 use pointmill_format::DatasetKind;
-use pointmill_format::potree1::{METADATA_FILE, Metadata, NodeCount, encode_index};
+use pointmill_format::potree1::{IndexFile, METADATA_FILE, Metadata, NodeCount, encode_index};
 use serde_json::{Map, Value};
 
 pub use settings::{Potree1Settings, Potree1Version};
@@ -86,6 +87,9 @@ impl Output for Potree1Settings {
     fn describe_settings(&self, settings: &mut Map<String, Value>) {
         self.tree().describe(settings);
         settings.insert("potree1-version".into(), self.version.name().into());
+        if self.archive {
+            settings.insert("archive".into(), true.into());
+        }
         if let Some(most) = self.max_node_points {
             settings.insert("max-node-points".into(), most.into());
         }
@@ -105,7 +109,8 @@ impl Output for Potree1Settings {
         let spacing = ChosenSpacing::of(self.sampling, self.spacing, cloud)?;
         let mut metadata = metadata::metadata(cloud, self, &spacing, &content, &steps);
         let meter = Meter::new(cloud, &steps);
-        let encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
+        let mut encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
+        encoding.archived = self.archive.then(|| metadata.clone());
         let settings = OctreeSettings {
             sampling: self.sampling,
             spacing: spacing.spacing,
@@ -115,11 +120,20 @@ impl Output for Potree1Settings {
         };
         let files = NodeFiles::new(&encoding, &metadata, to, rt)?;
         let tree = octree::build(cloud, rt, settings, &files)?;
-        let index_bytes = write_index(&tree, &metadata, to, &files, rt)?;
-        drop(files);
+        let indexes = indexes(&tree, &metadata)?;
+        if !self.archive {
+            write_index(&tree, &indexes, to, &files, rt)?;
+        }
+        let archive = files.into_archive();
         metadata.points = Some(tree.ledger.points());
-        let json = metadata.to_json();
-        to.write(METADATA_FILE, json.as_bytes())?;
+        let bytes = match archive {
+            Some(archive) => archive.finish(&tree.nodes, tree.bytes, &indexes, &metadata, rt)?,
+            None => {
+                let json = metadata.to_json();
+                to.write(METADATA_FILE, json.as_bytes())?;
+                tree.bytes + indexes.iter().map(|index| index.bytes.len() as u64).sum::<u64>() + json.len() as u64
+            }
+        };
 
         let Encoding { content, steps, tally, .. } = encoding;
         let tally = tally.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -138,7 +152,7 @@ impl Output for Potree1Settings {
             attributes_changed,
             attributes_renamed: content.renamed,
             warnings,
-            bytes: tree.bytes + index_bytes + json.len() as u64,
+            bytes,
             checksum: tree.ledger.unaltered().to_string(),
             tree: tree_report(&tree),
             details: self.details(&spacing, &metadata),
@@ -181,25 +195,26 @@ impl Potree1Settings {
     }
 }
 
-/// Writes the index files, and syncs all that was written; returns the bytes of the index.
+/// The index files.
+fn indexes(tree: &Octree, metadata: &Metadata) -> Result<Vec<IndexFile>, ConvertError> {
+    let mut counts: Vec<NodeCount> =
+        tree.nodes.iter().map(|node| NodeCount { key: node.key, points: node.points }).collect();
+    encode_index(&mut counts, metadata.step)
+        .map_err(|e| ConvertError::Internal(format!("the index of the octree: {e}")))
+}
+
+/// Writes the index files, and syncs all that was written.
 fn write_index(
     tree: &Octree,
-    metadata: &Metadata,
+    indexes: &[IndexFile],
     to: &StagedDataset,
     files: &NodeFiles<'_>,
     rt: &Runtime<'_>,
-) -> Result<u64, ConvertError> {
-    let mut counts: Vec<NodeCount> =
-        tree.nodes.iter().map(|node| NodeCount { key: node.key, points: node.points }).collect();
-    let indexes = encode_index(&mut counts, metadata.step)
-        .map_err(|e| ConvertError::Internal(format!("the index of the octree: {e}")))?;
-    let mut bytes = 0;
-    for index in &indexes {
+) -> Result<(), ConvertError> {
+    for index in indexes {
         rt.check_stop()?;
-        to.create(&metadata.index_file(index.root))?.write_at(&index.bytes, 0, "writing the index")?;
-        bytes += index.bytes.len() as u64;
+        to.create(&files.metadata().index_file(index.root))?.write_at(&index.bytes, 0, "writing the index")?;
     }
     let roots: Vec<_> = indexes.iter().map(|index| index.root).collect();
-    files.sync(&tree.nodes, &roots, rt)?;
-    Ok(bytes)
+    files.sync(&tree.nodes, &roots, rt)
 }
