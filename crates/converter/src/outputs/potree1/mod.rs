@@ -44,6 +44,9 @@ use crate::warning::Warning;
 /// Bytes that a file takes on a disk beside its contents, on average, and its record in an index.
 const NODE_BYTES: u64 = 2048 + 5;
 
+/// The same of a file in an archive: its head and its entry.
+const ARCHIVED_BYTES: u64 = 150 + 5;
+
 impl From<Potree1Settings> for Target {
     fn from(settings: Potree1Settings) -> Self {
         Self::new(settings)
@@ -81,7 +84,7 @@ impl Output for Potree1Settings {
         let colour = schema.rgb().map_or(0, |i| schema.attributes[i].size() as u64);
         let others = if plan.attributes == AttributeChoice::Usual { 0 } else { kept.saturating_sub(colour) };
         let per_point = (POSITION_BYTES + COLOUR_BYTES) as u64 + others;
-        DiskSize { per_point, per_1000_points: nodes * NODE_BYTES }
+        DiskSize { per_point, per_1000_points: nodes * if self.archive { ARCHIVED_BYTES } else { NODE_BYTES } }
     }
 
     fn describe_settings(&self, settings: &mut Map<String, Value>) {
