@@ -12,7 +12,7 @@ use crate::exit::Failure;
 /// The scans to convert.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct InputArgs {
-    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF): files, folders (searched recursively) or globs
+    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF) and datasets: files, folders (searched recursively) or globs
     #[arg(value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// Reads more inputs from the file LIST, one per line (- for standard input); skips empty lines and lines that

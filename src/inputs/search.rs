@@ -189,7 +189,7 @@ fn nothing(typed: &[PathBuf], inputs: &Inputs) -> Failure {
     }
     let others = inputs.other_files.first().map(|_| format!("; {}", other_files(&inputs.other_files)));
     Failure::Input(format!(
-        "{}: no scan found (supported: {}){}",
+        "{}: no scan found (supported: {}, datasets){}",
         FirstFew(typed),
         supported_scans(),
         others.unwrap_or_default()

@@ -181,3 +181,21 @@ fn batches_give_colours_back_as_they_were_before_averaging() {
     let said = dir.succeed(["convert", "first", "-o", "second", "--overwrite"]).stderr();
     assert!(said.contains("means of their cells"), "{said}");
 }
+
+#[test]
+fn datasets_are_read_within_little_memory() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(1_350_000, 1).bytes());
+    for format in ["potree2", "batches"] {
+        dir.succeed(["convert", "a.las", "-o", "first", "-q", "--overwrite", "--to", format, "--attributes", "all"]);
+        let args = ["convert", "first", "-o", "second", "-q", "--overwrite", "--name", "same"];
+        dir.succeed(args);
+        let ample = dataset(&dir.path("second"));
+        dir.succeed(args.iter().chain(&["--memory", "112MiB", "--threads", "1"]));
+        let report = dir.report("second");
+        assert!(dataset(&dir.path("second")) == ample, "{format}: the datasets differ");
+        if let Some(peak) = report["peak_memory_bytes"].as_u64() {
+            assert!(peak <= 112 << 20, "{format}: the resident set rose to {} MiB", peak >> 20);
+        }
+    }
+}

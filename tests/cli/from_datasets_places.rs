@@ -1,5 +1,6 @@
 //! Datasets as inputs: where they are found, and what is never read or replaced.
 
+use std::collections::BTreeMap;
 use std::fs;
 
 use pointmill_testkit::damage::put;
@@ -121,4 +122,43 @@ fn counts_that_the_reference_got_wrong_do_no_harm() {
     dir.succeed(["convert", words.to_str().unwrap(), "-o", "out", "-q"]);
     assert_eq!(points(&dir, "out"), 13);
     dir.validate("out", &[words.to_str().unwrap()]);
+}
+
+#[test]
+fn an_archive_is_an_input_where_it_is_named_and_where_it_is_found() {
+    let dir = Dir::new();
+    let zip = dir.write("in/cloud.zip", &archive(&dataset(&fixture("potree1/objects"))));
+    for input in [zip.to_str().unwrap(), "in", "in/*.zip"] {
+        dir.succeed(["convert", input, "-o", "out", "--overwrite", "-q"]);
+        assert_eq!(points(&dir, "out"), 13, "{input}");
+    }
+    dir.validate("out", &["in"]);
+    // an archive of something else is none
+    dir.write("in/other.zip", &archive(&[("notes.txt".to_owned(), b"notes".to_vec())].into()));
+    dir.succeed(["convert", "in", "-o", "out", "--overwrite", "-q"]);
+    assert_eq!(dir.report("out")["other_files"]["count"], 1);
+    dir.run(["convert", "in/other.zip", "-o", "out2"]).failed_with(4, &["a ZIP", "unpack it"]);
+}
+
+/// An uncompressed archive by the plainest means.
+fn archive(files: &BTreeMap<String, Vec<u8>>) -> Vec<u8> {
+    let (mut out, mut directory) = (Vec::new(), Vec::new());
+    for (name, bytes) in files {
+        let mut fields = [20u16, 0, 0, 0, 0].map(u16::to_le_bytes).concat(); // version, flags, method, time, date
+        fields.extend([0, bytes.len() as u32, bytes.len() as u32].map(u32::to_le_bytes).concat()); // checksum, sizes
+        fields.extend([name.len() as u16, 0].map(u16::to_le_bytes).concat()); // lengths of name and extra fields
+        directory.extend(b"PK\x01\x02\x14\0");
+        directory.extend(&fields);
+        directory.extend([0; 10]); // comment, disk, attributes
+        directory.extend((out.len() as u32).to_le_bytes());
+        directory.extend(name.as_bytes());
+        out.extend([&b"PK\x03\x04"[..], &fields, name.as_bytes(), bytes].concat());
+    }
+    let (at, count) = (out.len() as u32, files.len() as u16);
+    out.extend(&directory);
+    out.extend(b"PK\x05\x06\0\0\0\0");
+    out.extend([count, count].map(u16::to_le_bytes).concat());
+    out.extend([directory.len() as u32, at].map(u32::to_le_bytes).concat());
+    out.extend([0, 0]);
+    out
 }

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use crate::batches::{BATCH_POINTS, BatchScratch, Batches, ColourSource, Flags, Original, Part, Precision};
+use crate::batches::{
+    BATCH_POINTS, BatchRecord, BatchScratch, Batches, ColourSource, Flags, Header, Original, Part, Precision,
+};
 use crate::scan::DatasetNote;
 use crate::{Attribute, AttributeType, Column, Lattice, NodePoints, ReadError, Scan, ScanWarning};
 
@@ -10,35 +12,51 @@ use super::columns::{Becomes, Columns};
 use super::crs::crs_of;
 use super::described::{Described, NodeMemory, advised, file_bytes};
 use super::node_scan::{NodeScan, Nodes};
-use super::pieces::Place;
+use super::pieces::{PIECE_POINTS, Place};
 use super::placing::held;
 
-#[cfg(not(feature = "mmap"))]
-type Bytes = crate::batches::AlignedBytes;
+/// The file: mapped while a piece is decoded, and no longer, or all of it would count as memory of the process; without maps
+/// read once.
 #[cfg(feature = "mmap")]
 type Bytes = crate::batches::MappedFile;
+#[cfg(not(feature = "mmap"))]
+type Bytes = crate::batches::AlignedBytes;
 
 /// Memory of a decompressor of zstd.
 const ZSTD_BYTES: u64 = 4 << 20;
 
 /// The slots of a file.
-struct Slots(Batches<Bytes>);
+struct Slots {
+    #[cfg(feature = "mmap")]
+    path: std::path::PathBuf,
+    header: Header,
+    records: Vec<BatchRecord>,
+    #[cfg(not(feature = "mmap"))]
+    file: Batches<Bytes>,
+}
+
+/// What a thread has open, and the memory that it uses again.
+#[derive(Default)]
+struct Open {
+    #[cfg(feature = "mmap")]
+    file: Option<Batches<Bytes>>,
+    batch: BatchScratch,
+}
 
 impl Nodes for Slots {
-    type Scratch = BatchScratch;
+    type Scratch = Open;
 
     fn len(&self) -> usize {
-        self.0.records().len()
+        self.records.len()
     }
 
     fn place(&self, node: usize) -> Place {
-        let record = self.0.records()[node];
-        let points = u64::from(record.points);
-        let start = self.0.header().sections.hi10;
-        match self.0.is_compressed() {
+        let BatchRecord { points, first_point, .. } = self.records[node];
+        let (points, start) = (u64::from(points), self.header.sections.hi10);
+        match self.header.flags.has(Flags::COMPRESSED) {
             // where the blocks are is in their table
             true => Place { points, byte_offset: start, byte_size: 0 },
-            false => Place { points, byte_offset: start + 4 * u64::from(record.first_point), byte_size: 4 * points },
+            false => Place { points, byte_offset: start + 4 * u64::from(first_point), byte_size: 4 * points },
         }
     }
 
@@ -46,42 +64,71 @@ impl Nodes for Slots {
         format!("batch {node}")
     }
 
-    fn read(&self, node: usize, scratch: &mut BatchScratch, out: &mut NodePoints) -> Result<(), ReadError> {
-        self.0.read_batch(node as u32, Precision::Thirty, scratch, out)?;
-        self.restore(node as u32 * BATCH_POINTS, out)
+    fn read(&self, node: usize, scratch: &mut Open, out: &mut NodePoints) -> Result<(), ReadError> {
+        #[cfg(feature = "mmap")]
+        let file = match &mut scratch.file {
+            Some(file) => file,
+            none => none.insert(self.map()?),
+        };
+        #[cfg(not(feature = "mmap"))]
+        let file = &self.file;
+        file.read_batch(node as u32, Precision::Thirty, &mut scratch.batch, out)?;
+        restore(file, node as u32 * BATCH_POINTS, out)
+    }
+
+    #[cfg(feature = "mmap")]
+    fn close(&self, scratch: &mut Open) {
+        scratch.file = None;
     }
 }
 
 impl Slots {
-    /// Puts the colours before averaging in place of those that are shown. `first`: storage index of the first point.
-    fn restore(&self, first: u32, points: &mut NodePoints) -> Result<(), ReadError> {
-        let all = self.0.originals();
-        let end = first.saturating_add(points.len() as u32);
-        let own = &all[all.partition_point(|o| o.index < first)..];
-        let own: &[Original] = &own[..own.partition_point(|o| o.index < end)];
-        let ascend = own.windows(2).all(|pair| pair[0].index < pair[1].index);
-        let Some(Column::UInt32(words)) = points.columns.first_mut() else { return Ok(()) };
-        for Original { index, colour } in own {
-            match index.checked_sub(first).and_then(|i| words.get_mut(i as usize)).filter(|_| ascend) {
-                Some(word) => *word = *colour,
-                None => return Err(lost_originals(&self.0)),
-            }
+    #[cfg(feature = "mmap")]
+    fn map(&self) -> Result<Batches<Bytes>, ReadError> {
+        let file = Batches::map(&self.path)?;
+        if *file.header() == self.header && file.records() == self.records {
+            return Ok(file);
         }
-        Ok(())
+        Err(ReadError::broken(&self.path, 0, "it has changed since it was opened"))
     }
+}
+
+/// Puts the colours before averaging in place of those that are shown. `first`: storage index of the first point.
+fn restore(file: &Batches<Bytes>, first: u32, points: &mut NodePoints) -> Result<(), ReadError> {
+    let all = file.originals();
+    let end = first.saturating_add(points.len() as u32);
+    let own = &all[all.partition_point(|o| o.index < first)..];
+    let own: &[Original] = &own[..own.partition_point(|o| o.index < end)];
+    let ascend = own.windows(2).all(|pair| pair[0].index < pair[1].index);
+    let Some(Column::UInt32(words)) = points.columns.first_mut() else { return Ok(()) };
+    for Original { index, colour } in own {
+        match index.checked_sub(first).and_then(|i| words.get_mut(i as usize)).filter(|_| ascend) {
+            Some(word) => *word = *colour,
+            None => return Err(lost_originals(file)),
+        }
+    }
+    Ok(())
 }
 
 /// Opens the file `path`.
 pub(super) fn open(path: &Path) -> Result<Box<dyn Scan>, ReadError> {
     #[cfg(feature = "mmap")]
-    let batches = Batches::map(path).map_err(advised)?;
+    let file = Batches::map(path).map_err(advised)?;
     #[cfg(not(feature = "mmap"))]
-    let batches = Batches::open(path).map_err(advised)?;
-    if batches.originals().last().is_some_and(|last| u64::from(last.index) >= batches.header().points) {
-        return Err(lost_originals(&batches));
+    let file = Batches::open(path).map_err(advised)?;
+    if file.originals().last().is_some_and(|last| u64::from(last.index) >= file.header().points) {
+        return Err(lost_originals(&file));
     }
-    let described = described(path, &batches);
-    Ok(Box::new(NodeScan::new(Slots(batches), described)))
+    let described = described(path, &file);
+    let slots = Slots {
+        #[cfg(feature = "mmap")]
+        path: path.to_path_buf(),
+        header: file.header().clone(),
+        records: file.records().to_vec(),
+        #[cfg(not(feature = "mmap"))]
+        file,
+    };
+    Ok(Box::new(NodeScan::new(slots, described)))
 }
 
 fn lost_originals(batches: &Batches<Bytes>) -> ReadError {
@@ -102,11 +149,17 @@ fn described(path: &Path, batches: &Batches<Bytes>) -> Described {
     }
     warnings.extend(inexact(batches, &lattice));
     let size: u64 = batches.attributes().map(|a| a.size() as u64).sum();
-    // three planes, three words, a colour, three doubles, and the attributes twice
-    let (per_point, decompressor) = match batches.is_compressed() {
-        true => (2 * (52 + size) + block_batches(batches) * (16 + size), ZSTD_BYTES),
-        false => (2 * (52 + size), 0),
+    let stored = 16 + size;
+    // of a piece what is mapped; the records and the description are looked at each time
+    let mapped = header.points.min(PIECE_POINTS + 2 * u64::from(BATCH_POINTS)) * stored
+        + batches.records().len() as u64 * size_of::<BatchRecord>() as u64
+        + 2 * header.description_bytes;
+    let (blocks, zstd) = match batches.is_compressed() {
+        true => (block_batches(batches) * stored, ZSTD_BYTES),
+        false => (0, 0),
     };
+    // three words, three doubles, a colour, and the attributes
+    let (per_point, decompressor) = (2 * (40 + size) + blocks, mapped + zstd);
     Described {
         path: path.to_path_buf(),
         format: format!("quantised batches, {} bits per coordinate", header.precision().bits()),

@@ -26,6 +26,9 @@ pub(super) trait Nodes: Send + Sync {
     /// # Errors
     /// Those of its reader.
     fn read(&self, node: usize, scratch: &mut Self::Scratch, out: &mut NodePoints) -> Result<(), ReadError>;
+
+    /// A piece is decoded: what is only held for its nodes is given back.
+    fn close(&self, _: &mut Self::Scratch) {}
 }
 
 /// A dataset whose nodes are known.
@@ -137,6 +140,7 @@ impl<N: Nodes> Scan for NodeScan<N> {
         let mut kept = kept.unwrap_or_default();
         let goes_on = |node| self.node(node, wanted, &mut kept, &mut out);
         let result = range.map(goes_on).find(|goes_on| !matches!(goes_on, Ok(true)));
+        self.nodes.close(&mut kept.scratch);
         scratch.kept = Some(kept);
         result.map_or(Ok(()), |ended| ended.map(drop))
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::Piece;
 
 /// Points that a piece has at most, unless a single node has more.
-const PIECE_POINTS: u64 = 131_072;
+pub(super) const PIECE_POINTS: u64 = 131_072;
 
 /// How many points a node has, and where they are among the bytes of the dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use crate::octree::{Octree, OctreeNode};
-use crate::potree1::{Dataset, METADATA_FILE, Metadata, NodeFiles};
-use crate::{Aabb, Lattice, NodeKey, OpenOptions, ReadError, Scan};
+use crate::potree1::{Dataset, Field, METADATA_FILE, Metadata, NodeFiles};
+use crate::scan::DatasetNote;
+use crate::{Aabb, Lattice, NodeKey, OpenOptions, ReadError, Scan, ScanWarning};
 
 use super::columns::Columns;
 use super::crs::crs_of;
@@ -76,6 +77,9 @@ fn described(path: &Path, dataset: &Dataset, depth: u8) -> Described {
     let stored = &dataset.info().attributes;
     let columns: u64 = stored.iter().map(|a| a.size() as u64).sum();
     let (is_bin, made) = (metadata.files == NodeFiles::Bin, made_colours(own, dataset));
+    if uses_fourth_byte(dataset) {
+        warnings.push(ScanWarning::Dataset(DatasetNote::AlphaIgnored));
+    }
     Described {
         path: path.to_path_buf(),
         format: dataset.info().format.clone(),
@@ -89,6 +93,21 @@ fn described(path: &Path, dataset: &Dataset, depth: u8) -> Described {
         warnings,
         memory: NodeMemory { per_point: 2 * (24 + columns), decompressor: if is_bin { 0 } else { LAZ_BYTES } },
     }
+}
+
+/// True if colours of the root have a fourth byte that is not 255, as all writers known have it. That the root cannot be read is
+/// told when it is.
+fn uses_fourth_byte(dataset: &Dataset) -> bool {
+    let (mut at, mut root) = (0, Vec::new());
+    for attribute in &dataset.metadata().attributes {
+        if attribute.field == Field::Rgba {
+            let is_read = dataset.read_payload(NodeKey::ROOT, &mut root).is_ok();
+            let mut records = root.chunks_exact(dataset.metadata().record_len());
+            return is_read && records.any(|record| record.get(at + 3).is_some_and(|alpha| *alpha != u8::MAX));
+        }
+        at += attribute.size();
+    }
+    false
 }
 
 /// Colours that the sources did not have say nothing; greys of an intensity do, unless it is there.

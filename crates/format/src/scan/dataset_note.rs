@@ -15,6 +15,8 @@ pub enum DatasetNote {
     Inexact { most: [f64; 3] },
     /// Colours of points of coarse levels are means, and what they were is not in the file.
     ColoursAveraged,
+    /// Colours have a fourth byte of different values, which is not read.
+    AlphaIgnored,
 }
 
 impl fmt::Display for DatasetNote {
@@ -27,6 +29,9 @@ impl fmt::Display for DatasetNote {
             Self::ColoursAveraged => f.write_str(
                 "the colours of points of its coarse levels are means of their cells; the file does not have their own colours",
             ),
+            Self::AlphaIgnored => {
+                f.write_str("its colours have a fourth byte that is not 255 everywhere; it is not read")
+            }
             Self::PointsDiffer { declared, found } => {
                 write!(f, "its description declares {declared} points; the {found} of its nodes are read")
             }

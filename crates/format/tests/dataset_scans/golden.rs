@@ -113,6 +113,19 @@ fn stored_scales_of_potree_1_are_those_of_its_attributes() {
 }
 
 #[test]
+fn a_fourth_byte_of_colours_that_says_something_is_told() {
+    let (_kept, folder) = changed("potree1/words", |name, bytes| {
+        if name.ends_with("/r.bin") {
+            assert_eq!(bytes[15], 255);
+            bytes[15] = 7;
+        }
+    });
+    let cloud = READER.check(&folder, "alpha").unwrap();
+    assert!(cloud.warned("a fourth byte that is not 255"), "{:?}", cloud.info.warnings);
+    assert!(READER.check(&fixture("potree1/words"), "no alpha").unwrap().info.warnings.is_empty());
+}
+
+#[test]
 fn copc_is_the_same_cloud_as_laz_and_as_an_octree() {
     for name in ["format6", "format8", "pages"] {
         let name = format!("copc/{name}.copc.laz");
