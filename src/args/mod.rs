@@ -2,6 +2,7 @@
 
 mod common;
 mod convert;
+mod export;
 pub(crate) mod mistake;
 mod placing;
 mod values;
@@ -16,6 +17,7 @@ pub(crate) use convert::{
     BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg, FaultArg,
     LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
+pub(crate) use export::ExportArgs;
 pub(crate) use values::Attributes;
 use values::parse_bytes;
 
@@ -35,6 +37,8 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     /// Converts scans to a dataset
     Convert(Box<ConvertArgs>),
+    /// Writes the points of scans and datasets to one file: LAS, LAZ, PLY or CSV
+    Export(Box<ExportArgs>),
     /// Checks whether a dataset conforms to its format and matches its scans
     Validate(ValidateArgs),
     /// Writes the images within an E57 file, and the places of its scans and images as a table

@@ -92,6 +92,12 @@ pub(super) fn parse_scale(text: &str) -> Result<Scale, String> {
     }
 }
 
+/// A distance.
+pub(super) fn parse_spacing(text: &str) -> Result<f64, String> {
+    let spacing = text.parse::<f64>().ok().filter(|spacing| spacing.is_finite() && *spacing > 0.0);
+    spacing.ok_or_else(|| "expected a number above 0, for example 0.05".to_owned())
+}
+
 /// A default value in the help.
 pub(super) fn or_auto(value: Option<impl ToString>) -> String {
     value.map_or_else(|| "auto".to_owned(), |value| value.to_string())

@@ -1,6 +1,7 @@
 //! The commands, a file or folder for each.
 
 pub(crate) mod convert;
+pub(crate) mod export;
 pub(crate) mod extract;
 pub(crate) mod info;
 mod report_file;

@@ -2,6 +2,7 @@
 
 mod accuracy;
 pub(crate) mod conversion;
+pub(crate) mod export;
 pub(crate) mod progress;
 pub(crate) mod quantities;
 pub(crate) mod text;

@@ -67,7 +67,7 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
             &["report"],
             &["octree"],
             &["outputs"],
-            &["convert", "estimate"],
+            &["convert", "estimate", "export"],
             &["bench_api"],
         ],
     ),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use pointmill_format::{Aabb, DatasetKind, ReadError, system_reason};
 
 use crate::advice::Advice;
-use crate::plan::PlanError;
+use crate::plan::{ExportFormat, PlanError};
 
 /// Why a run could not finish; the output is as it was before.
 ///
@@ -89,6 +89,13 @@ pub enum Unsupported {
         step: f64,
         /// The shortest step that the cube allows, world units.
         least: f64,
+    },
+    /// A file of this format cannot hold these points.
+    Export {
+        /// The format.
+        format: ExportFormat,
+        /// Why.
+        what: String,
     },
     /// The format cannot hold this cloud.
     Format {
@@ -174,6 +181,8 @@ pub enum OutputFault {
     },
     /// It is not a dataset.
     NotADataset(PathBuf),
+    /// It is a folder, or nothing that a file can replace.
+    NotAFile(PathBuf),
     /// Another run writes in it.
     Busy(PathBuf),
 }
@@ -320,6 +329,7 @@ impl Unsupported {
             Self::CrowdedNode { .. } => Some(Advice::DropDuplicates),
             Self::TooFarApart => Some(Advice::ConvertApart),
             Self::FineAxis { least, .. } => Some(Advice::CoarserStep { least: *least }),
+            Self::Export { .. } => Some(Advice::NameAttributes),
             Self::Format { .. } => None,
         }
     }
@@ -344,6 +354,7 @@ impl fmt::Display for Unsupported {
                     "{kind}: positions have one step for all axes, at least {least} here; that of {axis} is {step}"
                 )
             }
+            Self::Export { format, what } => write!(f, "{format}: {what}"),
             Self::Format { kind, what } => write!(f, "{kind}: {what}"),
         }
     }
@@ -404,7 +415,7 @@ impl OutputFault {
         match self {
             Self::Exists(_) => Advice::ReplaceOutput,
             Self::Foreign { .. } => Advice::MoveAway,
-            Self::NotADataset(_) => Advice::OtherOutput,
+            Self::NotADataset(_) | Self::NotAFile(_) => Advice::OtherOutput,
             Self::Busy(_) => Advice::WaitForRun,
         }
     }
@@ -423,6 +434,7 @@ impl fmt::Display for OutputFault {
             Self::NotADataset(output) => {
                 write!(f, "{}: exists and is not a dataset of ours, so it is not replaced", output.display())
             }
+            Self::NotAFile(output) => write!(f, "{}: is there, and no file that another can replace", output.display()),
             Self::Busy(output) => write!(f, "{}: another run is writing there", output.display()),
         }
     }

@@ -37,6 +37,7 @@ mod cloud;
 mod convert;
 mod error;
 mod estimate;
+mod export;
 mod gather;
 pub mod memory;
 mod octree;
@@ -52,6 +53,7 @@ pub use advice::Advice;
 pub use convert::{convert, convert_on};
 pub use error::{ConvertError, InputFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
+pub use export::{ExportReport, ExportedAttribute, ExportedPoints, PositionChange, export, export_on};
 pub use octree::Sampling;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
@@ -59,8 +61,8 @@ pub use outputs::potree1::{Potree1Settings, Potree1Version};
 pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
 pub use outputs::{StagedFiles, Target, resolve_path};
 pub use plan::{
-    AttributeChoice, Duplicates, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault, RgbDepth,
-    ScaleChoice, Setting,
+    AttributeChoice, Duplicates, ExportFormat, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault,
+    RgbDepth, ScaleChoice, Setting,
 };
 pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{

@@ -19,14 +19,30 @@ pub(super) struct Assembly<'a> {
 }
 
 /// Rows of a batch that are taken together.
-pub(super) enum Rows<'a> {
+pub(crate) enum Rows<'a> {
     Consecutive(Range<usize>),
     Selected(&'a [u32]),
 }
 
 impl Rows<'_> {
+    /// How many.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Consecutive(range) => range.len(),
+            Self::Selected(rows) => rows.len(),
+        }
+    }
+
+    /// Some of these, by their numbers among them.
+    pub(crate) fn slice(&self, part: Range<usize>) -> Rows<'_> {
+        match self {
+            Self::Consecutive(range) => Rows::Consecutive(range.start + part.start..range.start + part.end),
+            Self::Selected(rows) => Rows::Selected(&rows[part]),
+        }
+    }
+
     /// The row of the batch that is the `i`th of these.
-    pub(super) fn row(&self, i: usize) -> usize {
+    pub(crate) fn row(&self, i: usize) -> usize {
         match self {
             Self::Consecutive(range) => range.start + i,
             Self::Selected(rows) => rows[i] as usize,
@@ -35,7 +51,7 @@ impl Rows<'_> {
 
     /// So many of these from `first` on.
     #[inline(always)]
-    fn part(&self, first: usize, count: usize) -> RowsOf<'_> {
+    pub(crate) fn part(&self, first: usize, count: usize) -> RowsOf<'_> {
         match self {
             Self::Consecutive(range) => RowsOf::From(range.start + first),
             Self::Selected(rows) => RowsOf::Named(&rows[first..first + count]),

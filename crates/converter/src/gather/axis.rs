@@ -4,7 +4,7 @@ use pointmill_format::{AxisGrid, Lattice};
 
 /// How one axis of a source maps to the job lattice. Ties are rounded to even everywhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum AxisMap {
+pub(crate) enum AxisMap {
     /// `job = source · mul + add`: every source coordinate is a point of the job lattice.
     Exact {
         mul: i64,
@@ -26,13 +26,13 @@ pub(super) enum AxisMap {
 
 /// The three axes of a source.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SourceMap {
+pub(crate) struct SourceMap {
     pub(super) axes: [AxisMap; 3],
 }
 
 /// By how much coordinates move on an axis: job minus source, world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Moved {
+pub(crate) enum Moved {
     /// All by this.
     By(f64),
     /// Each by the value in the column.

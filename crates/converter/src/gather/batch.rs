@@ -15,7 +15,6 @@ use super::{exact, moved, ranges, select};
 use crate::cloud::{BLOCK_BYTES, Group, Grouping, JobBounds, JobColumns, Segment, Stats};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Reservation, Vectors, os_hints, vectorized};
-use crate::sources::Recast;
 
 /// A batch is taken in slices of this many points, whose columns stay in the second-level cache while they are
 /// gathered cell by cell.
@@ -76,10 +75,10 @@ impl<'a> Worker<'a> {
 
     /// Takes one batch of a source: filter, lattice, ranges, cells, records.
     pub(super) fn take(&mut self, visit: &mut Visit<'_>, batch: &PointBatch) -> Result<(), ConvertError> {
-        let filtered = select::select(self.pass, visit, batch, &mut self.stats, &mut self.selection)?;
+        let filtered = select::select(self.pass.plan, visit, batch, &mut self.stats, &mut self.selection)?;
         visit.seen.read += batch.len() as u64;
-        note_changes(visit, batch);
-        let recast = recast(visit, batch);
+        visit.note_changes(batch);
+        let recast = visit.recast(batch);
         let columns = stored_columns(batch, &recast);
         if filtered {
             ranges::unfiltered_colour(self.pass, visit, &columns);
@@ -253,30 +252,8 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// Adds what the reader could not keep.
-fn note_changes(visit: &mut Visit<'_>, batch: &PointBatch) {
-    for (column, changes) in batch.changes() {
-        if let Some(place) = visit.intake.columns[column] {
-            visit.seen.count_changes(place, changes);
-        }
-    }
-}
-
-/// The columns that are not stored as they were read, by index.
-fn recast(visit: &mut Visit<'_>, batch: &PointBatch) -> Vec<(usize, Column)> {
-    let Visit { intake, seen, .. } = visit;
-    let recast = |(i, recast): &(usize, Recast)| {
-        let (column, changes) = recast.apply(&batch.columns[*i]);
-        if let Some(place) = intake.columns[*i] {
-            seen.count_changes(place, &changes);
-        }
-        (*i, column)
-    };
-    intake.recasts.iter().map(recast).collect()
-}
-
 /// The columns of a batch as they are stored; `recast`: those that are not as they were read.
-fn stored_columns<'b>(batch: &'b PointBatch, recast: &'b [(usize, Column)]) -> Vec<&'b Column> {
+pub(crate) fn stored_columns<'b>(batch: &'b PointBatch, recast: &'b [(usize, Column)]) -> Vec<&'b Column> {
     let mut columns: Vec<&Column> = batch.columns.iter().collect();
     recast.iter().for_each(|(i, column)| columns[*i] = column);
     columns
@@ -292,7 +269,8 @@ fn extent_anyhow(q: &[i64]) -> (i64, i64) {
     q.iter().fold((i64::MAX, i64::MIN), |(min, max), v| (min.min(*v), max.max(*v)))
 }
 
-fn quantize_axis(
+/// Puts an axis of some rows on the lattice of the pass; appends to `q`, and to `change` if coordinates move by different amounts.
+pub(crate) fn quantize_axis(
     map: &SourceMap,
     a: usize,
     positions: &Positions,

@@ -1,18 +1,16 @@
 //! What all threads of a pass share.
 
 use std::collections::HashMap;
+use std::ops::Deref;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
-
-use pointmill_format::{Aabb, Lattice};
 
 use super::census::Counts;
 use super::lattice::ulp;
 use super::partition::Partition;
-use crate::cloud::{CellHash, Intake, JobBounds, Moments, Segment, Segments, SourceStats, Store};
-use crate::plan::Plan;
+use super::visit::Reading;
+use crate::cloud::{CellHash, JobBounds, Moments, Segment, Segments, Store};
 use crate::runtime::Pool;
-use crate::sources::Sources;
 
 /// Bytes of a list of segments beside the segments themselves.
 const SEGMENTS_BYTES: usize = 64;
@@ -31,21 +29,21 @@ pub(crate) struct Demand {
 
 /// What all threads of a pass share.
 pub(super) struct Context<'a> {
-    pub(super) plan: &'a Plan,
-    pub(super) sources: &'a Sources,
-    pub(super) intake: &'a Intake,
-    /// Points outside are outliers, which are dropped.
-    pub(super) far_cut: Option<Aabb>,
-    /// By source: what was seen of it by threads that have left it.
-    pub(super) seen: Mutex<Vec<SourceStats>>,
-    /// The lattice of the pass.
-    pub(super) lattice: Lattice,
+    pub(super) reading: Reading<'a>,
     pub(super) partition: Partition,
     pub(super) store: Arc<Store>,
     pub(super) memory: &'a Arc<Pool>,
     pub(super) wants_moments: bool,
     /// True once a point could not be stored: from then on only bounds are wanted.
     pub(super) misled: AtomicBool,
+}
+
+impl<'a> Deref for Context<'a> {
+    type Target = Reading<'a>;
+
+    fn deref(&self) -> &Reading<'a> {
+        &self.reading
+    }
 }
 
 impl Context<'_> {

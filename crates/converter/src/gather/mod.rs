@@ -30,8 +30,15 @@ mod visit;
 
 use pointmill_format::{Aabb, AxisGrid, Lattice, ReadError};
 
+pub(crate) use assemble::Rows;
+pub(crate) use axis::Moved;
+pub(crate) use batch::{quantize_axis, stored_columns};
+pub(crate) use columns::Part;
 pub(crate) use context::Demand;
-pub(crate) use lattice::{from_headers, is_coarse};
+pub(crate) use lattice::{from_headers, is_coarse, settled};
+pub(crate) use moved::is_more_than_rounding as moves;
+pub(crate) use select::select;
+pub(crate) use visit::{Reading, Visit};
 
 use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
@@ -303,7 +310,7 @@ pub(crate) fn quantized(lattice: &Lattice, bounds: &Aabb) -> JobBounds {
     JobBounds { min: at(bounds.min), max: at(bounds.max) }
 }
 
-fn nothing_to_convert(sources: &Sources, stats: &Stats) -> ConvertError {
+pub(crate) fn nothing_to_convert(sources: &Sources, stats: &Stats) -> ConvertError {
     let read: u64 = stats.sources.iter().map(|s| s.read).sum();
     match sources.all.as_slice() {
         [first, others @ ..] if read == 0 => {

@@ -5,7 +5,7 @@ use pointmill_format::Lattice;
 use crate::cloud::{JobBounds, JobColumns};
 
 /// By how much the points of a slice move on each axis: all by the same, or each by the value in a column.
-pub(super) type Change<'a> = [Result<f64, &'a [f64]>; 3];
+pub(crate) type Change<'a> = [Result<f64, &'a [f64]>; 3];
 
 /// Doubles of a size differ by up to this times the size after a few operations.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -23,7 +23,7 @@ pub(super) fn integers_lost(change: &Change<'_>, source: &Lattice, points: usize
 }
 
 /// True if a point moves by more than doubles of its coordinates are rounded.
-pub(super) fn is_more_than_rounding(change: &Change<'_>, q: &JobColumns, bounds: &JobBounds, job: &Lattice) -> bool {
+pub(crate) fn is_more_than_rounding(change: &Change<'_>, q: &JobColumns, bounds: &JobBounds, job: &Lattice) -> bool {
     (0..3).any(|a| {
         let offset = job.offset[a];
         let size = |q: i64| (q as f64 * job.scale[a] + offset).abs().max(offset.abs());

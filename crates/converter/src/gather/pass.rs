@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use pointmill_format::{Aabb, Advice, Lattice, NodeKey, Scratch};
 
@@ -11,10 +11,9 @@ use super::context::{CellPart, Collected, Context, Demand};
 use super::lattice::ulp;
 use super::loose::Grouper;
 use super::partition::{Hint, Partition};
-use super::visit::Visit;
+use super::visit::{Reading, Visit};
 use crate::cloud::{
-    Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, SourceStats, Stats, Store, morton, node,
-    xyz,
+    Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, Stats, Store, morton, node, xyz,
 };
 use crate::error::ConvertError;
 use crate::plan::{OnFault, Plan};
@@ -62,12 +61,7 @@ impl<'a> Pass<'a> {
         let evict: Arc<dyn Evict> = Arc::clone(&store) as _;
         rt.memory.evict_from(Arc::downgrade(&evict));
         let context = Context {
-            plan,
-            sources,
-            intake,
-            far_cut,
-            seen: Mutex::new(vec![SourceStats::default(); sources.all.len()]),
-            lattice: lattice.lattice,
+            reading: Reading::new(plan, sources, intake, far_cut, lattice.lattice),
             partition: Partition::choose(hint, &lattice.lattice, sources.points_declared),
             store,
             memory: &rt.memory,
@@ -84,7 +78,8 @@ impl<'a> Pass<'a> {
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
         }
-        let Self { context: Context { partition, store, misled, intake, wants_moments, .. }, lattice, rt } = self;
+        let Self { context: Context { partition, store, misled, reading, wants_moments, .. }, lattice, rt } = self;
+        let intake = reading.intake;
         let cube = match Cube::around(&bounds, &lattice.lattice) {
             Ok(cube) if !misled.into_inner() && partition.holds(&bounds) => cube,
             _ => return Ok(PassEnd::Misled(Box::new(stats))),
@@ -146,8 +141,7 @@ impl<'a> Pass<'a> {
             collected.merge(more);
             room.merge(taken);
         }
-        let mut seen = self.context.seen.lock().map_err(|_| ConvertError::Internal("a worker thread failed".into()))?;
-        stats.sources = std::mem::take(&mut seen);
+        stats.sources = self.context.take_seen()?;
         Ok((stats, collected, room))
     }
 

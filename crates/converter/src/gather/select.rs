@@ -2,22 +2,21 @@
 
 use pointmill_format::{Aabb, Column, Lattice, PointBatch, Positions, with_column};
 
-use super::context::Context;
 use super::visit::Visit;
 use crate::cloud::Stats;
 use crate::error::{ConvertError, InputFault};
-use crate::plan::{OnFault, OriginPoints};
+use crate::plan::{OnFault, OriginPoints, Plan};
 use crate::runtime::{Vectors, vectorized};
 
 /// Fills `selection` with the points that pass the filter; false if all do.
-pub(super) fn select(
-    pass: &Context<'_>,
+pub(crate) fn select(
+    plan: &Plan,
     visit: &mut Visit<'_>,
     batch: &PointBatch,
     stats: &mut Stats,
     selection: &mut Vec<u32>,
 ) -> Result<bool, ConvertError> {
-    let filter = &pass.plan.filter;
+    let filter = &plan.filter;
     let bounds = world_bounds(visit.lattice(), &batch.positions);
     visit.seen.bounds = visit.seen.bounds.union(&bounds);
     let at_origin = visit.origins.count(batch);
@@ -45,7 +44,7 @@ pub(super) fn select(
             continue;
         }
         if !is_finite(i) {
-            if pass.plan.invalid == OnFault::Fail {
+            if plan.invalid == OnFault::Fail {
                 let path = info.path.clone();
                 return Err(InputFault::InvalidPosition { path, point: batch.first_point + i as u64 }.into());
             }

@@ -15,6 +15,6 @@ mod staging;
 
 pub(crate) use attributes::choose as choose_attributes;
 pub use output::Target;
-pub(crate) use output::{DiskSize, check, wants};
-pub(crate) use staging::StagedFolder;
+pub(crate) use output::{DiskSize, check, named_attributes, wants};
+pub(crate) use staging::{StagedFile, StagedFolder};
 pub use staging::{StagedFiles, resolve_path};

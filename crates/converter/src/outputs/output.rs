@@ -110,25 +110,36 @@ pub(crate) struct DiskSize {
     pub(crate) per_1000_points: u64,
 }
 
+/// For each attribute of the inputs: whether the plan names it, or all.
+///
+/// # Errors
+/// An attribute that was requested and that no input has.
+pub(crate) fn named_attributes(plan: &Plan, all: &Schema) -> Result<Vec<bool>, PlanError> {
+    check_names(plan, all, &[])?;
+    Ok(Wants::chosen(plan, all, true).attributes)
+}
+
 /// What all outputs need together.
 ///
 /// # Errors
 /// An attribute that was requested and that no input has.
 pub(crate) fn wants(plan: &Plan, targets: &[Target], all: &Schema) -> Result<Wants, PlanError> {
     let each: Vec<Wants> = targets.iter().map(|t| t.output().wants(plan, all)).collect();
-    if let AttributeChoice::List(names) = &plan.attributes {
-        let is_known = |n: &&String| {
-            let n = n.as_str();
-            n == "position" || all.find(n).is_some() || each.iter().any(|w| w.other_names.contains(&n))
-        };
-        if let Some(name) = names.iter().find(|n| !is_known(n)) {
-            let known = all.attributes.iter().map(|a| a.name.clone()).collect();
-            let fault = PlanFault::UnknownAttribute { name: name.clone(), known };
-            return Err(PlanError::new(Setting::Attributes, fault));
-        }
-    }
+    check_names(plan, all, &each)?;
     let attributes = (0..all.attributes.len()).map(|i| each.iter().any(|w| w.attributes[i])).collect();
     Ok(Wants { attributes, other_names: &[], moments: each.iter().any(|w| w.moments) })
+}
+
+/// Refuses a list that names an attribute which neither the inputs nor an output have.
+fn check_names(plan: &Plan, all: &Schema, each: &[Wants]) -> Result<(), PlanError> {
+    let AttributeChoice::List(names) = &plan.attributes else { return Ok(()) };
+    let is_known = |n: &&String| {
+        let n = n.as_str();
+        n == "position" || all.find(n).is_some() || each.iter().any(|w| w.other_names.contains(&n))
+    };
+    let Some(name) = names.iter().find(|n| !is_known(n)) else { return Ok(()) };
+    let known = all.attributes.iter().map(|a| a.name.clone()).collect();
+    Err(PlanError::new(Setting::Attributes, PlanFault::UnknownAttribute { name: name.clone(), known }))
 }
 
 /// Refuses plans and targets that cannot be used, before anything is read.

@@ -1,12 +1,14 @@
 //! What was requested: every setting resolved, nothing left to guess.
 
 mod error;
+mod export;
 
 use std::path::PathBuf;
 
 use pointmill_format::{Aabb, OpenOptions};
 
 pub use error::{PlanError, PlanFault, Setting};
+pub use export::ExportFormat;
 
 /// What every output shares: inputs, filter, lattice, policies, resources. [`Plan::new`] gives the defaults of the
 /// command line. The datasets to make are [`crate::Target`]s beside it.

@@ -112,6 +112,14 @@ fn from_text(text: &str) -> Result<ResolvedCrs, PlanError> {
     }
 }
 
+/// What a scan would declare for a text that [`resolve_all`] takes; `None`: a proj4 definition.
+pub(crate) fn declared_by(text: &str) -> Option<Crs> {
+    match code_and_height(text) {
+        Some((code, height)) => Some(Crs::new(None, Some(code), height)),
+        None => wkt::is_wkt(text).then(|| Crs::new(Some(text.to_owned()), None, None)),
+    }
+}
+
 /// `EPSG:n`, or `EPSG:n+m` with a system of heights.
 fn code_and_height(text: &str) -> Option<(u32, Option<u32>)> {
     let after = |p: &str| text.get(..p.len()).filter(|t| t.eq_ignore_ascii_case(p)).map(|t| &text[t.len()..]);

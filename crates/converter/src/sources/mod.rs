@@ -22,8 +22,8 @@ use std::sync::{Arc, Mutex};
 
 use pointmill_format::{Aabb, Attribute, Scan, Wanted};
 
-pub(crate) use crs::resolve_all as resolve_crs_of_all;
 pub use crs::{ResolvedCrs, resolve_crs};
+pub(crate) use crs::{declared_by as given_crs, resolve_all as resolve_crs_of_all};
 pub(crate) use decimals::tidy_product;
 pub(crate) use recast::{Recast, doubled};
 pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema};

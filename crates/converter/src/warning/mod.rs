@@ -186,6 +186,11 @@ pub enum Warning {
         /// What each of them says.
         labels: Vec<String>,
     },
+    /// A file has no place for the coordinate reference system as it is known.
+    CrsNotWritten {
+        /// The system, for people.
+        label: String,
+    },
     /// A binary tree with one file per leaf has very many files.
     ManyFiles {
         /// Number of leaves.
@@ -226,6 +231,7 @@ impl Warning {
             Self::Crs(_) => "crs",
             Self::Viewers { note, .. } => note.kind(),
             Self::DifferentCrs { .. } => "different_crs",
+            Self::CrsNotWritten { .. } => "crs_not_written",
             Self::ManyFiles { .. } => "many_files",
             Self::Colours { note, .. } => note.kind(),
         }

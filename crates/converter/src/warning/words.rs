@@ -69,6 +69,9 @@ impl Warning {
                 labels.join("; ")
             ),
             Self::Viewers { format, note } => format!("{}: {note}", format.name()),
+            Self::CrsNotWritten { label } => {
+                format!("the coordinate reference system ({label}) is not in the file, which has no place for it")
+            }
             Self::ManyFiles { leaves } => format!("{leaves} files, one per leaf"),
             Self::Colours { format, note } => format!("{}: {note}", format.name()),
         }

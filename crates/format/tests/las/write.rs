@@ -5,10 +5,9 @@ use pointmill_format::scan::las::write::{
     ChunkEncoder, CrsKind, CrsRecords, FieldPlace, Heading, RecordLayout, StridedColumn, Tally,
 };
 use pointmill_format::{Attribute, AttributeType, Changes, Column, Crs, Lattice};
-use pointmill_testkit::Random;
 use pointmill_testkit::damage::put;
 use pointmill_testkit::files::temporary;
-use pointmill_testkit::las_records::{descriptor, with_vlrs};
+use pointmill_testkit::las_records::random_las;
 use pointmill_testkit::reader::Cloud;
 
 use crate::common::read_bytes;
@@ -18,41 +17,14 @@ const LATTICE: Lattice = Lattice { scale: [0.001, 0.002, 0.01], offset: [500_000
 /// All that this writer knows.
 pub(crate) const WRITTEN: [u8; 7] = [0, 1, 2, 3, 6, 7, 8];
 
-const LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
-
-/// A LAS 1.4 file of random records of that format, with a triple of floats and a scaled number in extra bytes.
+/// Random records of that format, some of them at the ends of what integers hold.
 fn random_file(point_format: u8, points: usize) -> Vec<u8> {
-    let mut random = Random::new(u64::from(point_format) + 1);
-    let (own, extra) = (LEN[usize::from(point_format)], 14);
-    let mut out = vec![0; 375];
-    put(&mut out, 0, b"LASF");
-    put(&mut out, 24, &[1, 4]);
-    put(&mut out, 94, &375u16.to_le_bytes());
-    put(&mut out, 96, &375u32.to_le_bytes());
-    put(&mut out, 104, &[point_format]);
-    put(&mut out, 105, &((own + extra) as u16).to_le_bytes());
-    for axis in 0..3 {
-        put(&mut out, 131 + 8 * axis, &LATTICE.scale[axis].to_le_bytes());
-        put(&mut out, 155 + 8 * axis, &LATTICE.offset[axis].to_le_bytes());
-        put(&mut out, 179 + 16 * axis, &1e8f64.to_le_bytes());
+    let mut out = random_las(point_format, points, LATTICE.scale, LATTICE.offset, 1 << 20);
+    let (start, len) = (records_start(&out), usize::from(u16::from_le_bytes([out[105], out[106]])));
+    for (i, xyz) in [[i32::MIN; 3], [i32::MAX, i32::MIN, 0], [i32::MAX; 3]].into_iter().enumerate() {
+        xyz.iter().enumerate().for_each(|(a, v)| put(&mut out, start + 7 * i * len + 4 * a, &v.to_le_bytes()));
     }
-    put(&mut out, 247, &(points as u64).to_le_bytes());
-    for i in 0..points {
-        let start = out.len();
-        out.extend((0..own + extra).map(|_| random.index(256) as u8));
-        let time_at = if point_format >= 6 { 22 } else { 20 };
-        if !matches!(point_format, 0 | 2) {
-            put(&mut out, start + time_at, &(i as f64 * 0.37 - 50.0).to_le_bytes());
-        }
-        // coordinates as scans have them, some of them at the ends
-        if i % 100 > 0 {
-            (0..3).for_each(|axis| put(&mut out, start + 4 * axis, &(random.index(1 << 20) as i32).to_le_bytes()));
-        }
-        (0..3).for_each(|e| put(&mut out, start + own + 4 * e, &(random.unit() as f32).to_le_bytes()));
-    }
-    let mut scaled = descriptor(3, "Amplitude", Some(0.01));
-    scaled[160..164].copy_from_slice(b"echo");
-    with_vlrs(&out, &[("LASF_Spec", 4, [descriptor(29, "beam", None), scaled].concat())])
+    out
 }
 
 /// The file of the points of `cloud`, whatever format is chosen for them.

@@ -35,11 +35,11 @@ fn the_format_is_the_shortest_in_which_attributes_have_fields_that_hold_them() {
         (vec![], 0, 20),
         (vec![rgb()], 2, 26),
         (vec![time.clone()], 1, 28),
-        (vec![rgb(), time.clone()], 3, 34),
+        (vec![rgb(), time], 3, 34),
         // any class
         (vec![class.clone()], 6, 30),
         // a class of LAS
-        (vec![class.clone(), rank.clone(), rgb()], 2, 26),
+        (vec![class, rank, rgb()], 2, 26),
         (vec![rgb(), attribute("nir", T::UInt16)], 8, 38),
         (vec![attribute("scan angle", T::Int16)], 6, 30),
         (vec![attribute("scanner channel", T::UInt8), rgb()], 7, 36),

@@ -61,7 +61,7 @@ pub(crate) fn is_coarse(plan: &Plan, sources: &Sources) -> Result<bool, ConvertE
 ///
 /// It must be coarser where integers or doubles do not hold the points. It is finer where a claim of the headers, or
 /// of a sample, cost precision that the sources have.
-pub(super) fn settled(plan: &Plan, sources: &Sources, present: &JobLattice, stats: &Stats) -> Option<JobLattice> {
+pub(crate) fn settled(plan: &Plan, sources: &Sources, present: &JobLattice, stats: &Stats) -> Option<JobLattice> {
     let known = Knowledge::of_points(plan, sources, present, stats);
     let wanted = choose_for(plan, sources, &known);
     let resolved = finest_of_sources(sources, &known);

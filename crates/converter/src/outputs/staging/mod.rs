@@ -2,6 +2,7 @@
 //! and given its name at once: finished or not there. What stood there before is there until that moment.
 
 mod dataset;
+mod file;
 mod files;
 mod hidden;
 mod leftovers;
@@ -22,6 +23,7 @@ use crate::runtime::disk::{create_folder, sync_folder};
 use crate::runtime::{Disk, Events, Replacing};
 use crate::warning::Warning;
 pub(crate) use dataset::StagedDataset;
+pub(crate) use file::StagedFile;
 pub use files::StagedFiles;
 use hidden::HiddenFolder;
 pub(crate) use ours::REPORT_FILE;

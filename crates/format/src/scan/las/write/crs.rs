@@ -40,6 +40,11 @@ impl CrsRecords {
         Self { records, is_wkt }
     }
 
+    /// True if nothing is known.
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+
     /// True if there is WKT, which LAS knows since 1.4.
     pub(super) fn has_wkt(&self) -> bool {
         self.records.iter().any(|(number, _)| *number == WKT)

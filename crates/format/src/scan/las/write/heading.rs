@@ -91,6 +91,11 @@ impl Heading {
         Ok(out)
     }
 
+    /// The version of LAS, major and minor.
+    pub fn version(&self) -> (u8, u8) {
+        if self.is_1_4() { (1, 4) } else { (1, 2) }
+    }
+
     fn is_1_4(&self) -> bool {
         let is_large = self.most_points > u64::from(u32::MAX);
         is_large || self.layout.point_format() >= 6 || !self.layout.extra_bytes().is_empty() || self.crs.has_wkt()

@@ -67,6 +67,11 @@ impl Tally {
         self.gps_time = [least, greatest];
     }
 
+    /// Counts points of which nothing else is to be known.
+    pub fn count(&mut self, points: u64) {
+        self.points += points;
+    }
+
     /// Counts what another one has counted, too.
     pub fn merge(&mut self, other: &Self) {
         self.points += other.points;
