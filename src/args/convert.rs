@@ -155,6 +155,10 @@ pub(crate) struct Potree1Args {
     #[arg(long, value_name = "POINTS", value_parser = whole::<u32>(100..=u64::from(u32::MAX)),
           allow_negative_numbers = true, help_heading = "Output: potree1")]
     pub(crate) max_node_points: Option<u32>,
+    /// Writes one uncompressed archive, potree1.zip, instead of a file for each node: millions of files take days to copy.
+    /// Unpack it for viewers; info and validate read it as it is
+    #[arg(long, help_heading = "Output: potree1")]
+    pub(crate) archive: bool,
 }
 
 /// Settings of a mean-split binary tree.

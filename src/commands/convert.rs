@@ -102,6 +102,7 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
         ("--dark-colours", &[TargetArg::Potree2], args.dark_colours.is_some()),
         ("--potree1-version", &[TargetArg::Potree1], args.potree1.potree1_version.is_some()),
         ("--max-node-points", &[TargetArg::Potree1], args.potree1.max_node_points.is_some()),
+        ("--archive", &[TargetArg::Potree1], args.potree1.archive),
         ("--capacity", &[TargetArg::Bintree], tree.capacity.is_some()),
         ("--split", &[TargetArg::Bintree], tree.split.is_some()),
         ("--layout", &[TargetArg::Bintree], tree.layout.is_some()),
@@ -138,6 +139,7 @@ fn potree1_settings(args: &ConvertArgs) -> Potree1Settings {
             Potree1VersionArg::V1_7 => Potree1Version::V1_7,
             Potree1VersionArg::V1_8 => Potree1Version::V1_8,
         }),
+        archive: args.potree1.archive,
     }
 }
 

@@ -110,3 +110,39 @@ fn options_are_for_the_octrees_that_have_them() {
     let ended = dir.run(["convert", "a.las", "-o", "out2", "--to", "potree1", "--potree1-version", "1.6"]);
     ended.failed_with(2, &["--potree1-version '1.6'", "1.7, 1.8"]);
 }
+
+#[test]
+fn an_archive_is_made_told_of_validated_and_replaced() {
+    let dir = with_scans();
+    let args = ["convert", "a.las", "-o", "out", "--to", "potree1", "--leaf-capacity", "100", "--archive"];
+    dir.succeed(args);
+    assert_eq!(dataset(&dir.path("out")).keys().collect::<Vec<_>>(), ["potree1.zip"]);
+    for path in ["out", "out/potree1.zip"] {
+        let text = dir.succeed(["validate", path, "--against", "a.las"]).stdout();
+        assert!(text.contains("ok       node-counts") && text.contains("ok       report"), "{path}: {text}");
+        let text = dir.succeed(["info", path]).stdout();
+        assert!(text.contains("2,000"), "{path}: {text}");
+    }
+    assert_eq!(dir.run(args).code(), 2, "it is there");
+    dir.succeed(args.iter().chain(&["--overwrite"]));
+    // a folder takes its place, and an archive that of a folder
+    dir.succeed(["convert", "a.las", "-o", "out", "--to", "potree1", "--overwrite"]);
+    assert!(dir.path("out/cloud.js").exists() && !dir.path("out/potree1.zip").exists());
+    dir.succeed(args.iter().chain(&["--overwrite"]));
+    assert!(!dir.path("out/cloud.js").exists());
+    // another number of points
+    let mut bytes = fs::read(dir.path("out/potree1.zip")).unwrap();
+    let at = bytes.windows(8).position(|w| w == b"\"points\"").unwrap();
+    let digit = at + bytes[at..].iter().position(|b| *b == b'2').unwrap();
+    bytes[digit] = b'3';
+    dir.write("broken.zip", &bytes);
+    let ended = dir.run(["validate", "broken.zip"]);
+    assert_eq!(ended.code(), 7);
+    assert!(ended.stdout().contains("point-count"), "{}", ended.stdout());
+    // an archive of something else stays
+    dir.write("other/potree1.zip", b"PK\x03\x04 and more");
+    let ended = dir.run(["convert", "a.las", "-o", "other", "--to", "potree1", "--archive", "--overwrite"]);
+    assert_eq!(ended.code(), 2, "{}", ended.stderr());
+    let ended = dir.run(["convert", "a.las", "-o", "new", "--archive"]);
+    assert!(ended.code() == 2 && ended.stderr().contains("--archive requires --to potree1"), "{}", ended.stderr());
+}

@@ -9,6 +9,7 @@ use pointmill_converter::{
     ScaleChoice, Silent, convert,
 };
 use pointmill_format::batches::eight_bit;
+use pointmill_format::bytes::{Archive, ByteSource as _};
 use pointmill_format::octree::OctreeNodes;
 use pointmill_format::potree1::Dataset;
 use pointmill_format::{NodeKey, NodePoints, open_octree};
@@ -244,11 +245,54 @@ fn a_node_too_large_for_memory_is_written_in_parts() {
     (bench.plan.threads, bench.plan.memory_bytes) = (1, 100 << 20);
     bench.convert(Potree1Settings::default());
     let found = points_of_nodes(&bench.out(), &las);
+    let files = dataset(&bench.out());
+    let archived = Potree1Settings { archive: true, ..Potree1Settings::default() };
+    let [scarce, plenty] = [100 << 20, 4 << 30].map(|memory_bytes| {
+        bench.plan.memory_bytes = memory_bytes;
+        bench.convert(archived);
+        (unpacked(&bench.out().join("potree1.zip")), dataset(&bench.out()))
+    });
+    assert_same_dataset(&scarce.0, &files, "unpacked");
+    assert_same_dataset(&scarce.1, &plenty.1, "an archive with other memory");
     let mut all: Vec<_> = found.into_values().flatten().collect();
     all.sort_unstable();
     let mut meant: Vec<_> = las.points.iter().map(|p| (p.xyz.map(i64::from), p.rgb.map(eight_bit))).collect();
     meant.sort_unstable();
     assert!(all == meant);
+}
+
+/// The files of an archive.
+fn unpacked(path: &Path) -> BTreeMap<String, Vec<u8>> {
+    let archive = Archive::open(path, "cloud.js").unwrap();
+    let read = |(name, bytes): (&str, u64)| {
+        let mut buffer = vec![0; bytes as usize];
+        archive.read_at(name, 0, &mut buffer).unwrap();
+        (name.to_owned(), buffer)
+    };
+    archive.files().map(read).collect()
+}
+
+#[test]
+fn an_archive_holds_the_files_of_the_folder_byte_for_byte_whatever_the_memory() {
+    let bench = Bench::new(&Las::terrain(200_000, 3));
+    bench.convert(leaves_of(500));
+    let folder = dataset(&bench.out());
+    let settings = Potree1Settings { archive: true, ..leaves_of(500) };
+    let [plenty, scarce] = [(2, 4 << 30), (1, 100 << 20)].map(|(threads, memory_bytes)| {
+        let plan = Plan { threads, memory_bytes, ..bench.plan.clone() };
+        let report = convert(&plan, &[settings.into()], &Silent).unwrap();
+        let files = dataset(&plan.output);
+        assert_eq!(files.keys().collect::<Vec<_>>(), ["potree1.zip"]);
+        assert_eq!(report.outputs[0].bytes, files["potree1.zip"].len() as u64);
+        files
+    });
+    assert_same_dataset(&scarce, &plenty, "with other memory and threads");
+    let path = bench.out().join("potree1.zip");
+    assert_same_dataset(&unpacked(&path), &folder, "unpacked");
+    assert!(plenty["potree1.zip"].starts_with(b"PK") && plenty["potree1.zip"][30..38] == *b"cloud.js");
+    let (octree, mut points) = (Dataset::open(&path).unwrap(), NodePoints::default());
+    let nodes = octree.read_hierarchy().unwrap();
+    assert!(nodes.iter().all(|node| octree.read_points(node.key, &mut points).is_ok()));
 }
 
 /// The values of all points of a dataset, by place and the values themselves.

@@ -57,14 +57,17 @@ const POTREE2: Row = Row {
     extension: None,
 };
 
+/// A Potree 1.x dataset in one file, in the folder of its output.
+const POTREE1_ARCHIVE: &str = "potree1.zip";
+
 const POTREE1: Row = Row {
     name: "potree1",
     title: "Potree 1.x",
     marker: "cloud.js",
     mark: "\"octreeDir\"",
     places: &[],
-    required: &[],               // the folder of the nodes can have any name
-    optional: &["sources.json"], // PotreeConverter writes it
+    required: &[],                                // the folder of the nodes can have any name
+    optional: &["sources.json", POTREE1_ARCHIVE], // PotreeConverter writes the first
     owns: is_node_file,
     extension: None,
 };
@@ -152,6 +155,14 @@ impl DatasetKind {
     /// Text within the first 64 KiB of the marker file that distinguishes it from files of the same name.
     pub const fn mark(self) -> &'static str {
         self.row().mark
+    }
+
+    /// The file in an output's folder that is a whole dataset of this kind, archived: "potree1.zip".
+    pub const fn archive_file(self) -> Option<&'static str> {
+        match self {
+            Self::Potree1 => Some(POTREE1_ARCHIVE),
+            _ => None,
+        }
     }
 
     /// The files that a dataset cannot be without, besides the marker file.
@@ -249,7 +260,14 @@ pub fn locate(path: impl AsRef<Path>) -> Result<Located, ReadError> {
 fn find(path: &Path) -> Option<Located> {
     let mut kinds = DatasetKind::ALL.iter().copied();
     if path.is_dir() {
-        let kind = kinds.find(|kind| path.join(kind.marker_file()).is_file())?;
+        let kind = match kinds.find(|kind| path.join(kind.marker_file()).is_file()) {
+            Some(kind) => kind,
+            None => {
+                let archive = path.join(POTREE1_ARCHIVE);
+                let is_one = is_archive_of(&archive, DatasetKind::Potree1);
+                return is_one.then_some(Located { kind: DatasetKind::Potree1, path: archive });
+            }
+        };
         let path = if kind.is_single_file() { path.join(kind.marker_file()) } else { path.to_path_buf() };
         return Some(Located { kind, path });
     }
@@ -375,6 +393,7 @@ mod tests {
             ("log.txt", DatasetKind::Potree2),
             ("cloud.js", DatasetKind::Potree1),
             ("sources.json", DatasetKind::Potree1),
+            ("potree1.zip", DatasetKind::Potree1),
             ("r.hrc", DatasetKind::Potree1),
             ("r0427.bin", DatasetKind::Potree1),
             ("leaves.bin", DatasetKind::Bintree),

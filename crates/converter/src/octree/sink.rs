@@ -59,6 +59,11 @@ pub(crate) trait NodeEncoder {
     /// parts.
     fn row_bytes(&self) -> Option<u64>;
 
+    /// Bytes of a node before those of its points. Of a node that is encoded in parts the sink makes them.
+    fn head_bytes(&self, _key: NodeKey) -> u64 {
+        0
+    }
+
     /// Bytes of memory that encoding takes for each point of a node beside its record, otherwise.
     fn bytes_per_point(&self) -> u64;
 }

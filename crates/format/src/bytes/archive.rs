@@ -61,6 +61,11 @@ impl Archive {
         read.is_ok() && &start == b"PK\x03\x04"
     }
 
+    /// Names and bytes of all files, in any order.
+    pub fn files(&self) -> impl Iterator<Item = (&str, u64)> + '_ {
+        self.entries.iter().map(|(name, entry)| (&**name, entry.bytes))
+    }
+
     fn entry(&self, file: &str) -> io::Result<Entry> {
         let entry = *self.entries.get(file).ok_or(io::ErrorKind::NotFound)?;
         if entry.is_stored {

@@ -3,6 +3,8 @@
 
 #[cfg(feature = "zip")]
 mod archive;
+#[cfg(feature = "zip")]
+mod archive_parts;
 mod room;
 mod source;
 mod tree;
@@ -12,6 +14,8 @@ use std::io;
 
 #[cfg(feature = "zip")]
 pub use archive::Archive;
+#[cfg(feature = "zip")]
+pub use archive_parts::{ArchivedFile, MIN_ARCHIVE_PADDING, put_archive_end};
 pub(crate) use room::STEP;
 pub use room::{open_file, read_file, try_resize};
 pub use source::{ByteSource, Folder, Memory};

@@ -53,8 +53,7 @@ mod tests {
             let mut warnings = Vec::new();
             (crs_of(wkt, text, &mut warnings), warnings.len())
         };
-        let mut proj4 = Crs::default();
-        proj4.proj4 = Some("+proj=utm +zone=33".to_owned());
+        let mut proj4 = Crs { proj4: Some("+proj=utm +zone=33".to_owned()), ..Crs::default() };
         assert_eq!(of(None, " +proj=utm +zone=33\n"), (proj4.clone(), 0));
         proj4.wkt = Some("PROJCS[]".to_owned());
         assert_eq!(of(Some("PROJCS[]"), "+proj=utm +zone=33"), (proj4, 0));

@@ -151,7 +151,7 @@ mod tests {
         let own = Lattice { scale: [0.001; 3], offset: [4_428_000.0; 3] };
         let bounds = Aabb { min: [4_428_000.0; 3], max: [4_428_100.0; 3] };
         assert_eq!(with_offset(&own, [4_427_999.999; 3], &bounds).map(|l| l.offset), Some([4_427_999.999; 3]));
-        assert_eq!(with_offset(&own, [4_427_999.9995; 3], &bounds), None, "half a step away");
+        assert_eq!(with_offset(&own, [4_427_999.999_5; 3], &bounds), None, "half a step away");
         assert_eq!(with_offset(&own, [0.0; 3], &bounds), None, "4,428,000,000 steps");
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::octree::{Octree, OctreeNode};
-use crate::potree2::{Dataset, Encoding, METADATA_FILE, Metadata, OCTREE_FILE};
+use crate::potree2::{Dataset, Encoding, METADATA_FILE, Metadata, Node, OCTREE_FILE};
 use crate::{Aabb, Lattice, OpenOptions, ReadError, Scan};
 
 use super::columns::Columns;
@@ -58,6 +58,11 @@ fn check(dataset: &Dataset, nodes: &[OctreeNode]) -> Result<(), ReadError> {
         if let Some(one) = point_bytes.filter(|one| one * u128::from(node.points) != u128::from(node.byte_size)) {
             let what = format!("node {} has {} bytes for {} points of {one}", node.key, node.byte_size, node.points);
             return broken(node, what);
+        }
+        // or memory would be asked for what is not there
+        let node = Node::from(node);
+        if dataset.is_doubtful(&node) {
+            dataset.check_payload(&node)?;
         }
     }
     Ok(())

@@ -38,12 +38,14 @@ fn a_payload_has_one_node() {
 
 #[test]
 fn a_count_that_its_payload_does_not_have_is_refused() {
-    let (_kept, folder) = changed("potree2/default", |name, bytes| {
-        if name == "hierarchy.bin" {
-            bytes[field(0, 2)..field(0, 6)].copy_from_slice(&u32::MAX.to_le_bytes());
-        }
-    });
-    broken(&refused(&folder, &OpenOptions::default()), &["octree.bin", "node r has", "4294967295 points"]);
+    for (encoding, words) in [("default", "node r has"), ("brotli", "node r claims")] {
+        let (_kept, folder) = changed(&format!("potree2/{encoding}"), |name, bytes| {
+            if name == "hierarchy.bin" {
+                bytes[field(0, 2)..field(0, 6)].copy_from_slice(&u32::MAX.to_le_bytes());
+            }
+        });
+        broken(&refused(&folder, &OpenOptions::default()), &["octree.bin", words, "4294967295 points"]);
+    }
 }
 
 #[test]

@@ -1,15 +1,14 @@
 //! The index, walked file by file; nothing in it is trusted.
 
 use std::collections::{HashMap, VecDeque};
-use std::path::Path;
 
 use pointmill_format::NodeKey;
 use pointmill_format::ReadError;
-use pointmill_format::bytes::{open_file, read_exact_at};
 use pointmill_format::potree1::IndexRecord;
 
 use super::expect::Names;
 use super::files::Files;
+use super::store::Store;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::memory::Budget;
@@ -26,7 +25,7 @@ pub(crate) struct Indexed {
 
 /// The index of a dataset: nodes once each, parents before their children.
 pub(crate) struct Index<'a> {
-    pub(crate) folder: &'a Path,
+    pub(crate) store: &'a Store,
     pub(crate) names: &'a Names,
     pub(crate) files: &'a Files,
     pub(crate) budget: &'a Budget,
@@ -70,8 +69,7 @@ impl Index<'_> {
     /// Reads one file as far as there are nodes: it may be longer than anything in it.
     fn read(&self, root: NodeKey, bytes: u64, nodes: &mut Vec<Indexed>, queue: &mut Pending) -> Result<(), ReadError> {
         const STEP: usize = IndexRecord::LEN << 14;
-        let path = self.folder.join(self.names.index(root));
-        let file = open_file(&path).map_err(|e| ReadError::io(&path, "opening", e))?;
+        let file = self.names.index(root);
         let whole = bytes - bytes % IndexRecord::LEN as u64;
         if whole != bytes {
             let expected = format!("a multiple of {} bytes", IndexRecord::LEN);
@@ -81,7 +79,7 @@ impl Index<'_> {
         let (mut keys, mut taken, mut buffer) = (VecDeque::from([root]), 0u64, Vec::new());
         for at in (0..whole).step_by(STEP) {
             buffer.resize(STEP.min((whole - at) as usize), 0);
-            read_exact_at(&file, &mut buffer, at).map_err(|e| ReadError::io(&path, "reading an index", e))?;
+            self.store.read_at(&file, at, &mut buffer, "reading an index")?;
             for record in buffer.as_chunks::<{ IndexRecord::LEN }>().0 {
                 let Some(key) = keys.pop_front() else { break };
                 let record = IndexRecord::from_bytes(record);

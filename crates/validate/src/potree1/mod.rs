@@ -18,15 +18,16 @@ mod metadata;
 mod nodes;
 mod records;
 mod steps;
+mod store;
 mod structure;
 
 use std::path::Path;
 use std::sync::Mutex;
 
-use pointmill_format::bytes::read_file;
+use pointmill_format::bytes::try_resize;
 use pointmill_format::octree::Octree as _;
 use pointmill_format::potree1::{Dataset, METADATA_FILE, Metadata, NodeFiles};
-use pointmill_format::{Aabb, Advice, DatasetKind, NodeKey, ReadError};
+use pointmill_format::{Aabb, DatasetKind, NodeKey, ReadError};
 use serde_json::Value;
 
 use crate::accuracy::{self, Known, Side};
@@ -47,21 +48,20 @@ use index::Index;
 use nodes::Nodes;
 use records::Records;
 use steps::Steps;
+use store::Store;
 
 /// More JSON than this is not metadata.
 const MAX_METADATA_BYTES: u64 = 256 << 20;
 
-/// Checks the dataset in `folder`.
+/// Checks the dataset in `folder`, or in the archive that it is.
 ///
 /// # Errors
 /// As [`crate::validate`].
 pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -> Result<Outcome, ReadError> {
-    if folder.is_file() {
-        return Err(ReadError::unsupported(folder, "an archive is not validated as it is").advise(Advice::Unpack));
-    }
     let mut budget = Budget::new(folder, options.memory_bytes)?;
+    let store = Store::open(folder, &mut budget)?;
     let findings = Findings::new(DatasetKind::Potree1, options.max_problems);
-    let bytes = metadata_bytes(folder, &budget)?;
+    let bytes = metadata_bytes(&store, folder, &budget)?;
     let json: Option<Value> = serde_json::from_slice(&bytes).ok();
     let mut dataset = match Dataset::open(folder) {
         Ok(dataset) => dataset,
@@ -78,7 +78,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         paths => Some(Against::open(paths, &options.open, rules)?),
     };
 
-    let tree = tree(folder, &dataset, &mut budget, &findings)?;
+    let tree = tree(&store, &dataset, &mut budget, &findings)?;
     dataset.set_max_node_bytes(budget.left());
     let metadata = dataset.metadata();
     let most_points = own["maxNodePoints"].as_u64();
@@ -152,10 +152,16 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
 }
 
 /// `cloud.js`.
-fn metadata_bytes(folder: &Path, budget: &Budget) -> Result<Vec<u8>, ReadError> {
-    let path = folder.join(METADATA_FILE);
-    let bytes = read_file(&path, MAX_METADATA_BYTES).map_err(|e| ReadError::io(&path, "reading", e))?;
-    budget.require(bytes.len() as u64 * memory::JSON)?;
+fn metadata_bytes(store: &Store, folder: &Path, budget: &Budget) -> Result<Vec<u8>, ReadError> {
+    let size = store.size(METADATA_FILE)?;
+    if size > MAX_METADATA_BYTES {
+        let error = std::io::ErrorKind::FileTooLarge.into();
+        return Err(ReadError::io(folder.join(METADATA_FILE), "reading", error));
+    }
+    budget.require(size * memory::JSON)?;
+    let mut bytes = Vec::new();
+    try_resize(&mut bytes, size).map_err(|e| ReadError::io(folder.join(METADATA_FILE), "reading", e))?;
+    store.read_at(METADATA_FILE, 0, &mut bytes, "reading")?;
     Ok(bytes)
 }
 
@@ -179,7 +185,7 @@ fn steps_of(metadata: &Metadata, own: &Value) -> Steps {
 }
 
 /// The tree by index and files.
-fn tree(folder: &Path, dataset: &Dataset, budget: &mut Budget, findings: &Findings) -> Result<Tree, ReadError> {
+fn tree(store: &Store, dataset: &Dataset, budget: &mut Budget, findings: &Findings) -> Result<Tree, ReadError> {
     let metadata = dataset.metadata();
     let names = Names {
         octree_dir: metadata.octree_dir.clone(),
@@ -187,11 +193,11 @@ fn tree(folder: &Path, dataset: &Dataset, budget: &mut Budget, findings: &Findin
         extension: metadata.files.extension(),
         has_folders: metadata.minor >= 5,
     };
-    let files = Files::look(folder, &names, budget, findings)?;
+    let files = Files::look(store, &names, budget, findings)?;
     let list = metadata.nodes.as_ref().filter(|_| !files.indexes.contains_key(&NodeKey::ROOT));
     let indexed = match list {
         Some(list) => index::listed(list, findings),
-        None => Index { folder, names: &names, files: &files, budget, findings }.walk()?,
+        None => Index { store, names: &names, files: &files, budget, findings }.walk()?,
     };
     budget.take(indexed.len() as u64 * NODE_BYTES)?;
     structure::tree(&indexed, &files, dataset, findings)

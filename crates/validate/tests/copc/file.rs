@@ -263,7 +263,7 @@ impl Writer {
         let count = cloud.points().count() as u64;
         put(out, 247, &count.to_le_bytes());
         put(out, 255, &count.to_le_bytes());
-        let [first, last] = range(&mut cloud.points().map(|p| p.gps_time));
+        let [first, last] = range(&mut cloud.points().map(|p| p.gps_time).filter(|t| t.is_finite()));
         for (at, value) in [(24, half), (32, 2.0 * half / 128.0), (56, first), (64, last)] {
             put(out, INFO + at, &value.to_le_bytes());
         }

@@ -3,8 +3,10 @@
 use std::sync::{Mutex, PoisonError};
 
 use pointmill_format::batches::eight_bit;
+use pointmill_format::potree1::Metadata;
 use pointmill_format::{Changes, NodeKey};
 
+use super::archive;
 use super::content::{COLOUR_BYTES, Colour, Content};
 use super::errors::{Meter, Seen};
 use super::steps::Steps;
@@ -25,6 +27,8 @@ pub(super) struct Encoding<'a> {
     pub(super) tally: Mutex<Tally>,
     stored_stride: usize,
     meter: Option<Meter>,
+    /// What files are called, if nodes have the heads of those of an archive.
+    pub(super) archived: Option<Metadata>,
     events: &'a dyn Events,
 }
 
@@ -37,7 +41,7 @@ impl<'a> Encoding<'a> {
         meter: Option<Meter>,
         events: &'a dyn Events,
     ) -> Self {
-        Self { content, steps, tally: Mutex::default(), stored_stride, meter, events }
+        Self { content, steps, tally: Mutex::default(), stored_stride, meter, archived: None, events }
     }
 }
 
@@ -85,10 +89,12 @@ impl NodeEncoder for RecordEncoder<'_> {
         written: &mut Checksum,
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError> {
-        let Encoding { content, steps, stored_stride, meter, events, .. } = self.encoding;
+        let Encoding { content, steps, stored_stride, meter, archived, events, .. } = self.encoding;
         if events.stop_requested() {
             return Err(ConvertError::Interrupted);
         }
+        let first = out.len();
+        let head = archived.as_ref().map(|metadata| archive::begin(metadata, key, out));
         let (stride, steps) = (content.stride, steps.of(key));
         out.reserve(records.len() * stride);
         self.tile.resize(TILE_RECORDS * stored_stride, 0);
@@ -110,11 +116,18 @@ impl NodeEncoder for RecordEncoder<'_> {
                 meter.look(tile, &mut self.tally.positions);
             }
         }
+        if let Some(head) = head {
+            archive::end(first, head, out);
+        }
         Ok(())
     }
 
     fn row_bytes(&self) -> Option<u64> {
         Some(self.encoding.content.stride as u64)
+    }
+
+    fn head_bytes(&self, key: NodeKey) -> u64 {
+        self.encoding.archived.as_ref().map_or(0, |metadata| archive::head_len(metadata, key) as u64)
     }
 
     fn bytes_per_point(&self) -> u64 {

@@ -1,4 +1,4 @@
-//! Where the bytes of nodes go: a file each, in nested folders.
+//! Where the bytes of nodes go: a file each, in nested folders, or in one archive.
 
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use pointmill_format::NodeKey;
 use pointmill_format::potree1::Metadata;
 
+use super::archive::{ARCHIVE_FILE, Archive};
 use super::encoder::{Encoding, RecordEncoder};
 use crate::error::ConvertError;
 use crate::octree::{FinishedNode, NodeSink};
@@ -24,6 +25,8 @@ pub(super) struct NodeFiles<'a> {
     metadata: Metadata,
     staged: &'a StagedDataset,
     folders: Mutex<Folders>,
+    /// In place of files.
+    archive: Option<Archive>,
 }
 
 /// Folders that were made.
@@ -40,9 +43,25 @@ impl<'a> NodeFiles<'a> {
         staged: &'a StagedDataset,
         rt: &Runtime<'_>,
     ) -> Result<Self, ConvertError> {
-        staged.create_folder(&metadata.octree_dir)?;
+        let archive = match &encoding.archived {
+            Some(_) => Some(Archive::new(staged, metadata, ARCHIVE_FILE, rt)?),
+            None => {
+                staged.create_folder(&metadata.octree_dir)?;
+                None
+            }
+        };
         let folders = Folders { made: HashSet::new(), room: Reservation::new(&rt.memory, Consumer::Nodes) };
-        Ok(Self { encoding, metadata, staged, folders: Mutex::new(folders) })
+        Ok(Self { encoding, metadata, staged, folders: Mutex::new(folders), archive })
+    }
+
+    /// What is known of the dataset.
+    pub(super) fn metadata(&self) -> &Metadata {
+        self.metadata
+    }
+
+    /// The archive, if that is where nodes go.
+    pub(super) fn into_archive(self) -> Option<Archive> {
+        self.archive
     }
 
     /// What is known of the dataset.
@@ -119,6 +138,9 @@ impl NodeSink for NodeFiles<'_> {
     }
 
     fn write(&self, nodes: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
+        if let Some(archive) = &self.archive {
+            return archive.write(nodes, bytes, offset);
+        }
         for node in nodes {
             let from = (node.byte_offset - offset) as usize;
             self.put(node, &bytes[from..from + node.byte_size as usize])?;
@@ -127,6 +149,9 @@ impl NodeSink for NodeFiles<'_> {
     }
 
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
+        if let Some(archive) = &self.archive {
+            return archive.write_part(node, bytes, &self.metadata.node_file(node.key));
+        }
         if at == 0 {
             return self.put(node, bytes);
         }

@@ -3,6 +3,7 @@
 //! [`content`] decides what a record is made of, [`column`] fills what follows the colour; [`steps`] turns positions into
 //! integers of the box of their node, [`errors`] says how far these are from the lattice. [`files`] is a `NodeSink`.
 
+mod archive;
 mod column;
 mod content;
 mod encoder;
@@ -16,7 +17,7 @@ mod steps;
 use std::sync::PoisonError;
 
 use pointmill_format::DatasetKind;
-use pointmill_format::potree1::{METADATA_FILE, Metadata, NodeCount, encode_index};
+use pointmill_format::potree1::{IndexFile, METADATA_FILE, Metadata, NodeCount, encode_index};
 use serde_json::{Map, Value};
 
 pub use settings::{Potree1Settings, Potree1Version};
@@ -42,6 +43,9 @@ use crate::warning::Warning;
 
 /// Bytes that a file takes on a disk beside its contents, on average, and its record in an index.
 const NODE_BYTES: u64 = 2048 + 5;
+
+/// The same of a file in an archive: its head and its entry.
+const ARCHIVED_BYTES: u64 = 150 + 5;
 
 impl From<Potree1Settings> for Target {
     fn from(settings: Potree1Settings) -> Self {
@@ -80,12 +84,15 @@ impl Output for Potree1Settings {
         let colour = schema.rgb().map_or(0, |i| schema.attributes[i].size() as u64);
         let others = if plan.attributes == AttributeChoice::Usual { 0 } else { kept.saturating_sub(colour) };
         let per_point = (POSITION_BYTES + COLOUR_BYTES) as u64 + others;
-        DiskSize { per_point, per_1000_points: nodes * NODE_BYTES }
+        DiskSize { per_point, per_1000_points: nodes * if self.archive { ARCHIVED_BYTES } else { NODE_BYTES } }
     }
 
     fn describe_settings(&self, settings: &mut Map<String, Value>) {
         self.tree().describe(settings);
         settings.insert("potree1-version".into(), self.version.name().into());
+        if self.archive {
+            settings.insert("archive".into(), true.into());
+        }
         if let Some(most) = self.max_node_points {
             settings.insert("max-node-points".into(), most.into());
         }
@@ -122,6 +129,7 @@ impl OctreeOutput for Potree1Settings {
         }
         let metadata = metadata::metadata(cloud, self, &spacing, &content, &steps);
         let meter = Meter::new(cloud, &steps);
+<<<<<<< HEAD
         let encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
         let files = NodeFiles::new(encoding, metadata, to, rt)?;
         Ok(Box::new(Writer { settings: self, cloud, rt, to, spacing, files }))
@@ -151,9 +159,33 @@ impl OctreeWriter for Writer<'_> {
         let Self { settings, cloud, rt, to, spacing, files } = *self;
         let index_bytes = write_index(&tree, to, &files, rt)?;
         let (Encoding { content, steps, tally, .. }, mut metadata) = files.into_parts();
+=======
+        let mut encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
+        encoding.archived = self.archive.then(|| metadata.clone());
+        let settings = OctreeSettings {
+            sampling: self.sampling,
+            spacing: spacing.spacing,
+            leaf_capacity: self.capacity(),
+            most_points: self.max_node_points.unwrap_or(u32::MAX),
+            unit_points: self.tree().unit_points(cloud),
+        };
+        let files = NodeFiles::new(&encoding, &metadata, to, rt)?;
+        let tree = octree::build(cloud, rt, settings, &files)?;
+        let indexes = indexes(&tree, &metadata)?;
+        if !self.archive {
+            write_index(&tree, &indexes, to, &files, rt)?;
+        }
+        let archive = files.into_archive();
+>>>>>>> main
         metadata.points = Some(tree.ledger.points());
-        let json = metadata.to_json();
-        to.write(METADATA_FILE, json.as_bytes())?;
+        let bytes = match archive {
+            Some(archive) => archive.finish(&tree.nodes, tree.bytes, &indexes, &metadata, rt)?,
+            None => {
+                let json = metadata.to_json();
+                to.write(METADATA_FILE, json.as_bytes())?;
+                tree.bytes + indexes.iter().map(|index| index.bytes.len() as u64).sum::<u64>() + json.len() as u64
+            }
+        };
 
         let tally = tally.into_inner().unwrap_or_else(PoisonError::into_inner);
         let (attributes_changed, changes) = settings.changes(cloud, &content, &tally);
@@ -171,7 +203,7 @@ impl OctreeWriter for Writer<'_> {
             attributes_changed,
             attributes_renamed: content.renamed,
             warnings,
-            bytes: tree.bytes + index_bytes + json.len() as u64,
+            bytes,
             checksum: tree.ledger.unaltered().to_string(),
             tree: tree_report(&tree),
             details: settings.details(&spacing, &metadata),
@@ -209,9 +241,18 @@ impl Potree1Settings {
     }
 }
 
-/// Writes the index files, and syncs all that was written; returns the bytes of the index.
+/// The index files.
+fn indexes(tree: &Octree, metadata: &Metadata) -> Result<Vec<IndexFile>, ConvertError> {
+    let mut counts: Vec<NodeCount> =
+        tree.nodes.iter().map(|node| NodeCount { key: node.key, points: node.points }).collect();
+    encode_index(&mut counts, metadata.step)
+        .map_err(|e| ConvertError::Internal(format!("the index of the octree: {e}")))
+}
+
+/// Writes the index files, and syncs all that was written.
 fn write_index(
     tree: &Octree,
+<<<<<<< HEAD
     to: &StagedDataset,
     files: &NodeFiles<'_>,
     rt: &Runtime<'_>,
@@ -223,11 +264,17 @@ fn write_index(
         .map_err(|e| ConvertError::Internal(format!("the index of the octree: {e}")))?;
     let mut bytes = 0;
     for index in &indexes {
+=======
+    indexes: &[IndexFile],
+    to: &StagedDataset,
+    files: &NodeFiles<'_>,
+    rt: &Runtime<'_>,
+) -> Result<(), ConvertError> {
+    for index in indexes {
+>>>>>>> main
         rt.check_stop()?;
-        to.create(&metadata.index_file(index.root))?.write_at(&index.bytes, 0, "writing the index")?;
-        bytes += index.bytes.len() as u64;
+        to.create(&files.metadata().index_file(index.root))?.write_at(&index.bytes, 0, "writing the index")?;
     }
     let roots: Vec<_> = indexes.iter().map(|index| index.root).collect();
-    files.sync(&tree.nodes, &roots, rt)?;
-    Ok(bytes)
+    files.sync(&tree.nodes, &roots, rt)
 }

@@ -16,6 +16,8 @@ pub struct Potree1Settings {
     pub max_node_points: Option<u32>,
     /// How attributes are described, and so which there can be.
     pub version: Potree1Version,
+    /// All files are in one archive, uncompressed.
+    pub archive: bool,
 }
 
 impl Default for Potree1Settings {
@@ -26,6 +28,7 @@ impl Default for Potree1Settings {
             leaf_capacity: 20_000,
             max_node_points: None,
             version: Potree1Version::V1_7,
+            archive: false,
         }
     }
 }

@@ -116,7 +116,7 @@ impl Own {
                 let has = |key: &str, value: &str| has_pair(&head, key, value);
                 (has("format", "pointmill-bintree\"") && has("generator", "pointmill "), has("layout", "packed\""))
             }
-            DatasetKind::Potree1 => (is_cloud(&marker), false),
+            DatasetKind::Potree1 => (is_cloud(&marker) || is_archive(folder, kind), false),
             DatasetKind::Batches => (head(&marker, 8).is_some_and(|h| h == kind.mark().as_bytes()), false),
             DatasetKind::Copc => (head(&marker, HEAD_BYTES).is_some_and(|h| is_copc(&h)), false),
             _ => (false, false),
@@ -131,7 +131,7 @@ impl Own {
             || match self.kind {
                 DatasetKind::Bintree if self.is_packed => name == "leaves.bin",
                 DatasetKind::Bintree => name != "leaves.bin" && self.kind.owns(name),
-                _ => self.kind.required_files().contains(&name),
+                _ => self.kind.required_files().contains(&name) || self.kind.archive_file() == Some(name),
             };
         is_named && is_file(path)
     }
@@ -174,18 +174,41 @@ fn is_metadata(path: &Path) -> bool {
     is_json::<Metadata>(path)
 }
 
+#[derive(Deserialize)]
+struct Object {}
+
+/// What is in the metadata of a Potree 1 octree of ours.
+#[derive(Deserialize)]
+struct Cloud {
+    #[serde(rename = "octreeDir")]
+    _octree_dir: String,
+    #[serde(rename = "pointmill")]
+    _pointmill: Object,
+}
+
 /// True if the file is the metadata of a Potree 1 octree of ours.
 fn is_cloud(path: &Path) -> bool {
-    #[derive(Deserialize)]
-    struct Object {}
-    #[derive(Deserialize)]
-    struct Cloud {
-        #[serde(rename = "octreeDir")]
-        _octree_dir: String,
-        #[serde(rename = "pointmill")]
-        _pointmill: Object,
-    }
     is_json::<Cloud>(path)
+}
+
+/// True if the archive of an output has metadata of ours as its first file.
+fn is_archive(folder: &Path, kind: DatasetKind) -> bool {
+    let Some(path) = kind.archive_file().map(|name| folder.join(name)).filter(|path| is_file(path)) else {
+        return false;
+    };
+    let Ok(mut file) = File::open(path) else { return false };
+    let mut head = [0; 30];
+    if file.read_exact(&mut head).is_err() || !head.starts_with(b"PK\x03\x04\x14\0") || head[8..10] != [0, 0] {
+        return false;
+    }
+    let [name, extra] = [26, 28].map(|at| u64::from(u16::from_le_bytes([head[at], head[at + 1]])));
+    let bytes = u32::from_le_bytes([head[22], head[23], head[24], head[25]]);
+    let (mut named, mut json) = (Vec::new(), Vec::new());
+    let read = file.by_ref().take(name).read_to_end(&mut named).and_then(|_| {
+        io::copy(&mut file.by_ref().take(extra), &mut io::sink())?;
+        file.take(u64::from(bytes).min(JSON_BYTES)).read_to_end(&mut json)
+    });
+    read.is_ok() && named == kind.marker_file().as_bytes() && serde_json::from_slice::<Cloud>(&json).is_ok()
 }
 
 /// True for the first bytes of a COPC file whose header names this program: COPC files of others are scans.
@@ -226,7 +249,9 @@ fn has_pair(text: &[u8], key: &str, value: &str) -> bool {
 pub(super) fn rank(name: &str) -> u8 {
     match name {
         REPORT_FILE => 1,
-        name if DatasetKind::ALL.iter().any(|kind| kind.marker_file() == name) => 2,
+        name if DatasetKind::ALL.iter().any(|kind| kind.marker_file() == name || kind.archive_file() == Some(name)) => {
+            2
+        }
         _ => 0,
     }
 }
