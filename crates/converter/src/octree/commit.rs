@@ -140,11 +140,7 @@ impl<'a, S: Sinks> Committer<'a, S> {
             loop {
                 let next = state.next;
                 let Some(unit) = state.waiting.remove(&next) else { break };
-<<<<<<< HEAD
                 state.append(unit, encoders, &mut ready)?;
-=======
-                state.append(unit, &*encoder, &mut ready)?;
->>>>>>> main
                 state.next += 1;
             }
         }
@@ -217,17 +213,10 @@ impl State {
     fn append(
         &mut self,
         unit: BuiltUnit,
-<<<<<<< HEAD
         encoders: &impl Encoders,
         ready: &mut Vec<Placed>,
     ) -> Result<(), ConvertError> {
         let BuiltUnit { pieces, root, ledger, written, overfull_leaves } = unit;
-=======
-        encoder: &impl NodeEncoder,
-        ready: &mut Vec<Placed>,
-    ) -> Result<(), ConvertError> {
-        let BuiltUnit { pieces, root, ledger, overfull_leaves } = unit;
->>>>>>> main
         self.ledger.merge(&ledger);
         self.placed.iter_mut().zip(&written).for_each(|(stream, sum)| stream.written.merge(sum));
         self.overfull_leaves += overfull_leaves;
@@ -243,21 +232,11 @@ impl State {
                     }
                 }
                 Piece::Large(key, points) => {
-<<<<<<< HEAD
                     let place = |(i, stream): (usize, &mut PlacedStream)| {
-                        stream.place_large(key, points.count(), encoders.row_bytes(i))
+                        stream.place_large(key, points.count(), encoders.large_bytes(i, key, points.count()))
                     };
                     let nodes = self.placed.iter_mut().enumerate().map(place).collect::<Result<_, _>>()?;
                     ready.push(Placed::Large { nodes, points });
-=======
-                    let too_many = || Unsupported::CrowdedNode { points: points.count(), max: u64::MAX };
-                    let rows = encoder.row_bytes().and_then(|b| points.count().checked_mul(b));
-                    let byte_size = rows.and_then(|b| b.checked_add(encoder.head_bytes(key))).ok_or_else(too_many)?;
-                    let node = FinishedNode { key, points: points_of(points.count())?, byte_offset: offset, byte_size };
-                    self.nodes.push(node);
-                    self.bytes += byte_size;
-                    ready.push(Placed::Large { node, points });
->>>>>>> main
                 }
             }
         }
@@ -271,10 +250,9 @@ impl State {
 }
 
 impl PlacedStream {
-    /// The place of a node that is encoded later, `row_bytes` a point.
-    fn place_large(&mut self, key: NodeKey, points: u64, row_bytes: Option<u64>) -> Result<FinishedNode, ConvertError> {
-        let too_many = || Unsupported::CrowdedNode { points, max: u64::MAX };
-        let byte_size = row_bytes.and_then(|b| points.checked_mul(b)).ok_or_else(too_many)?;
+    /// The place of a node that is encoded later, to so many bytes.
+    fn place_large(&mut self, key: NodeKey, points: u64, bytes: Option<u64>) -> Result<FinishedNode, ConvertError> {
+        let byte_size = bytes.ok_or(Unsupported::CrowdedNode { points, max: u64::MAX })?;
         let node = FinishedNode { key, points: points_of(points)?, byte_offset: self.bytes, byte_size };
         self.nodes.push(node);
         self.bytes += byte_size;

@@ -53,8 +53,8 @@ pub(super) trait Encoders {
         streams: &mut [Stream],
     ) -> Result<(), ConvertError>;
 
-    /// As [`NodeEncoder::row_bytes`].
-    fn row_bytes(&self, stream: usize) -> Option<u64>;
+    /// Bytes of a node that is encoded in parts.
+    fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64>;
 
     /// True if nodes may be encoded in parts.
     fn takes_parts(&self) -> bool;
@@ -98,8 +98,8 @@ impl<E: NodeEncoder> Encoders for E {
         NodeEncoder::encode(self, key, records, written, bytes)
     }
 
-    fn row_bytes(&self, _: usize) -> Option<u64> {
-        NodeEncoder::row_bytes(self)
+    fn large_bytes(&self, _: usize, key: NodeKey, points: u64) -> Option<u64> {
+        NodeEncoder::row_bytes(self)?.checked_mul(points)?.checked_add(NodeEncoder::head_bytes(self, key))
     }
 
     fn takes_parts(&self) -> bool {
@@ -135,8 +135,8 @@ pub(crate) trait AnyEncoder {
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError>;
 
-    /// As [`NodeEncoder::row_bytes`].
-    fn any_row_bytes(&self) -> Option<u64>;
+    /// As [`Encoders::large_bytes`]; `None`: nodes are not encoded in parts.
+    fn any_large_bytes(&self, key: NodeKey, points: u64) -> Option<u64>;
 
     /// As [`NodeEncoder::bytes_per_point`].
     fn any_bytes_per_point(&self) -> u64;
@@ -168,8 +168,8 @@ impl<E: NodeEncoder> AnyEncoder for E {
         NodeEncoder::encode(self, key, rows.chunks_exact(stride), written, out)
     }
 
-    fn any_row_bytes(&self) -> Option<u64> {
-        NodeEncoder::row_bytes(self)
+    fn any_large_bytes(&self, key: NodeKey, points: u64) -> Option<u64> {
+        self.large_bytes(0, key, points)
     }
 
     fn any_bytes_per_point(&self) -> u64 {
@@ -244,12 +244,12 @@ impl Encoders for SeveralEncoders<'_> {
         })
     }
 
-    fn row_bytes(&self, stream: usize) -> Option<u64> {
-        self.encoders.get(stream)?.any_row_bytes()
+    fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64> {
+        self.encoders.get(stream)?.any_large_bytes(key, points)
     }
 
     fn takes_parts(&self) -> bool {
-        self.encoders.iter().all(|encoder| encoder.any_row_bytes().is_some())
+        self.encoders.iter().all(|encoder| encoder.any_large_bytes(NodeKey::ROOT, 1).is_some())
     }
 
     fn bytes_per_point(&self) -> u64 {

@@ -44,7 +44,7 @@ impl<'a> NodeFiles<'a> {
         rt: &Runtime<'_>,
     ) -> Result<Self, ConvertError> {
         let archive = match &encoding.archived {
-            Some(_) => Some(Archive::new(staged, metadata, ARCHIVE_FILE, rt)?),
+            Some(_) => Some(Archive::new(staged, &metadata, ARCHIVE_FILE, rt)?),
             None => {
                 staged.create_folder(&metadata.octree_dir)?;
                 None
@@ -56,22 +56,12 @@ impl<'a> NodeFiles<'a> {
 
     /// What is known of the dataset.
     pub(super) fn metadata(&self) -> &Metadata {
-        self.metadata
-    }
-
-    /// The archive, if that is where nodes go.
-    pub(super) fn into_archive(self) -> Option<Archive> {
-        self.archive
-    }
-
-    /// What is known of the dataset.
-    pub(super) fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// What they were made with, once all are.
-    pub(super) fn into_parts(self) -> (Encoding<'a>, Metadata) {
-        (self.encoding, self.metadata)
+    /// What they were made with, once all are; and the archive, if that is where nodes went.
+    pub(super) fn into_parts(self) -> (Encoding<'a>, Metadata, Option<Archive>) {
+        (self.encoding, self.metadata, self.archive)
     }
 
     /// Writes the file of a node.

@@ -129,8 +129,8 @@ impl OctreeOutput for Potree1Settings {
         }
         let metadata = metadata::metadata(cloud, self, &spacing, &content, &steps);
         let meter = Meter::new(cloud, &steps);
-<<<<<<< HEAD
-        let encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
+        let mut encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
+        encoding.archived = self.archive.then(|| metadata.clone());
         let files = NodeFiles::new(encoding, metadata, to, rt)?;
         Ok(Box::new(Writer { settings: self, cloud, rt, to, spacing, files }))
     }
@@ -157,26 +157,11 @@ impl OctreeWriter for Writer<'_> {
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {
         let Self { settings, cloud, rt, to, spacing, files } = *self;
-        let index_bytes = write_index(&tree, to, &files, rt)?;
-        let (Encoding { content, steps, tally, .. }, mut metadata) = files.into_parts();
-=======
-        let mut encoding = Encoding::new(content, steps, cloud.frame.stride, meter, rt.events());
-        encoding.archived = self.archive.then(|| metadata.clone());
-        let settings = OctreeSettings {
-            sampling: self.sampling,
-            spacing: spacing.spacing,
-            leaf_capacity: self.capacity(),
-            most_points: self.max_node_points.unwrap_or(u32::MAX),
-            unit_points: self.tree().unit_points(cloud),
-        };
-        let files = NodeFiles::new(&encoding, &metadata, to, rt)?;
-        let tree = octree::build(cloud, rt, settings, &files)?;
-        let indexes = indexes(&tree, &metadata)?;
-        if !self.archive {
+        let indexes = indexes(&tree, files.metadata())?;
+        if !settings.archive {
             write_index(&tree, &indexes, to, &files, rt)?;
         }
-        let archive = files.into_archive();
->>>>>>> main
+        let (Encoding { content, steps, tally, .. }, mut metadata, archive) = files.into_parts();
         metadata.points = Some(tree.ledger.points());
         let bytes = match archive {
             Some(archive) => archive.finish(&tree.nodes, tree.bytes, &indexes, &metadata, rt)?,
@@ -252,26 +237,12 @@ fn indexes(tree: &Octree, metadata: &Metadata) -> Result<Vec<IndexFile>, Convert
 /// Writes the index files, and syncs all that was written.
 fn write_index(
     tree: &Octree,
-<<<<<<< HEAD
-    to: &StagedDataset,
-    files: &NodeFiles<'_>,
-    rt: &Runtime<'_>,
-) -> Result<u64, ConvertError> {
-    let metadata = files.metadata();
-    let mut counts: Vec<NodeCount> =
-        tree.nodes.iter().map(|node| NodeCount { key: node.key, points: node.points }).collect();
-    let indexes = encode_index(&mut counts, metadata.step)
-        .map_err(|e| ConvertError::Internal(format!("the index of the octree: {e}")))?;
-    let mut bytes = 0;
-    for index in &indexes {
-=======
     indexes: &[IndexFile],
     to: &StagedDataset,
     files: &NodeFiles<'_>,
     rt: &Runtime<'_>,
 ) -> Result<(), ConvertError> {
     for index in indexes {
->>>>>>> main
         rt.check_stop()?;
         to.create(&files.metadata().index_file(index.root))?.write_at(&index.bytes, 0, "writing the index")?;
     }
