@@ -110,7 +110,7 @@ fn commands_and_options_that_are_none() {
     check_all(&[
         ("", 2, &["no command", "convert, export, validate, extract, info", "see 'pointmill --help'"]),
         ("convrt", 2, &["'convrt'", "did you mean convert?"]),
-        ("bogus", 2, &["no command 'bogus'", "convert, validate"]),
+        ("bogus", 2, &["no command 'bogus'", "convert, export, validate"]),
         ("--bogus", 2, &["no option --bogus", "pointmill --help"]),
         ("help~bogus", 2, &["'bogus'"]),
         ("convert", 2, &["--output OUT is missing", "see 'pointmill convert --help'"]),
