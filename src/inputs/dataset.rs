@@ -12,6 +12,9 @@ use crate::datasets;
 /// What the names of folders have that a run makes its datasets in, and the file that is in them.
 const UNFINISHED: (&str, &str) = (".unfinished-", "lock");
 
+/// What a run says of itself.
+const REPORT_FILE: &str = "report.json";
+
 /// What a search makes of a folder.
 pub(super) enum Met {
     /// It is searched.
@@ -47,6 +50,15 @@ pub(super) fn met(folder: &Path, output: Option<&Path>) -> Met {
 /// True for a file that is a dataset, or has one in it.
 pub(super) fn is_file(path: &Path) -> bool {
     detected(path).is_some_and(|found| found.path == path)
+}
+
+/// True for the account of a run beside the dataset that it made.
+pub(super) fn is_report(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name == REPORT_FILE) && path.parent().is_some_and(has_dataset)
+}
+
+fn has_dataset(folder: &Path) -> bool {
+    DatasetKind::detect(folder).is_some()
 }
 
 /// True for the output of the run and what is in it.

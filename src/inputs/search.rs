@@ -81,6 +81,7 @@ impl Search {
                     self.add_scan(path);
                 }
             }
+            _ if dataset::is_report(path) => {}
             _ => self.no_scans.push(path.to_path_buf()),
         }
     }

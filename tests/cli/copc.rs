@@ -2,6 +2,7 @@
 
 use pointmill_testkit::damage::put;
 use pointmill_testkit::files::{fixture, fixture_bytes};
+use pointmill_testkit::las::Las;
 use serde_json::{Value, json};
 
 use crate::support::Dir;
@@ -79,4 +80,20 @@ fn a_copc_file_is_validated_by_its_content_also_against_itself_as_a_scan() {
     let ended = dir.run(["validate", "none.copc.laz"]);
     assert_eq!(ended.code(), 7);
     assert!(ended.stdout().contains("bytes of the file"), "{}", ended.stdout());
+}
+
+#[test]
+fn a_file_has_wkt_or_says_that_it_has_none_and_is_an_input_like_others() {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(500, 1).bytes());
+    let named = dir.succeed(["convert", "a.las", "-o", "named", "--to", "copc", "--crs", "EPSG:25832"]);
+    assert!(!named.stderr().contains("not written"), "{}", named.stderr());
+    let told = dir.succeed(["info", "named"]).stdout();
+    assert!(told.contains("EPSG:25832"), "{told}");
+    let unknown = dir.succeed(["convert", "a.las", "-o", "unknown", "--to", "copc", "--crs", "EPSG:9999"]);
+    assert!(unknown.stderr().contains("EPSG:9999) is not written"), "{}", unknown.stderr());
+    // the report beside it is no file that was left out
+    let again = dir.succeed(["convert", "named", "-o", "again"]);
+    assert!(!again.stderr().contains("skipped"), "{}", again.stderr());
+    dir.succeed(["validate", "again", "--against", "named", "-q"]);
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use pointmill_format::{OpenOptions, open_scan};
 use pointmill_testkit::damage::{put, u32_at};
-use pointmill_testkit::files::fixture_bytes;
+use pointmill_testkit::files::{fixture, fixture_bytes};
 use pointmill_testkit::las::{Las, Point};
 use pointmill_testkit::las_records::{random_las, shorts, with_vlrs};
 use serde_json::Value;
@@ -178,6 +178,14 @@ fn coordinate_reference_systems_come_back() {
     }
     dir.succeed(["export", "utm.las", "-o", "named.las", "-q", "--crs", "EPSG:32632+5773"]);
     assert_eq!((crs("named.las").epsg, crs("named.las").vertical_epsg), (Some(32632), Some(5773)));
+    // points of format 6 and above have WKT and nothing else
+    let modern = fixture("las/format6.las");
+    dir.succeed(["export", modern.to_str().unwrap(), "-o", "modern.las", "-q", "--crs", "EPSG:32632+5773"]);
+    let found = crs("modern.las");
+    let wkt = found.wkt.clone().unwrap();
+    assert!(wkt.starts_with("COMPD_CS[\"WGS 84 / UTM zone 32N + EPSG:5773\",PROJCS["), "{wkt}");
+    assert!(wkt.contains("AUTHORITY[\"EPSG\",\"32632\"]") && wkt.ends_with("AUTHORITY[\"EPSG\",\"5773\"]]]"), "{wkt}");
+    assert_eq!((found.epsg, found.vertical_epsg), (None, None));
     let given = dir.succeed(["export", "utm.las", "-o", "proj.las", "--crs", "+proj=utm +zone=32 +datum=WGS84"]);
     assert!(given.stderr().contains("no place for it"), "{}", given.stderr());
     let both = dir.succeed(["export", "utm.las", "degrees.las", "-o", "both.las"]);

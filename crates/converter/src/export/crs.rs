@@ -8,10 +8,11 @@ use crate::plan::{ExportFormat, Plan};
 use crate::sources::{ResolvedCrs, Sources, given_crs, resolve_crs_of_all};
 use crate::warning::Warning;
 
-/// The system of all points together, for people and as records.
+/// The system of all points together, for people and as records. `wants_wkt`: of points that WKT is to describe alone.
 pub(super) fn of(
     plan: &Plan,
     format: ExportFormat,
+    wants_wkt: bool,
     sources: &Sources,
     warnings: &mut Vec<Warning>,
 ) -> Result<(ResolvedCrs, CrsRecords), ConvertError> {
@@ -24,6 +25,10 @@ pub(super) fn of(
         Some(text) => given_crs(text.trim()),
         None if resolved.label.is_empty() => None,
         None => sources.all.iter().map(|source| &*source.crs).find(|crs| **crs != Crs::default()).cloned(),
+    };
+    let declared = match (declared, resolved.wkt_text()) {
+        (Some(Crs { wkt: None, .. }), Some(text)) if wants_wkt => Some(Crs::new(Some(text.into_owned()), None, None)),
+        (declared, _) => declared,
     };
     let kind = if resolved.is_geocentric {
         CrsKind::Geocentric

@@ -39,6 +39,11 @@ impl LasFile {
     }
 }
 
+/// True if points of these attributes are of a format that has WKT and nothing else (6 and above, LAS 1.4).
+pub(super) fn wants_wkt(schema: &Schema) -> bool {
+    RecordLayout::choose(&schema.attributes, &FORMATS).is_ok_and(|layout| layout.point_format() >= 6)
+}
+
 /// What only a fault of our own code can bring about.
 fn internal(error: &WriteError) -> ConvertError {
     ConvertError::Internal(format!("writing LAS: {error}"))

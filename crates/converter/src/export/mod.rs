@@ -110,7 +110,8 @@ fn write(
     let decode_bytes = sources.decode_bytes(|source| &intake.of(source).wanted)?;
     let room = Room::new(plan, format, 24 + intake.schema.stride as u64, decode_bytes, sources.bytes)?;
     let known = warnings.len();
-    let (crs, records) = crs::of(plan, format, &sources, &mut warnings)?;
+    let wants_wkt = format.has_lattice() && las::wants_wkt(&intake.schema);
+    let (crs, records) = crs::of(plan, format, wants_wkt, &sources, &mut warnings)?;
     warnings[known..].iter().for_each(|w| events.warning(w));
     let workers = Workers::start(plan.threads, events)?;
     let job = Job { plan, format, sources: &sources, intake: &intake, crs, records, room };

@@ -126,6 +126,13 @@ pub(crate) fn list(job: Job, points: u64, more: &str) -> Vec<Case> {
             cases.add(Program::PotreeConverter, "BROTLI", "-m poisson --encoding BROTLI");
         }
         Job::Outputs => outputs(&mut cases),
+        Job::Octrees | Job::OctreesLaz => {
+            for format in ["potree2", "potree1", "copc"] {
+                cases.add(Program::Pointmill, format, &format!("--to {format}"));
+            }
+            cases.add(Program::Pointmill, "three octrees", "--to potree2 --to potree1 --to copc");
+            cases.add(Program::CopcConverter, "", "");
+        }
         Job::Decoder => {
             for layout in DECODED {
                 cases.scene.layout = layout;

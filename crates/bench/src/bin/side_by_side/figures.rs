@@ -161,6 +161,30 @@ pub(crate) const FIGURES: &[Figure] = {
         Figure::new(Job::Outputs, "all three / sum of single runs, wall", Told, |o| {
             o.together("all three", &[OCTREE, BINTREE, BATCHES], WALL)
         }),
+        Figure::new(Job::Octrees, "aerial LAS: copc / copc_converter, CPU", AtMost(1.0), |o| {
+            o.ratio("pointmill, copc", "copc_converter", CPU)
+        }),
+        Figure::new(Job::Octrees, "aerial LAS: copc / copc_converter, bytes", Told, |o| {
+            o.ratio("pointmill, copc", "copc_converter", BYTES)
+        }),
+        Figure::new(Job::Octrees, "aerial LAS: potree1 / potree2, CPU", AtMost(1.3), |o| {
+            o.ratio("pointmill, potree1", "pointmill, potree2", CPU)
+        }),
+        Figure::new(Job::Octrees, "aerial LAS: three octrees / sum of single runs, CPU", AtMost(0.75), |o| {
+            o.together("three octrees", &[OCTREE, "potree1", "copc"], CPU)
+        }),
+        Figure::new(Job::OctreesLaz, "terrestrial LAZ: copc / copc_converter, CPU", AtMost(1.0), |o| {
+            o.ratio("pointmill, copc", "copc_converter", CPU)
+        }),
+        Figure::new(Job::OctreesLaz, "terrestrial LAZ: copc / copc_converter, bytes", Told, |o| {
+            o.ratio("pointmill, copc", "copc_converter", BYTES)
+        }),
+        Figure::new(Job::OctreesLaz, "terrestrial LAZ: potree1 / potree2, CPU", AtMost(1.3), |o| {
+            o.ratio("pointmill, potree1", "pointmill, potree2", CPU)
+        }),
+        Figure::new(Job::OctreesLaz, "terrestrial LAZ: three octrees / sum of single runs, CPU", AtMost(0.75), |o| {
+            o.together("three octrees", &[OCTREE, "potree1", "copc"], CPU)
+        }),
         Figure::new(Job::HalfBillion, "500 million points, 2 GiB: CPU a point / with 20 million", Told, |o| {
             o.ratio("pointmill, all points", "pointmill, 20,000,000 points", Outcome::cpu_per_point)
         }),

@@ -21,6 +21,10 @@ pub(crate) enum Job {
     Brotli,
     /// Binary tree and batches, alone and with others from one read
     Outputs,
+    /// Octrees of three formats, alone and built together, with copc_converter; aerial LAS
+    Octrees,
+    /// The same of terrestrial LAZ
+    OctreesLaz,
     /// LAZ decoders in one thread, by point format
     Decoder,
     /// 500 million points under 2 GiB, with validation (takes 35 GB of disk)
@@ -48,6 +52,8 @@ impl Job {
             Self::Large => format!("A ceiling of memory: aerial LAS, {points} points"),
             Self::Brotli => format!("BROTLI: aerial LAS, {points} points"),
             Self::Outputs => format!("Binary trees, batches and several outputs: aerial LAS, {points} points"),
+            Self::Octrees => format!("Octrees of three formats: aerial LAS, {points} points"),
+            Self::OctreesLaz => format!("Octrees of three formats: terrestrial LAZ, {points} points"),
             Self::Decoder => format!("LAZ decoders: aerial LAZ, {points} points, one thread"),
             Self::HalfBillion => format!("Out of core: aerial LAS, {points} points of format 0"),
             Self::Sampling => format!("Rules of sampling: aerial LAS, {points} points"),
@@ -78,13 +84,18 @@ impl Job {
     /// Its scene, of so many points.
     pub(crate) const fn scene(self, points: u64) -> SceneFile {
         let scene = match self {
-            Self::Terrestrial => Scene::Terrestrial,
+            Self::Terrestrial | Self::OctreesLaz => Scene::Terrestrial,
             Self::RandomOrder => Scene::Shuffled,
             Self::Volume => Scene::Volume,
             _ => Scene::Aerial,
         };
         let layout = if matches!(self, Self::HalfBillion) { LasLayout::PLAIN } else { LasLayout::COLOUR };
-        SceneFile { scene, layout, is_laz: matches!(self, Self::Terrestrial | Self::Decoder), points }
+        SceneFile {
+            scene,
+            layout,
+            is_laz: matches!(self, Self::Terrestrial | Self::OctreesLaz | Self::Decoder),
+            points,
+        }
     }
 }
 
