@@ -224,9 +224,22 @@ fn what_cannot_be_written_is_refused() {
     let mut wide = heading.clone();
     wide.extra_bytes[1].elements = 4;
     assert!(wide.chunks_start().unwrap_err().to_string().contains("three"));
-    wide.extra_bytes.clear();
-    wide.wkt = Some("x".repeat(70_000));
-    assert!(wide.chunks_start().unwrap_err().to_string().contains("65535"));
+}
+
+#[test]
+fn what_a_record_cannot_hold_is_in_an_extended_one() {
+    let mut heading = heading(7);
+    let start = heading.chunks_start().unwrap();
+    let long = WKT.replacen("PROJCS[\"", &format!("PROJCS[\"{}", "x".repeat(70_000)), 1);
+    (heading.wkt, heading.making) = (Some(long.clone()), "{\"version\":\"1\"}".into());
+    assert!(heading.chunks_start().unwrap() < start, "the record is behind the chunks");
+    let nodes = nodes(&heading, &mut Random::new(9));
+    let Made { bytes, .. } = write(&heading, &nodes);
+    let dataset = open(&bytes).unwrap();
+    assert_eq!((dataset.crs().wkt.as_deref(), dataset.warnings()), (Some(&*long), &[][..]));
+    assert_eq!(walk(&dataset).unwrap(), nodes.keys().cloned().collect::<Vec<_>>());
+    assert!(bytes.ends_with(heading.making.as_bytes()));
+    assert_eq!(bytes[243..247], 3u32.to_le_bytes());
 }
 
 #[test]

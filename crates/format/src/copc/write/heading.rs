@@ -13,6 +13,9 @@ use super::pages::{MAX_PAGE_ENTRIES, encode_pages};
 /// Bytes before the chunks: where the chunk table is.
 const TABLE_OFFSET: u64 = 8;
 
+/// User and number of the record with WKT.
+const PROJECTION: (&str, u16) = ("LASF_Projection", 2112);
+
 /// What a COPC file says of its points before the first one is there. How many bytes it takes is known then
 /// ([`Self::chunks_start`]): chunks may be written at once, by any number of threads, and the rest at the end ([`Self::finish`]).
 #[derive(Debug, Clone, PartialEq)]
@@ -88,11 +91,33 @@ impl Heading {
             records::append(&mut out, "LASF_Spec", 4, &records::extra_bytes(&self.extra_bytes)?)?;
             count += 1;
         }
-        if let Some(wkt) = &self.wkt {
-            records::append(&mut out, "LASF_Projection", 2112, &[wkt.as_bytes(), &[0]].concat())?;
+        if let Some(wkt) = self.wkt_data().filter(|wkt| !is_long(wkt)) {
+            records::append(&mut out, PROJECTION.0, PROJECTION.1, &wkt)?;
             count += 1;
         }
         Ok((out, count))
+    }
+
+    /// The text with the zero byte that ends it.
+    fn wkt_data(&self) -> Option<Vec<u8>> {
+        self.wkt.as_ref().map(|wkt| [wkt.as_bytes(), &[0]].concat())
+    }
+
+    /// The extended records behind that of the hierarchy.
+    fn extended(&self) -> (Vec<u8>, u32) {
+        let (mut out, mut count) = (Vec::new(), 0);
+        let mut add = |(user, number): (&str, u16), data: &[u8]| {
+            records::append_extended(&mut out, user, number, data.len() as u64);
+            out.extend(data);
+            count += 1;
+        };
+        if let Some(wkt) = self.wkt_data().filter(|wkt| is_long(wkt)) {
+            add(PROJECTION, &wkt);
+        }
+        if !self.making.is_empty() {
+            add(("pointmill", 1), self.making.as_bytes());
+        }
+        (out, count)
     }
 
     /// The first byte of the first chunk.
@@ -130,10 +155,8 @@ impl Heading {
         let pages = encode_pages(nodes, pages_start, MAX_PAGE_ENTRIES)?;
         records::append_extended(&mut tail, "copc", 1000, pages.bytes.len() as u64);
         tail.extend(&pages.bytes);
-        if !self.making.is_empty() {
-            records::append_extended(&mut tail, "pointmill", 1, self.making.len() as u64);
-            tail.extend(self.making.as_bytes());
-        }
+        let (more, more_count) = self.extended();
+        tail.extend(more);
         let too_long = || WriteError::input("records of more than 4 GiB");
         let fields = Fields {
             is_1_4: true,
@@ -146,7 +169,7 @@ impl Heading {
             is_wkt: true,
             records: count,
             points_start: u32::try_from(chunks_start - TABLE_OFFSET).map_err(|_| too_long())?,
-            extended: (hierarchy_start, 1 + u32::from(!self.making.is_empty())),
+            extended: (hierarchy_start, 1 + more_count),
             summary,
         };
         let mut head = Vec::with_capacity(LEN_1_4 + records.len());
@@ -158,6 +181,11 @@ impl Heading {
         head.extend(tail_start.to_le_bytes());
         Ok(Ending::new(head, tail_start, tail))
     }
+}
+
+/// True for data that only an extended record holds.
+fn is_long(data: &[u8]) -> bool {
+    data.len() > usize::from(u16::MAX)
 }
 
 /// Where the chunks end, if they are those of the table, without gaps.
