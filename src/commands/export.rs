@@ -24,7 +24,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), Failure> {
         inputs.notes.iter().for_each(|note| print_line(note));
     }
     let plan = plan(args, inputs)?;
-    protect_inputs(&plan)?;
+    protect_inputs(&plan, args)?;
     let report_file = args.report.as_ref().map(|file| {
         let sources = plan.inputs.iter().chain(&args.inputs.files_from);
         ReportFile::new(file, &plan.output, sources)
@@ -107,11 +107,13 @@ fn plan(args: &ExportArgs, inputs: Inputs) -> Result<Plan, Failure> {
 }
 
 /// What is being read is never replaced, nor is anything put into it.
-fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
+fn protect_inputs(plan: &Plan, args: &ExportArgs) -> Result<(), Failure> {
     // an output that cannot be found is an error of the run
     let Ok(output) = resolve_path(&plan.output) else { return Ok(()) };
     let is_in = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| output.starts_with(input));
-    let Some(input) = plan.inputs.iter().find(is_in) else { return Ok(()) };
+    let matrix = args.inputs.reading.placing.transform.as_ref().map(PathBuf::from);
+    let mut read = plan.inputs.iter().chain(&args.inputs.files_from).chain(&matrix);
+    let Some(input) = read.find(is_in) else { return Ok(()) };
     let (shown, input) = (plan.output.display(), input.display());
     Err(Failure::Usage(format!("{shown}: the output would be in the place of the input {input}; choose another file")))
 }

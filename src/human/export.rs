@@ -35,7 +35,10 @@ fn points_line(p: &ExportedPoints, inputs: u64) -> String {
     let causes: Vec<_> = causes.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n))).collect();
     match causes.is_empty() {
         true => format!("all {} of {from} written", plural(p.read, "point")),
-        false => format!("points not written, of {} in {from}: {}", plural(p.read, "point"), causes.join(", ")),
+        false => {
+            let all = plural(p.read + p.unreadable, "point");
+            format!("points not written, of {all} in {from}: {}", causes.join(", "))
+        }
     }
 }
 

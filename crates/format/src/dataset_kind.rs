@@ -288,8 +288,16 @@ fn find(path: &Path) -> Option<Located> {
 /// True for an archive with such a dataset in it.
 #[cfg(feature = "zip")]
 fn is_archive_of(path: &Path, kind: DatasetKind) -> bool {
-    use crate::bytes::Archive;
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("zip")) && Archive::open(path, kind.marker_file()).is_ok()
+    use crate::bytes::{Archive, ByteSource as _};
+    let is_named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("zip"));
+    let start = || {
+        let archive = Archive::open(path, kind.marker_file()).ok()?;
+        let size = archive.size(kind.marker_file()).ok()?;
+        let mut start = vec![0; size.min(MARK_WITHIN_BYTES) as usize];
+        archive.read_at(kind.marker_file(), 0, &mut start).ok()?;
+        Some(start)
+    };
+    is_named && start().is_some_and(|start| kind.is_marked(&start))
 }
 
 #[cfg(not(feature = "zip"))]

@@ -37,11 +37,13 @@ pub(super) fn of(
     } else {
         CrsKind::Projected
     };
+    let is_code = |code: u32| u16::try_from(code).is_ok();
+    let says_it = declared.as_ref().is_some_and(|crs| crs.wkt.is_some() || crs.epsg.is_some_and(is_code));
     let records = declared.map(|crs| CrsRecords::new(&crs, kind)).unwrap_or_default();
     let has_place = match format {
         ExportFormat::Ply => true,
         ExportFormat::Csv => false,
-        ExportFormat::Las | ExportFormat::Laz => !records.is_empty(),
+        ExportFormat::Las | ExportFormat::Laz => says_it,
     };
     if !has_place && !resolved.label.is_empty() {
         warnings.push(Warning::CrsNotWritten { label: resolved.label.clone() });

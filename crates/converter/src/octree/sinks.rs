@@ -23,6 +23,9 @@ impl Stream {
     }
 }
 
+/// The records of a node up to this size keep their memory for the next one; that of larger ones was reserved for them.
+const KEPT_BYTES: usize = 4 << 20;
+
 /// What is done with finished nodes, a format for each stream.
 pub(super) trait Sinks: Sync {
     /// One thread's means to encode nodes.
@@ -241,7 +244,11 @@ impl Encoders for SeveralEncoders<'_> {
         self.rows.chunks_exact_mut(self.stride).zip(records).for_each(|(row, record)| copy_record(record, row));
         self.encoders.iter_mut().zip(streams).try_for_each(|(encoder, Stream { written, bytes, .. })| {
             encoder.encode_rows(key, &self.rows, self.stride, written, bytes)
-        })
+        })?;
+        if self.rows.capacity() > KEPT_BYTES {
+            self.rows = Vec::new();
+        }
+        Ok(())
     }
 
     fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64> {

@@ -17,8 +17,8 @@ pub(super) fn own_key(cloud: &Cloud<'_>, dropped: &[DroppedAttribute]) -> Map<St
     if !filter.is_empty() {
         own.insert("filter".into(), filter.into());
     }
-    if let Some(wkt) = &cloud.facts.crs.wkt {
-        own.insert("wkt".into(), wkt.clone().into());
+    if let Some(wkt) = cloud.facts.crs.wkt_text() {
+        own.insert("wkt".into(), wkt.into());
     }
     // Those that were not requested are not recorded: which there were depends on the kind of the scans.
     let constant = |d: &DroppedAttribute| match &d.why {

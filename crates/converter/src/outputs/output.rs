@@ -11,7 +11,7 @@ use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::octree::{AnySink, Octree, OctreeSettings};
-use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
+use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::OutputReport;
 use crate::runtime::Runtime;
 use crate::sources::{ResolvedCrs, Schema};
@@ -173,6 +173,10 @@ pub(crate) fn named_attributes(plan: &Plan, all: &Schema) -> Result<Vec<bool>, P
 pub(crate) fn wants(plan: &Plan, targets: &[Target], all: &Schema) -> Result<Wants, PlanError> {
     let each: Vec<Wants> = targets.iter().map(|t| t.output().wants(plan, all)).collect();
     check_names(plan, all, &each)?;
+    let differ = each.iter().any(|w| w.attributes != each[0].attributes);
+    if plan.duplicates == Duplicates::Drop && differ {
+        return Err(PlanError::new(Setting::Outputs, PlanFault::DifferentDuplicates));
+    }
     let attributes = (0..all.attributes.len()).map(|i| each.iter().any(|w| w.attributes[i])).collect();
     Ok(Wants { attributes, other_names: &[], moments: each.iter().any(|w| w.moments) })
 }

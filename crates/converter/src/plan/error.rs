@@ -94,6 +94,12 @@ pub enum PlanFault {
     /// A format is named more than once.
     #[error("{0} is named twice")]
     Twice(DatasetKind),
+    /// Duplicates are dropped, and those of the outputs are not the same.
+    #[error(
+        "the outputs hold different attributes, and so have different duplicates; name attributes, or make one after the \
+         other"
+    )]
+    DifferentDuplicates,
     /// A count of 0.
     #[error("must be at least 1")]
     Zero,

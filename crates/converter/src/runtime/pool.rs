@@ -126,7 +126,8 @@ impl Pool {
                 evict.evict(missing)?;
             }
             if self.taken_by(Consumer::Records) >= records && self.free() < bytes {
-                let needed = self.ceiling + missing / 9 * 10 + (1 << 20);
+                // half of what is added goes to the chunks of the threads
+                let needed = self.ceiling + missing.saturating_mul(2).div_ceil(9) * 10 + (1 << 20);
                 return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why: MemoryNeed::Part(who.name()) });
             }
         }

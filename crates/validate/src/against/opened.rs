@@ -85,7 +85,8 @@ impl Opened {
         let feeds = self.columns.iter().map(|feed| Some(info.attributes[feed.as_ref()?.column].ty));
         let written = rules.attributes.iter().zip(&rules.conversions).filter(|(_, c)| **c != NotWritten);
         let written: Vec<&str> = written.map(|(a, _)| a.name.as_str()).collect();
-        let is_absent = |name: &&String| !written.contains(&name.as_str());
+        let is_used = |name: &str| self.columns.iter().flatten().any(|feed| info.attributes[feed.column].name == name);
+        let is_absent = |name: &&String| !written.contains(&name.as_str()) && !is_used(name);
         let pieces = self.scan.pieces();
         Look {
             pieces: pieces.len(),

@@ -99,7 +99,8 @@ fn reference_system(front: &Front, judge: &Judge<'_>) {
 fn wkt_fault(text: &[u8]) -> Option<&'static str> {
     let Ok(text) = std::str::from_utf8(text) else { return Some("no UTF-8") };
     let text = text.trim();
-    if !text.starts_with(|c: char| c.is_ascii_uppercase()) {
+    let keyword = text.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_').trim_start();
+    if !text.starts_with(|c: char| c.is_ascii_alphabetic()) || !keyword.starts_with(['[', '(']) {
         return Some("it does not begin with a keyword");
     }
     let (mut depth, mut is_quoted) = (0i64, false);

@@ -1,7 +1,7 @@
 //! What the records of a file are made of.
 
 use pointmill_format::scan::las::write::{FieldPlace, RecordLayout, StridedColumn};
-use pointmill_format::{Attribute, AttributeType, DatasetKind, Lattice};
+use pointmill_format::{Attribute, AttributeType, Changes, DatasetKind, Lattice};
 
 use crate::cloud::{Cloud, RecordFrame};
 use crate::error::{ConvertError, Unsupported};
@@ -62,7 +62,7 @@ impl Content {
     }
 
     /// Encodes stored records, whose positions it changes; `changes`: for each attribute that is kept.
-    pub(super) fn put(&self, rows: &mut [u8], out: &mut [u8], changes: &mut [pointmill_format::Changes]) {
+    pub(super) fn put(&self, rows: &mut [u8], out: &mut [u8], changes: &mut [Changes]) {
         if self.shift != [0; 3] {
             for row in rows.chunks_exact_mut(self.stored_stride) {
                 for (axis, shift) in row[..POSITION_BYTES].as_chunks_mut::<4>().0.iter_mut().zip(self.shift) {
@@ -80,11 +80,14 @@ impl Content {
     }
 
     /// What readers of the file call the attributes that are in it as they are: the other fields of a record are filled up.
-    pub(super) fn written(&self, schema: &Schema) -> Vec<String> {
+    /// `changes`: values that a field could not hold, by attribute that is kept.
+    pub(super) fn written(&self, schema: &Schema, changes: &[Changes]) -> Vec<String> {
+        let is_changed = |i: usize| changes.get(i).is_some_and(|changes| !changes.is_empty());
         let mut extra = self.layout.extra_bytes().iter();
-        let name = |(&i, place): (&usize, &FieldPlace)| {
+        let name = |(n, (&i, place)): (usize, (&usize, &FieldPlace))| {
             let Attribute { name, elements, .. } = &schema.attributes[i];
             match place {
+                FieldPlace::Field | FieldPlace::AngleField if is_changed(n) => None,
                 FieldPlace::Field => Some(name.clone()),
                 FieldPlace::AngleField => Some("scan angle".to_owned()),
                 _ if *elements > 3 => {
@@ -94,7 +97,7 @@ impl Content {
                 _ => extra.next().map(|a| a.name.clone()),
             }
         };
-        self.choice.kept.iter().zip(self.layout.places()).filter_map(name).collect()
+        self.choice.kept.iter().zip(self.layout.places()).enumerate().filter_map(name).collect()
     }
 
     /// Attributes that are called otherwise in the file, or are several there.

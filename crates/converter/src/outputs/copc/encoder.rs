@@ -14,6 +14,9 @@ use crate::runtime::Events;
 /// Points, and bytes, that an entry of the hierarchy can say.
 const MOST: usize = i32::MAX as usize;
 
+/// The memory of a node up to this size is kept for the next one; that of larger ones was reserved for them.
+const KEPT_BYTES: usize = 4 << 20;
+
 /// What all nodes share.
 pub(super) struct Encoding<'a> {
     pub(super) content: Content,
@@ -119,6 +122,9 @@ impl NodeEncoder for ChunkMaker<'_> {
             return Err(Unsupported::Format { kind: DatasetKind::Copc, what }.into());
         }
         out.extend_from_slice(&chunk);
+        if self.rows.capacity() > KEPT_BYTES {
+            (self.rows, self.sorted, self.records, self.order) = Default::default();
+        }
         Ok(())
     }
 

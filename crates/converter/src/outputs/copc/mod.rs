@@ -14,7 +14,7 @@ use std::sync::{Mutex, PoisonError};
 use pointmill_format::copc::{Heading, Info};
 use pointmill_format::potree2::NodeEntry;
 use pointmill_format::scan::las::write::ChunkEncoder;
-use pointmill_format::{DatasetKind, WriteError};
+use pointmill_format::{Changes, DatasetKind, WriteError};
 use serde_json::{Map, Value};
 
 pub use settings::CopcSettings;
@@ -105,7 +105,6 @@ impl OctreeOutput for CopcSettings {
         let mut heading = Heading::new(content.layout.point_format(), content.lattice).map_err(|e| failed(&e))?;
         heading.extra_bytes = content.layout.extra_bytes().to_vec();
         heading.wkt = cloud.facts.crs.wkt_text().map(Cow::into_owned);
-        heading.making = self.making(cloud, &content);
         let chunks_start = heading.chunks_start().map_err(|e| failed(&e))?;
         let chunks = ChunkEncoder::new(&content.layout).map_err(|e| failed(&e))?;
         let file = to.create(self.kind().marker_file())?;
@@ -125,7 +124,7 @@ impl OctreeOutput for CopcSettings {
 
 impl CopcSettings {
     /// What the file says of its making.
-    fn making(&self, cloud: &Cloud<'_>, content: &Content) -> String {
+    fn making(&self, cloud: &Cloud<'_>, content: &Content, changes: &[Changes]) -> String {
         let mut own = own_key(cloud, &content.choice.dropped);
         own.remove("wkt"); // it has a record of its own
         let renamed = content.renamed(cloud.schema());
@@ -133,7 +132,7 @@ impl CopcSettings {
             let renamed = renamed.into_iter().map(|r| (r.stored_as, r.name.into()));
             own.insert("attributesRenamed".into(), renamed.collect::<Map<_, _>>().into());
         }
-        own.insert("attributes".into(), content.written(cloud.schema()).into());
+        own.insert("attributes".into(), content.written(cloud.schema(), changes).into());
         own.insert("sampling".into(), self.sampling.name().into());
         own.insert("leafCapacity".into(), self.leaf_capacity.into());
         Value::from(own).to_string()
@@ -192,6 +191,7 @@ impl OctreeWriter for Writer<'_> {
         let Counted { tally, changes } = counted.into_inner().unwrap_or_else(PoisonError::into_inner);
         let summary = tally.summary(&content.lattice);
         heading.is_adjusted_time = summary.is_adjusted_time();
+        heading.making = settings.making(cloud, &content, &changes);
         let table = chunks.table(&in_file(&tree)?).map_err(|e| failed(&e))?;
         let entry = |n: &FinishedNode| NodeEntry::new(n.key, n.points, chunks_start + n.byte_offset, n.byte_size);
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();

@@ -41,17 +41,16 @@ impl ResolvedCrs {
         self.unit.is_some_and(Unit::is_angle)
     }
 
-    /// The system as WKT: what was found or given, else what its code means. `None` if there is no system, or nothing says it
-    /// in WKT.
+    /// The system as WKT: what was found or given, if it is whole, else what its code means. `None` if there is no system, or
+    /// nothing says it in WKT. A system of heights whose unit is not known, or that cannot stand beside the other, is left out.
     pub fn wkt_text(&self) -> Option<Cow<'_, str>> {
-        if let Some(wkt) = &self.wkt {
+        if let Some(wkt) = self.wkt.as_deref().filter(|text| wkt::is_wkt(text) && wkt::is_whole(text)) {
             return Some(Cow::Borrowed(wkt));
         }
         let horizontal = self.of_code?;
-        match self.vertical_code {
-            None => Some(Cow::Borrowed(horizontal)),
-            Some(code) => wkt::compound(horizontal, code, self.vertical_unit?).map(Cow::Owned),
-        }
+        let heights = self.vertical_code.zip(self.vertical_unit);
+        let compound = heights.and_then(|(code, unit)| wkt::compound(horizontal, code, unit));
+        Some(compound.map_or(Cow::Borrowed(horizontal), Cow::Owned))
     }
 
     /// Equal for systems that are the same, though files may declare them in other words.

@@ -267,7 +267,9 @@ fn string_len(bytes: &[u8]) -> Option<usize> {
 
 /// A system of a code of EPSG with another one for heights, in `unit`, as WKT 1. Nothing but their codes says which these are.
 pub(super) fn compound(horizontal: &str, vertical: u32, unit: Unit) -> Option<String> {
-    let name = parse_name(horizontal)?;
+    // what is compound itself, three-dimensional or geocentric cannot be a part of one
+    let is_flat = ["PROJCS[", "GEOGCS["].iter().any(|keyword| horizontal.trim_start().starts_with(keyword));
+    let name = parse_name(horizontal).filter(|_| is_flat)?;
     let Unit::Length(metres) = unit else { return None };
     let authority = unit.epsg().map_or_else(String::new, |code| format!(",AUTHORITY[\"EPSG\",\"{code}\"]"));
     Some(format!(

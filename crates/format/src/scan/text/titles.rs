@@ -165,7 +165,13 @@ impl Titles {
 fn cut(text: &str, separator: char) -> Vec<String> {
     let mut names = vec![String::new()];
     let mut quoted = false;
-    for c in text.chars() {
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        if quoted && c == '"' && chars.next_if_eq(&'"').is_some() {
+            // two of them are one that belongs to the name
+            names.iter_mut().rev().take(1).for_each(|name| name.push('"'));
+            continue;
+        }
         quoted ^= c == '"';
         match names.last_mut() {
             Some(name) if quoted || c != separator => name.extend((c != '"').then_some(c)),

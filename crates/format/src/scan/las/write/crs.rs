@@ -33,7 +33,8 @@ impl CrsRecords {
             records.push((WKT, [wkt.as_bytes(), &[0]].concat()));
         }
         let keys = Keys::of(crs, kind);
-        let is_wkt = crs.wkt.is_some() && !(crs.keys_first && keys.is_some());
+        // keys that define a system by parameters are not written: then the WKT counts
+        let is_wkt = crs.wkt.is_some() && !(crs.keys_first && crs.epsg.is_some());
         if let Some(keys) = keys {
             records.extend(keys.records());
         }

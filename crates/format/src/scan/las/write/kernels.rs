@@ -8,6 +8,9 @@ use crate::{AttributeType, Changes};
 /// Records to which one column after the other is written: 34 bytes × 512 = 17 kB, half of a first-level cache.
 const TILE: usize = 512;
 
+/// Degrees of a step of the scan angle of formats 6 and above.
+const FINE: f64 = 0.006;
+
 /// How an attribute gets into records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Move {
@@ -27,8 +30,10 @@ pub(super) enum Target {
     Whole { at: usize, shift: u8, most: u16, change: Change },
     /// Whole degrees in steps of 0.006°.
     Angle { at: usize },
-    /// No column: the first of one return.
-    OnlyReturn { is_wide: bool },
+    /// Degrees as doubles in steps of 0.006°.
+    Degrees { at: usize },
+    /// No column: 1 for what is missing, or as many returns as the number of the point's own.
+    OnlyReturn { is_wide: bool, number: bool, of: bool },
 }
 
 /// What becomes of a value that is too large.
@@ -99,8 +104,12 @@ fn put_tile<const LEN: usize>(
         scatter::<LEN, 4>(position.from(first), tile, len, 4 * axis);
     }
     for Move { attribute, target } in moves {
-        if let Target::OnlyReturn { is_wide } = target {
-            tile.chunks_exact_mut(len).for_each(|record| record[14] |= if *is_wide { 1 | 1 << 4 } else { 1 | 1 << 3 });
+        if let Target::OnlyReturn { is_wide, number, of } = target {
+            let (mask, shift) = if *is_wide { (0b1111, 4) } else { (0b111, 3) };
+            for record in tile.chunks_exact_mut(len) {
+                record[14] |= u8::from(*number);
+                record[14] |= if *of { (record[14] & mask) << shift } else { 0 };
+            }
             continue;
         }
         let Some(column) = columns.get(*attribute).and_then(Option::as_ref) else { continue };
@@ -153,8 +162,27 @@ fn put_column<const LEN: usize>(
                 record[at..at + 2].copy_from_slice(&angle_of_rank(rank.cast_signed()).to_le_bytes());
             }
         }
+        Target::Degrees { at } => {
+            for (record, degrees) in tile.chunks_exact_mut(len).zip(numbers(values, column.ty())) {
+                record[at..at + 2].copy_from_slice(&angle(degrees, changes).to_le_bytes());
+            }
+        }
         Target::OnlyReturn { .. } => {}
     }
+}
+
+/// The nearest step of 0.006°; what is neither that step nor a whole degree is counted.
+fn angle(degrees: f64, changes: &mut Changes) -> i16 {
+    let steps = (degrees / FINE).round();
+    let nearest = steps as i16; // the ends are clamped, NaN is 0
+    if degrees.is_nan() {
+        changes.leave_out(degrees);
+    } else if f64::from(nearest) != steps {
+        changes.clamp(degrees);
+    } else if (steps * FINE - degrees).abs() > 1e-9 && degrees.fract() != 0.0 {
+        changes.round(degrees);
+    }
+    nearest
 }
 
 /// `SIZE` bytes to each record, to its byte `at`.

@@ -14,7 +14,8 @@ pub enum FieldPlace {
     /// In the field of the point format that has its name. Where the type of the attribute holds more than the field, values
     /// that do not fit are counted as they are written.
     Field,
-    /// Whole degrees in the field that has steps of 0.006°: the nearest, which rounds to the same degree.
+    /// Degrees in the field that has steps of 0.006°: the nearest. Whole degrees come back by rounding; of others those are
+    /// counted that are no whole steps.
     AngleField,
     /// In the extra bytes behind the fields, as they are.
     ExtraBytes,
@@ -87,8 +88,11 @@ impl RecordLayout {
                 None => out.push_extra(index, attribute),
             }
         }
-        if !has("return number") && !has("number of returns") {
-            out.moves.push(Move { attribute: usize::MAX, target: Target::OnlyReturn { is_wide: point_format >= 6 } });
+        let (number, of) = (has("return number"), has("number of returns"));
+        if !(number && of) {
+            // behind the others: what is missing follows from what is there
+            let target = Target::OnlyReturn { is_wide: point_format >= 6, number: !number, of: !of };
+            out.moves.push(Move { attribute: usize::MAX, target });
         }
         out
     }
@@ -188,6 +192,9 @@ fn field_move(attribute: &Attribute, schema: &Schema) -> Option<(FieldPlace, Tar
         return None;
     }
     let is_same = own.ty == attribute.ty;
+    if attribute.name == "scan angle" && attribute.ty == AttributeType::Float64 {
+        return Some((FieldPlace::AngleField, Target::Degrees { at }));
+    }
     let target = match (kind, change(&attribute.name)) {
         (FieldKind::Bits { mask: 0xff, .. }, _) if is_same => Target::Copy { at, bytes: 1 },
         (FieldKind::Bits { shift, mask }, change) if is_same => {
