@@ -90,7 +90,8 @@ fn a_file_has_wkt_or_says_that_it_has_none_and_is_an_input_like_others() {
     assert!(!named.stderr().contains("not written"), "{}", named.stderr());
     let told = dir.succeed(["info", "named"]).stdout();
     assert!(told.contains("EPSG:25832"), "{told}");
-    let unknown = dir.succeed(["convert", "a.las", "-o", "unknown", "--to", "copc", "--crs", "+proj=utm +zone=32 +datum=WGS84"]);
+    let unknown =
+        dir.succeed(["convert", "a.las", "-o", "unknown", "--to", "copc", "--crs", "+proj=utm +zone=32 +datum=WGS84"]);
     assert!(unknown.stderr().contains(") is not written"), "{}", unknown.stderr());
     // the report beside it is no file that was left out
     let again = dir.succeed(["convert", "named", "-o", "again"]);

@@ -116,9 +116,9 @@ fn values_that_no_field_holds_are_counted_and_never_wrap() {
         ([record[14], record[15], record[16], record[17]], source, changes)
     };
     let (bytes, source, changes) = with(15, 255.0, 15, 65_535, 1, 255.0);
-    assert_eq!((bytes, source, changes.iter().all(Changes::is_empty)), ([15, 0x8f, 255, 255], 65_535, true));
+    assert_eq!((bytes, source, changes.iter().all(Changes::is_empty)), ([0xff, 0x8f, 255, 255], 65_535, true));
     let (bytes, source, changes) = with(16, 256.0, 16, -1, 2, 255.6);
-    assert_eq!((bytes, source), ([15, 0x80, 0, 255], 0));
+    assert_eq!((bytes, source), ([0xff, 0x80, 0, 255], 0));
     let clamped = |value| {
         let mut changes = Changes::default();
         changes.clamp(value);
@@ -131,7 +131,27 @@ fn values_that_no_field_holds_are_counted_and_never_wrap() {
     };
     assert_eq!(changes, [clamped(16.0), left_out(256.0), left_out(16.0), left_out(-1.0), clamped(2.0), clamped(255.6)]);
     let (bytes, _, changes) = with(1, f32::NAN, 0, 1, 0, 2.4);
-    assert_eq!((bytes, changes[1].not_finite, changes[5].rounded), ([1, 0, 0, 2], 1, 1));
+    assert_eq!((bytes, changes[1].not_finite, changes[5].rounded), ([0x11, 0, 0, 2], 1, 1));
+}
+
+#[test]
+fn degrees_become_steps_and_what_is_no_step_is_counted() {
+    let layout = RecordLayout::choose(&[attribute("scan angle", T::Float64)], &[6]).unwrap();
+    assert_eq!(layout.places(), [FieldPlace::AngleField]);
+    for (degrees, steps, is_changed) in [
+        (-90.0, -15_000, false),
+        (12.0, 2000, false),
+        (7.0, 1167, false), // a whole degree comes back by rounding
+        (0.006 * 1001.0, 1001, false),
+        (0.01, 2, true),
+        (400.0, i16::MAX, true),
+        (f64::NAN, 0, true),
+    ] {
+        let column = Column::Float64(vec![degrees]);
+        let (record, changes) = put(&layout, &[(&column, 1)]);
+        assert_eq!(i16::from_le_bytes([record[18], record[19]]), steps, "{degrees}");
+        assert_eq!(!changes[0].is_empty(), is_changed, "{degrees}");
+    }
 }
 
 #[test]
