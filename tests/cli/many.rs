@@ -40,19 +40,18 @@ fn more_scans_than_files_may_be_open_convert_to_the_same_bytes() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_scan_of_one_point_takes_about_a_kibibyte_of_memory() {
-    const MANY: usize = 10_000;
+fn a_scan_of_one_point_takes_at_most_a_kibibyte_of_memory() {
+    const MANY: usize = 20_000;
     let dir = Dir::new();
     scans(&dir, "many", MANY);
     // the same points in one file
     dir.write("one.las", &Las::new((0..MANY).map(point).collect()).bytes());
+    // one thread: the scans that several have in hand vary, and so do the arenas of the allocator
     let peak = |name: &str, out: &str| {
-        dir.succeed(["convert", name, "-o", out, "--threads", "2", "--memory", "512MiB"]);
+        dir.succeed(["convert", name, "-o", out, "--threads", "1", "--memory", "512MiB"]);
         dir.report(out)["peak_memory_bytes"].as_u64().unwrap()
     };
-    // threads that other tests hold up have more scans in hand: that only adds
-    let many = ["b", "c", "d"].map(|out| peak("many", out)).into_iter().min().unwrap();
-    let one = peak("one.las", "a");
+    let (many, one) = (peak("many", "b"), peak("one.las", "a"));
     let each = many.saturating_sub(one) / MANY as u64;
-    assert!(each < 1280, "{each} bytes for each input: {one} in one file, {many} in {MANY}");
+    assert!(each <= 1024, "{each} bytes per input: {one} in one file, {many} in {MANY}");
 }
