@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use pointmill_converter::{
     AttributeChoice, BatchesSettings, BintreeSettings, CopcSettings, DarkColours, Duplicates, Encoding, Filter,
     OnFault, OriginPoints, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, RgbDepth,
-    Sampling, ScaleChoice, Target,
+    Sampling, ScaleChoice, Target, resolve_path,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
@@ -269,15 +269,24 @@ fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
     name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// The scans that are being read are never replaced. What else may be, the converter judges.
+/// What is being read is never replaced, nor is anything put into a dataset that is. What else may be, the converter judges.
 fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
-    let Ok(output) = plan.output.canonicalize() else {
-        return Ok(()); // not there: nothing to protect
-    };
-    let inside = |file: &&PathBuf| file.canonicalize().is_ok_and(|file| file.starts_with(&output));
-    let Some(scan) = plan.inputs.iter().find(inside) else { return Ok(()) };
-    let (output, scan) = (plan.output.display(), scan.display());
-    Err(Failure::Usage(format!("{output}: the output would replace the input {scan}; choose another folder")))
+    // an output that cannot be found is an error of the run
+    let Ok(output) = resolve_path(&plan.output) else { return Ok(()) };
+    let clash = plan.inputs.iter().find_map(|input| {
+        let found = input.canonicalize().ok()?;
+        let what = if found.starts_with(&output) {
+            "would replace"
+        } else if output.starts_with(&found) {
+            "would be inside of"
+        } else {
+            return None;
+        };
+        Some((input, what))
+    });
+    let Some((input, what)) = clash else { return Ok(()) };
+    let (output, input) = (plan.output.display(), input.display());
+    Err(Failure::Usage(format!("{output}: the output {what} the input {input}; choose another folder")))
 }
 
 #[cfg(test)]

@@ -63,7 +63,7 @@ fn after_all(failure: Failure, output: &Path) -> Failure {
 /// The format that the ending of the output asks for.
 fn format(output: &Path) -> Result<ExportFormat, Failure> {
     if let Some(format) = ExportFormat::of(output) {
-        return Ok(format);
+        return if is_named_copc(output) { Err(no_copc(output)) } else { Ok(format) };
     }
     let known = ExportFormat::ALL.map(|format| format!(".{}", format.extension())).join(", ");
     let shown = output.display();
@@ -74,6 +74,17 @@ fn format(output: &Path) -> Result<ExportFormat, Failure> {
         Some(_) => Failure::Usage(format!("{shown}: files with this ending are not written; choose {known}")),
         None => Failure::Usage(format!("{shown}: the ending of the name says the format; choose {known}")),
     })
+}
+
+/// True of the double ending by which other programs know COPC.
+fn is_named_copc(output: &Path) -> bool {
+    let stem = output.file_stem().map(Path::new).and_then(Path::extension);
+    stem.is_some_and(|ending| ending.eq_ignore_ascii_case("copc"))
+}
+
+fn no_copc(output: &Path) -> Failure {
+    let shown = output.display();
+    Failure::Usage(format!("{shown}: an export is no COPC; pass `convert --to copc`, or choose a name without .copc"))
 }
 
 fn plan(args: &ExportArgs, inputs: Inputs) -> Result<Plan, Failure> {

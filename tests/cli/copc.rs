@@ -2,7 +2,7 @@
 
 use pointmill_testkit::damage::put;
 use pointmill_testkit::files::{fixture, fixture_bytes};
-use pointmill_testkit::las::Las;
+use pointmill_testkit::las::{Las, Point};
 use serde_json::{Value, json};
 
 use crate::support::Dir;
@@ -97,4 +97,25 @@ fn a_file_has_wkt_or_says_that_it_has_none_and_is_an_input_like_others() {
     let again = dir.succeed(["convert", "named", "-o", "again"]);
     assert!(!again.stderr().contains("skipped"), "{}", again.stderr());
     dir.succeed(["validate", "again", "--against", "named", "-q"]);
+}
+
+#[test]
+fn an_export_is_not_called_copc() {
+    let dir = Dir::new();
+    dir.write("in.las", &Las::new(vec![Point::numbered(0, [1, 2, 3])]).bytes());
+    for name in ["x.copc.laz", "x.COPC.las"] {
+        dir.run(["export", "in.las", "-o", name]).failed_with(2, &[name, "--to copc"]);
+        assert!(!dir.path(name).exists());
+    }
+    dir.succeed(["export", "in.las", "-o", "copc.laz"]);
+}
+
+#[test]
+fn nothing_is_put_into_a_dataset_that_is_read() {
+    let dir = Dir::new();
+    dir.write("in.las", &Las::new(vec![Point::numbered(0, [1, 2, 3])]).bytes());
+    dir.succeed(["convert", "in.las", "-o", "octree"]);
+    dir.run(["convert", "octree", "-o", "octree/again"]).failed_with(2, &["inside of the input octree"]);
+    assert!(!dir.path("octree/again").exists());
+    dir.validate("octree", &["in.las"]);
 }
