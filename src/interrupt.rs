@@ -22,6 +22,7 @@ const WORKING: u8 = 0;
 const SETTLING: u8 = 1;
 const ABANDONED: u8 = 2;
 static FOLDER: Mutex<Option<PathBuf>> = Mutex::new(None);
+static KEPT: Mutex<Option<String>> = Mutex::new(None);
 
 /// A command that was asked to stop has this long to do so.
 const GRACE: Duration = Duration::from_millis(600);
@@ -65,6 +66,11 @@ pub(crate) fn works_in(folder: &Path) {
     *FOLDER.lock().unwrap_or_else(PoisonError::into_inner) = Some(folder.to_path_buf());
 }
 
+/// What the user reads if the command is ended in its work, where not everything is lost.
+pub(crate) fn keeps(line: String) {
+    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(line);
+}
+
 /// The command has stopped working: it cleans up, or gives its output the name, and is not disturbed.
 pub(crate) fn settling() {
     if STAGE.compare_exchange(WORKING, SETTLING, Ordering::AcqRel, Ordering::Acquire) == Err(ABANDONED) {
@@ -103,10 +109,11 @@ fn abandon_late_work() {
         let folder = if fs::rename(&folder, &other).is_ok() { PathBuf::from(other) } else { folder };
         let _ = (0..3).find(|_| fs::remove_dir_all(&folder).is_ok());
     }
-    end("interrupted; nothing was written");
+    let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner).take();
+    end(kept.unwrap_or_else(|| "interrupted; nothing was written".to_owned()));
 }
 
-fn end(line: &'static str) {
+fn end(line: impl Into<String>) {
     say(line);
     std::process::exit(i32::from(Failure::Interrupted(String::new()).code()));
 }

@@ -27,7 +27,7 @@ use std::process::ExitCode;
 use args::{Args, Command, mistake};
 use clap::Parser as _;
 use clap::error::ErrorKind;
-use commands::{convert, export, extract, info, validate};
+use commands::{convert, export, extract, info, measure, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {
@@ -62,6 +62,7 @@ fn run(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Convert(convert) => convert::run(convert),
         Command::Export(export) => export::run(export),
+        Command::Measure(measure) => measure::run(measure),
         Command::Validate(validate) => validate::run(validate),
         Command::Extract(extract) => extract::run(extract),
         Command::Info(info) => info::run(info),

@@ -42,10 +42,10 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "STEP", value_parser = parse_spacing, allow_negative_numbers = true,
           help_heading = "Selecting data")]
     pub(crate) spacing: Option<f64>,
-    /// Keeps only points inside this box, in world coordinates
+    /// Keeps only points inside this box, in world coordinates; repeat it for points in any of several boxes
     #[arg(long, value_name = "X,Y,Z..X,Y,Z", value_parser = parse_bounds, allow_hyphen_values = true,
           help_heading = "Selecting data")]
-    pub(crate) bounds: Option<Aabb>,
+    pub(crate) bounds: Vec<Aabb>,
     /// Keeps only points of these classes, for example 2,6 [default: all]
     #[arg(
         long,

@@ -3,6 +3,7 @@
 mod common;
 mod convert;
 mod export;
+mod measure;
 pub(crate) mod mistake;
 mod placing;
 mod values;
@@ -18,6 +19,7 @@ pub(crate) use convert::{
     LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use export::ExportArgs;
+pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use values::Attributes;
 use values::parse_bytes;
 
@@ -39,6 +41,8 @@ pub(crate) enum Command {
     Convert(Box<ConvertArgs>),
     /// Writes the points of scans and datasets to one file: LAS, LAZ, PLY or CSV
     Export(Box<ExportArgs>),
+    /// Measures what settings of convert cost and buy on a scene: speed, size, errors of positions, colours and pictures
+    Measure(Box<MeasureArgs>),
     /// Checks whether a dataset conforms to its format and matches its scans
     Validate(ValidateArgs),
     /// Writes the images within an E57 file, and the places of its scans and images as a table

@@ -147,6 +147,16 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
     if bytes >= 1.0 && bytes < (1u64 << 60) as f64 { Ok(bytes as u64) } else { Err(advice()) }
 }
 
+/// Parses a number of points: digits, and `k`, `M` or `G` for thousands, millions or thousands of millions.
+pub(super) fn parse_points(text: &str) -> Result<u64, String> {
+    let unit = [('k', 1_000), ('K', 1_000), ('M', 1_000_000), ('m', 1_000_000), ('G', 1_000_000_000)];
+    let unit = unit.into_iter().find(|(letter, _)| text.ends_with(*letter));
+    let (digits, factor) = unit.map_or((text, 1), |(letter, factor)| (text.trim_end_matches(letter), factor));
+    let number = digits.parse::<f64>().ok().filter(|_| digits.bytes().all(|b| b.is_ascii_digit() || b == b'.'));
+    let points = number.map(|n| n * factor as f64).filter(|n| (1.0..=1e18).contains(n));
+    points.map(|n| n as u64).ok_or_else(|| "expected a number of points, such as 500000, 500k or 5M".to_owned())
+}
+
 /// Parses `xmin,ymin,zmin..xmax,ymax,zmax`, world coordinates.
 pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
     let advice = || "expected two corners, xmin,ymin,zmin..xmax,ymax,zmax".to_owned();
@@ -166,6 +176,15 @@ pub(super) fn parse_bounds(text: &str) -> Result<Aabb, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_are_counted_in_thousands_and_millions() {
+        let values = ["1", "500k", "5M", "2.5M", "1G"].map(|text| parse_points(text).unwrap());
+        assert_eq!(values, [1, 500_000, 5_000_000, 2_500_000, 1_000_000_000]);
+        for text in ["", "0", "-1", "M", "1e6", "5MM", "1 M", "nan", "99999999999999999999"] {
+            assert!(parse_points(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn numbers_are_digits_within_a_range() {

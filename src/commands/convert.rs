@@ -213,7 +213,13 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         OriginPointsArg::Keep => OriginPoints::Keep,
         OriginPointsArg::Skip => OriginPoints::Skip,
     };
-    plan.filter = Filter { bounds: args.bounds, classes: args.class.clone(), every: args.every, origin_points };
+    plan.filter = Filter {
+        bounds: args.bounds,
+        regions: Vec::new(),
+        classes: args.class.clone(),
+        every: args.every,
+        origin_points,
+    };
     plan.duplicates = match args.duplicates {
         DuplicatesArg::Keep => Duplicates::Keep,
         DuplicatesArg::Drop => Duplicates::Drop,

@@ -101,7 +101,11 @@ fn plan(args: &ExportArgs, inputs: Inputs) -> Result<Plan, Failure> {
         Attributes::List(names) => AttributeChoice::List(names.clone()),
     };
     plan.scale = args.scale.0.map_or(ScaleChoice::Auto, ScaleChoice::Fixed);
-    (plan.filter.bounds, plan.filter.classes, plan.filter.every) = (args.bounds, args.class.clone(), args.every);
+    plan.filter.bounds = args.bounds.iter().copied().reduce(|all, more| all.union(&more));
+    if args.bounds.len() > 1 {
+        plan.filter.regions.clone_from(&args.bounds);
+    }
+    (plan.filter.classes, plan.filter.every) = (args.class.clone(), args.every);
     plan.unreadable = match args.unreadable {
         FaultArg::Skip => OnFault::Skip,
         FaultArg::Fail => OnFault::Fail,

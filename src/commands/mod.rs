@@ -4,5 +4,6 @@ pub(crate) mod convert;
 pub(crate) mod export;
 pub(crate) mod extract;
 pub(crate) mod info;
+pub(crate) mod measure;
 mod report_file;
 pub(crate) mod validate;

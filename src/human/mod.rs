@@ -3,6 +3,7 @@
 mod accuracy;
 pub(crate) mod conversion;
 pub(crate) mod export;
+pub(crate) mod measurement;
 pub(crate) mod progress;
 pub(crate) mod quantities;
 pub(crate) mod text;

@@ -120,6 +120,13 @@ impl Progress {
         self.step(done.saturating_sub(self.done.load(Ordering::Relaxed)));
     }
 
+    /// What is being done within the phase.
+    pub(crate) fn detail(&self, what: &str) {
+        if let Face::Bar(bar) = &self.face {
+            bar.set_message(what.to_owned());
+        }
+    }
+
     /// Reports a warning.
     pub(crate) fn note(&self, line: &str) {
         if self.stopped() || self.quiet || self.warnings.fetch_add(1, Ordering::Relaxed) >= MAX_WARNINGS {
@@ -209,16 +216,23 @@ fn write_line(object: &serde_json::Value) {
     let _ = writeln!(io::stderr().lock(), "{}", json_escaped(&object.to_string()));
 }
 
+/// The phase of a command that runs conversions.
+pub(crate) const MEASURE: &str = "measure";
+
 /// What is counted in a phase.
 fn unit(phase: &str) -> &'static str {
-    if phase == Phase::Probe.name() { "scans" } else { "points" }
+    match phase {
+        MEASURE => "settings",
+        _ if phase == Phase::Probe.name() => "scans",
+        _ => "points",
+    }
 }
 
 fn style(phase: &str, total: u64) -> ProgressStyle {
     let unit = unit(phase);
     let template = match total {
         0 => "{msg:8} {spinner} {elapsed}",
-        _ if phase == Phase::Probe.name() => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {left}",
+        _ if unit != "points" => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {left}",
         _ => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {speed}  {left}",
     };
     let per_second = |state: &ProgressState| state.pos() as f64 / state.elapsed().as_secs_f64().max(1e-3);

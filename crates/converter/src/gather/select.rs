@@ -23,7 +23,13 @@ pub(crate) fn select(
     visit.seen.at_origin += at_origin;
     let skips_origin = filter.origin_points == OriginPoints::Skip && at_origin > 0;
     let (info, cut, far_cut) = (visit.info(), visit.cut.as_ref(), visit.far_cut.as_ref());
-    let all_inside = [cut, far_cut].into_iter().flatten().all(|cut| cut.holds_all(&batch.positions));
+    let regions = &visit.regions;
+    let all_inside = [cut, far_cut].into_iter().flatten().all(|cut| cut.holds_all(&batch.positions))
+        && (regions.is_empty() || regions.iter().any(|region| region.holds_all(&batch.positions)));
+    let is_inside = |i: usize| {
+        cut.is_none_or(|cut| cut.holds(&batch.positions, i))
+            && (regions.is_empty() || regions.iter().any(|region| region.holds(&batch.positions, i)))
+    };
     let all_finite = match &batch.positions {
         Positions::Quantized(_) => true,
         Positions::World(p) => p.iter().all(|axis| axis.iter().all(|v| v.is_finite())),
@@ -51,7 +57,7 @@ pub(crate) fn select(
             stats.invalid += 1;
         } else if skips_origin && visit.origins.hold(batch, i) {
             stats.origin_skipped += 1;
-        } else if cut.is_some_and(|cut| !cut.holds(&batch.positions, i)) {
+        } else if !is_inside(i) {
             stats.outside_bounds += 1;
         } else if far_cut.is_some_and(|cut| !cut.holds(&batch.positions, i)) {
             stats.outliers += 1;

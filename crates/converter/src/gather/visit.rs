@@ -57,6 +57,8 @@ pub(crate) struct Visit<'a> {
     /// The filter's box.
     pub(super) cut: Option<Cut>,
     /// Points outside are outliers, which are dropped.
+    /// Of that, what is in any of these; empty: all.
+    pub(super) regions: Vec<Cut>,
     pub(super) far_cut: Option<Cut>,
     pub(super) origins: Origins,
     /// Axes on which every point has to prove the claim that a grid holds it.
@@ -76,6 +78,7 @@ impl<'a> Visit<'a> {
             group: pass.intake.group(index, source),
             map: SourceMap::new(info.lattice.as_ref(), &pass.lattice),
             cut: pass.plan.filter.bounds.map(|bounds| Cut::new(&bounds, info)),
+            regions: pass.plan.filter.regions.iter().map(|bounds| Cut::new(bounds, info)).collect(),
             far_cut: pass.far_cut.map(|bounds| Cut::new(&bounds, info)),
             origins: Origins::of(info),
             claims: claims(source, &pass.lattice),

@@ -86,6 +86,8 @@ pub enum ScaleChoice {
 pub struct Filter {
     /// Keep what lies inside or on the border, world coordinates.
     pub bounds: Option<Aabb>,
+    /// Of that, keep what lies inside or on the border of any of these boxes; empty: all.
+    pub regions: Vec<Aabb>,
     /// Keep these classes; `None`: all.
     pub classes: Option<Vec<i64>>,
     /// Keep points whose index in their file is a multiple of this; 0 and 1: all.

@@ -1,0 +1,160 @@
+//! What each option buys and costs, as sentences.
+
+use crate::axis::Axis;
+use crate::result::{Measured, Row};
+
+/// An option of an output, two of its values, and what changes from one to the other.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct Trade {
+    /// The format.
+    pub output: String,
+    /// The axis.
+    pub axis: &'static str,
+    /// The value that is compared with.
+    pub from: String,
+    /// The other value.
+    pub to: String,
+    /// Processor time, bytes, error of pictures: `to` over `from`, geometric mean over all pairs of settings that differ in this
+    /// alone.
+    pub ratios: [Option<f64>; 3],
+    /// The largest error of a coordinate with either.
+    pub position: [Option<f64>; 2],
+    /// For people.
+    pub sentence: String,
+}
+
+/// The trades of a result: each value against the first of its axis.
+pub fn trades(result: &Measured) -> Vec<Trade> {
+    let mut trades = Vec::new();
+    let mut outputs: Vec<&str> = result.rows.iter().map(|row| row.output.as_str()).collect();
+    outputs.dedup();
+    for output in outputs {
+        let rows: Vec<&Row> = result.rows.iter().filter(|row| row.output == output && row.cost.is_some()).collect();
+        for axis in Axis::ALL.into_iter().filter(|axis| *axis != Axis::Output) {
+            let mut values: Vec<&String> = rows.iter().filter_map(|row| row.values.get(axis.name())).collect();
+            let mut seen = std::collections::HashSet::new();
+            values.retain(|value| seen.insert(*value));
+            for to in values.iter().skip(1) {
+                trades.extend(trade(output, axis, values[0], to, &rows));
+            }
+        }
+    }
+    trades
+}
+
+fn trade(output: &str, axis: Axis, from: &str, to: &str, rows: &[&Row]) -> Option<Trade> {
+    let is_pair = |a: &Row, b: &Row| {
+        Axis::ALL.iter().filter(|other| **other != axis).all(|o| a.values.get(o.name()) == b.values.get(o.name()))
+    };
+    let with = |value: &str| -> Vec<&Row> {
+        rows.iter().copied().filter(|row| row.values.get(axis.name()).is_some_and(|v| v == value)).collect()
+    };
+    let pairs: Vec<(&Row, &Row)> =
+        with(from).into_iter().flat_map(|a| with(to).into_iter().filter(|b| is_pair(a, b)).map(move |b| (a, b))).collect();
+    if pairs.is_empty() {
+        return None;
+    }
+    let ratio = |figure: fn(&Row) -> Option<f64>| {
+        let logs = pairs.iter().map(|(a, b)| Some((figure(b)? / figure(a)?).ln()));
+        let logs: Vec<f64> = logs.collect::<Option<_>>()?;
+        let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+        mean.is_finite().then_some(mean)
+    };
+    let largest = |side: fn(&(&Row, &Row)) -> Option<f64>| pairs.iter().filter_map(side).reduce(f64::max);
+    let mut trade = Trade {
+        output: output.to_owned(),
+        axis: axis.name(),
+        from: from.to_owned(),
+        to: to.to_owned(),
+        ratios: [ratio(Row::seconds_per_million), ratio(Row::bytes_per_point), ratio(Row::picture_error)],
+        position: [largest(|pair| pair.0.position_error()), largest(|pair| pair.1.position_error())],
+        sentence: String::new(),
+    };
+    trade.sentence = sentence(&trade);
+    Some(trade)
+}
+
+fn sentence(trade: &Trade) -> String {
+    let Trade { output, axis, from, to, ratios: [time, bytes, picture], position, .. } = trade;
+    let mut changes = Vec::new();
+    changes.extend(change(*time, "processor time"));
+    changes.extend(change(*bytes, "disk and download"));
+    changes.extend(change(*picture, "difference between the pictures and the whole cloud"));
+    if let [Some(before), Some(after)] = position
+        && (before - after).abs() > 0.03 * before.max(*after)
+    {
+        changes.push(format!("coordinates are within {} instead of {}", length(*after), length(*before)));
+    }
+    let what = if changes.is_empty() { "nothing that can be measured changes".to_owned() } else { changes.join(", ") };
+    format!("{output}: with {axis} {to} instead of {from}, {what}.")
+}
+
+/// `12 % less processor time`; nothing if it is within the noise.
+fn change(ratio: Option<f64>, of: &str) -> Option<String> {
+    let ratio = ratio?;
+    let percent = (ratio - 1.0) * 100.0;
+    match ratio {
+        r if (0.97..=1.03).contains(&r) => None,
+        r if r > 3.0 => Some(format!("{ratio:.1} times the {of}")),
+        r if r > 1.0 => Some(format!("{percent:.0} % more {of}")),
+        _ => Some(format!("{:.0} % less {of}", -percent)),
+    }
+}
+
+/// A length in units of the coordinate system.
+pub(crate) fn length(units: f64) -> String {
+    match units {
+        0.0 => "0".to_owned(),
+        u if u < 1e-6 => format!("{u:.0e}"),
+        u => format!("{:.*}", (1 - u.log10().floor() as i32).clamp(0, 8) as usize, u),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::Cost;
+
+    fn row(sampling: &str, encoding: &str, seconds: f64, bytes: f64) -> Row {
+        let cost = Cost {
+            wall_seconds: 1.0,
+            cpu_seconds: Some(seconds),
+            points_per_second: 1e6,
+            bytes_per_point: bytes,
+            ..Cost::default()
+        };
+        let values = [("output", "potree2"), ("sampling", sampling), ("encoding", encoding)];
+        Row {
+            output: "potree2".to_owned(),
+            values: values.map(|(axis, value)| (axis, value.to_owned())).into(),
+            cost: Some(cost),
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn pairs_that_differ_in_one_value_make_a_trade() {
+        let rows = vec![
+            row("poisson", "default", 1.0, 30.0),
+            row("poisson", "brotli", 4.0, 10.0),
+            row("random", "default", 0.5, 30.0),
+            row("random", "brotli", 2.0, 10.0),
+        ];
+        let found = trades(&Measured { rows, ..Measured::default() });
+        let sentences: Vec<&str> = found.iter().map(|trade| trade.sentence.as_str()).collect();
+        assert_eq!(
+            sentences,
+            [
+                "potree2: with sampling random instead of poisson, 50 % less processor time.",
+                "potree2: with encoding brotli instead of default, 4.0 times the processor time, 67 % less disk and \
+                 download.",
+            ]
+        );
+    }
+
+    #[test]
+    fn lengths_have_two_digits() {
+        assert_eq!([0.0, 0.00123, 1e-9, 0.5, 123.4].map(length), ["0", "0.0012", "1e-9", "0.50", "123"]);
+    }
+}

@@ -1,0 +1,137 @@
+//! `pointmill measure`: from the options to a `Measurement`, its files and a summary.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pointmill_converter::resolve_path;
+use pointmill_measure::{Measured, MeasureError, Measurement, Shown, Watch, report};
+
+use crate::args::{BUDGET, InputArgs, MeasureArgs, SAMPLE};
+use crate::exit::{Failure, print_line};
+use crate::human::measurement;
+use crate::human::progress::{MEASURE, Progress};
+use crate::interrupt::{keeps, no_more_checks, stop_flag, works_in};
+
+pub(crate) fn run(args: &MeasureArgs) -> Result<(), Failure> {
+    let typed = InputArgs { inputs: args.inputs.clone(), files_from: args.files_from.clone(), ..InputArgs::default() };
+    let inputs = typed.expand(&args.output)?;
+    if let Some(failure) = inputs.unread_failure("") {
+        return Err(failure);
+    }
+    if !args.talk.quiet {
+        inputs.notes.iter().for_each(|note| print_line(note));
+    }
+    let folder = prepare(args, &inputs.files)?;
+    let temporary = temporary(args.temp_dir.as_deref().unwrap_or(&folder))?;
+    let progress = Progress::new(&args.talk, Some(stop_flag()));
+    works_in(temporary.path());
+    let measurement = Measurement {
+        program: program()?,
+        inputs: inputs.files,
+        axes: args.axes.clone().unwrap_or_default(),
+        sample: args.sample.unwrap_or(SAMPLE),
+        threads: args.threads.map_or_else(all_cores, |threads| usize::from(threads.get())),
+        budget: args.budget.unwrap_or(BUDGET),
+        size: args.size,
+        temporary: temporary.path().to_owned(),
+        memory: args.memory,
+    };
+    let watcher = Watcher { folder: &folder, progress: &progress, failed: std::sync::Mutex::new(None) };
+    let measured = measurement.run(&watcher);
+    no_more_checks();
+    let for_people = progress.end();
+    drop(temporary);
+    if let Some(error) = watcher.failed.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+        return Err(error.into());
+    }
+    let (result, _) = measured?;
+    if !result.is_complete {
+        return Err(Failure::Interrupted(kept_line(&folder, &result)));
+    }
+    if for_people {
+        measurement::summary(&result, &folder).iter().for_each(|line| print_line(line));
+    }
+    Ok(())
+}
+
+/// This program: what is measured is what runs.
+fn program() -> Result<PathBuf, Failure> {
+    std::env::current_exe().map_err(|error| Failure::Internal(format!("this program's file is not known: {error}")))
+}
+
+fn all_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, Into::into)
+}
+
+/// Makes the folder; what stands in it is left alone, but for the files of an earlier measurement if these may be replaced.
+fn prepare(args: &MeasureArgs, inputs: &[PathBuf]) -> Result<PathBuf, Failure> {
+    let shown = args.output.display();
+    let folder = resolve_path(&args.output).map_err(|error| Failure::Usage(format!("{shown}: {error}")))?;
+    let is_in = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| folder.starts_with(input));
+    if let Some(input) = inputs.iter().find(is_in) {
+        let input = input.display();
+        return Err(Failure::Usage(format!("{shown}: the output would be inside of the input {input}; choose another folder")));
+    }
+    if folder.exists() && !folder.is_dir() {
+        return Err(Failure::Usage(format!("{shown}: this is a file; name a folder")));
+    }
+    if let Some(file) = report::FILES.iter().find(|file| folder.join(file).exists())
+        && !args.overwrite
+    {
+        return Err(Failure::Usage(format!("{shown}: {file} is there already; pass --overwrite to replace it")));
+    }
+    fs::create_dir_all(&folder).map_err(|error| Failure::io(&args.output, "making the folder", &error))?;
+    Ok(folder)
+}
+
+fn temporary(parent: &Path) -> Result<tempfile::TempDir, Failure> {
+    let made = tempfile::Builder::new().prefix(".measure-").tempdir_in(parent);
+    made.map_err(|error| Failure::io(parent, "making a folder for temporary files", &error))
+}
+
+fn kept_line(folder: &Path, result: &Measured) -> String {
+    let folder = folder.display();
+    format!("interrupted; {folder} has the figures of the {} settings that were measured until then", result.rows.len())
+}
+
+/// Tells of progress, and writes what was measured after every setting.
+struct Watcher<'a> {
+    folder: &'a Path,
+    progress: &'a Progress,
+    /// The results could not be written: that ends the measurement.
+    failed: std::sync::Mutex<Option<MeasureError>>,
+}
+
+impl Watch for Watcher<'_> {
+    fn should_stop(&self) -> bool {
+        self.progress.stopped() || self.failed.lock().is_ok_and(|failed| failed.is_some())
+    }
+
+    fn begins(&self, what: &str, done: usize, of: usize) {
+        self.progress.at(MEASURE, done as u64, of as u64);
+        self.progress.detail(what);
+    }
+
+    fn measured(&self, so_far: &Measured, pictures: &[Shown]) {
+        if let Err(error) = report::write_all(self.folder, so_far, pictures)
+            && let Ok(mut failed) = self.failed.lock()
+        {
+            *failed = Some(error);
+        }
+        keeps(kept_line(self.folder, so_far));
+    }
+}
+
+impl From<MeasureError> for Failure {
+    fn from(error: MeasureError) -> Self {
+        match error {
+            MeasureError::Interrupted => Self::Interrupted("interrupted; nothing was measured yet".to_owned()),
+            MeasureError::Read(error) => error.into(),
+            MeasureError::Empty(_) => Self::Input(error.to_string()),
+            MeasureError::TooMany { .. } => Self::Memory(format!("{error}; pass a smaller --sample")),
+            MeasureError::Write { .. } => Self::Io(error.to_string()),
+            MeasureError::Sample(_) => Self::Input(error.to_string()),
+            other => Self::Internal(other.to_string()),
+        }
+    }
+}
