@@ -19,6 +19,7 @@ mod human;
 mod inputs;
 mod interrupt;
 mod printable;
+mod profiles;
 mod scan_choice;
 mod text_choice;
 
@@ -50,12 +51,13 @@ fn main() -> ExitCode {
 /// The command line; help and version are printed here, and end the process.
 fn args() -> Result<Args, Failure> {
     let typed: Vec<_> = std::env::args_os().collect();
-    Args::try_parse_from(&typed).map_err(|error| {
+    let args = Args::try_parse_from(&typed).map_err(|error| {
         if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
             error.exit();
         }
         Failure::Usage(mistake::line(&error, &typed))
-    })
+    })?;
+    profiles::apply(args, &typed)
 }
 
 fn run(args: &Args) -> Result<(), Failure> {

@@ -36,6 +36,13 @@ pub(crate) struct ConvertArgs {
     /// Name of the point cloud in the metadata [default: name of the first input]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     pub(crate) name: Option<String>,
+    /// Options by name: fast (least processor time), balanced (time, size and pictures weighed), exact (nothing lost that need not
+    /// be); options that are given override them
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Output")]
+    pub(crate) profile: Option<ProfileArg>,
+    /// Takes the profile from a measurement of this scene: the folder that `measure` made
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub(crate) measured: Option<PathBuf>,
     /// Encoding of node payloads [default: default]
     #[arg(long, value_enum, help_heading = "Output")]
     pub(crate) encoding: Option<EncodingArg>,
@@ -141,6 +148,28 @@ pub(crate) struct ConvertArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) talk: TalkArgs,
+}
+
+/// What a conversion is good for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ProfileArg {
+    /// The least processor time
+    Fast,
+    /// Time, size and pictures weighed
+    Balanced,
+    /// Nothing lost that need not be
+    Exact,
+}
+
+impl ProfileArg {
+    /// As it is typed.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Balanced => "balanced",
+            Self::Exact => "exact",
+        }
+    }
 }
 
 /// Settings of an octree before Potree 2.0.

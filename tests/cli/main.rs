@@ -20,6 +20,7 @@ mod hostile;
 mod inputs;
 mod interrupted;
 mod many;
+mod measure;
 mod memory;
 mod mistakes;
 mod mounted;
