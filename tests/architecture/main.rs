@@ -17,13 +17,13 @@ use layers::Layers;
 
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
-const LAYERS: [(&str, Layers<'static>); 5] = [
+const LAYERS: [(&str, Layers<'static>); 7] = [
     (
         "pointmill",
         &[
             &["flags", "printable"],
             &["exit", "datasets"],
-            &["args", "allocator", "crs_choice", "interrupt"],
+            &["args", "allocator", "crs_choice", "interrupt", "profiles"],
             &["human", "scan_choice", "text_choice"],
             &["inputs"],
             &["commands"],
@@ -40,6 +40,32 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
             &["dataset_kind"],
             &["dataset_scan"],
             &["open_octree", "open_scan"],
+        ],
+    ),
+    (
+        "pointmill-measure",
+        &[
+            &["axis", "error", "image", "position"],
+            &["cloud", "program"],
+            &["colour", "decoded", "sample", "views"],
+            &["result"],
+            &["choice", "trades"],
+            &["measurement"],
+            &["report"],
+        ],
+    ),
+    (
+        "pointmill-render",
+        &[
+            &["vector", "error", "style", "workers"],
+            &["camera"],
+            &["picture", "projection"],
+            &["raster", "sources"],
+            &["colours", "shading"],
+            &["canvas", "boxes"],
+            &["draw", "overview"],
+            &["render"],
+            &["scene"],
         ],
     ),
     (
