@@ -98,7 +98,8 @@ fn read(path: &Path) -> Result<Value, Failure> {
 /// The options of a profile and their reason in a measurement.
 fn measured(result: &Value, profile: &str, output: &str) -> Option<(Vec<String>, String)> {
     let text = |value: &Value, name: &str| value.get(name)?.as_str().map(str::to_owned);
-    let of_it = |p: &&Value| text(p, "name").is_some_and(|n| n == profile) && text(p, "output").is_some_and(|o| o == output);
+    let of_it =
+        |p: &&Value| text(p, "name").is_some_and(|n| n == profile) && text(p, "output").is_some_and(|o| o == output);
     let found = result.get("profiles")?.as_array()?.iter().find(of_it)?;
     let arguments = found.get("arguments")?.as_array()?;
     let arguments = arguments.iter().map(|a| a.as_str().map(str::to_owned)).collect::<Option<_>>()?;
@@ -112,9 +113,8 @@ fn allowed(arguments: &[String], path: &Path) -> Result<Vec<Vec<String>>, Failur
     while let Some(option) = rest.next() {
         let values = OPTIONS.iter().chain(&[("--to", 1)]).find(|(name, _)| name == option).map(|(_, values)| *values);
         let values = values.or_else(|| SWITCHES.contains(&option.as_str()).then_some(0));
-        let values = values.ok_or_else(|| {
-            Failure::Usage(format!("{}: a profile may not set {option}", path.display()))
-        })?;
+        let values =
+            values.ok_or_else(|| Failure::Usage(format!("{}: a profile may not set {option}", path.display())))?;
         let whole: Vec<String> = [option].into_iter().chain(rest.by_ref().take(values)).cloned().collect();
         if option != "--to" {
             options.push(whole);
@@ -127,7 +127,9 @@ fn allowed(arguments: &[String], path: &Path) -> Result<Vec<Vec<String>>, Failur
 fn usual(convert: &ConvertArgs, profile: ProfileArg) -> Chosen {
     let of = |to: TargetArg| -> &[&[&str]] {
         match (profile, to) {
-            (ProfileArg::Fast, TargetArg::Potree2 | TargetArg::Potree1 | TargetArg::Copc) => &[&["--sampling", "random"]],
+            (ProfileArg::Fast, TargetArg::Potree2 | TargetArg::Potree1 | TargetArg::Copc) => {
+                &[&["--sampling", "random"]]
+            }
             (ProfileArg::Balanced, TargetArg::Potree2) => &[&["--encoding", "brotli"]],
             (ProfileArg::Fast | ProfileArg::Balanced, TargetArg::Batches) => &[&["--no-originals"]],
             _ => &[],

@@ -28,8 +28,8 @@ RECORD = np.dtype([("xyz", "<i4", 3), ("intensity", "<u2"), ("flags", "u1"), ("c
                    ("user", "u1"), ("source", "<u2"), ("time", "<f8"), ("rgb", "<u2", 3)])
 
 
-def las(path, pieces, scale=0.001, extra=0, offset=(0, 0, 0)):
-    """LAS 1.2 with points of format 3 and `extra` undescribed bytes behind each."""
+def las(path, pieces, scale=0.001, extra=0, offset=(0, 0, 0), paint=None):
+    """LAS 1.2 with points of format 3 and `extra` undescribed bytes behind each; `paint` gives colours of places."""
     record = np.dtype(RECORD.descr + ([("extra", "u1", extra)] if extra else []))
     count, least, greatest = 0, np.full(3, 2**31), np.full(3, -(2**31))
     rng = np.random.default_rng(7)
@@ -38,7 +38,7 @@ def las(path, pieces, scale=0.001, extra=0, offset=(0, 0, 0)):
         for xyz in pieces:
             points = np.zeros(len(xyz), record)
             points["xyz"] = xyz
-            points["rgb"] = rng.integers(0, 65536, (len(xyz), 3))
+            points["rgb"] = rng.integers(0, 65536, (len(xyz), 3)) if paint is None else paint(rng, xyz * scale)
             points["intensity"] = rng.integers(0, 65536, len(xyz))
             if extra:
                 points["extra"] = rng.integers(0, 256, (len(xyz), extra))

@@ -16,7 +16,8 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 pub(crate) use common::{InputArgs, ProgressArg, ReadingArgs, TalkArgs};
 pub(crate) use convert::{
     BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg, FaultArg,
-    LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, ProfileArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
+    LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, ProfileArg, RgbDepthArg, SEED, SamplingArg, SplitArg,
+    TargetArg,
 };
 pub(crate) use export::ExportArgs;
 pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};

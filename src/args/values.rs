@@ -151,7 +151,8 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
 pub(super) fn parse_points(text: &str) -> Result<u64, String> {
     let unit = [('k', 1_000), ('K', 1_000), ('M', 1_000_000), ('m', 1_000_000), ('G', 1_000_000_000)];
     let unit = unit.into_iter().find(|(letter, _)| text.ends_with(*letter));
-    let (digits, factor) = unit.map_or((text, 1), |(letter, factor)| (text.trim_end_matches(letter), factor));
+    let (digits, factor) =
+        unit.map_or((text, 1), |(letter, factor)| (text.strip_suffix(letter).unwrap_or(text), factor));
     let number = digits.parse::<f64>().ok().filter(|_| digits.bytes().all(|b| b.is_ascii_digit() || b == b'.'));
     let points = number.map(|n| n * factor as f64).filter(|n| (1.0..=1e18).contains(n));
     points.map(|n| n as u64).ok_or_else(|| "expected a number of points, such as 500000, 500k or 5M".to_owned())

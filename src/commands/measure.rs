@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::resolve_path;
-use pointmill_measure::{Measured, MeasureError, Measurement, Shown, Watch, report};
+use pointmill_measure::{MeasureError, Measured, Measurement, Shown, Watch, report};
 
 use crate::args::{BUDGET, InputArgs, MeasureArgs, SAMPLE};
 use crate::exit::{Failure, print_line};
@@ -70,7 +70,9 @@ fn prepare(args: &MeasureArgs, inputs: &[PathBuf]) -> Result<PathBuf, Failure> {
     let is_in = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| folder.starts_with(input));
     if let Some(input) = inputs.iter().find(is_in) {
         let input = input.display();
-        return Err(Failure::Usage(format!("{shown}: the output would be inside of the input {input}; choose another folder")));
+        return Err(Failure::Usage(format!(
+            "{shown}: the output would be inside of the input {input}; choose another folder"
+        )));
     }
     if folder.exists() && !folder.is_dir() {
         return Err(Failure::Usage(format!("{shown}: this is a file; name a folder")));

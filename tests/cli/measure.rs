@@ -28,7 +28,10 @@ fn every_setting_has_a_row_with_its_figures_and_each_profile_converts() {
     let row = |name: &str| rows.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("{name}"));
     for row in rows {
         assert!(row["failed"].is_null(), "{row}");
-        assert!(row["cost"]["bytes_per_point"].as_f64().unwrap() > 1.0 && row["cost"]["cpu_seconds"].as_f64().unwrap() > 0.0);
+        assert!(
+            row["cost"]["bytes_per_point"].as_f64().unwrap() > 1.0
+                && row["cost"]["cpu_seconds"].as_f64().unwrap() > 0.0
+        );
         assert_eq!(row["views"].as_array().unwrap().len(), 4);
     }
     // an octree keeps the integers of the scan: what is left is the rounding of doubles
@@ -55,8 +58,7 @@ fn every_setting_has_a_row_with_its_figures_and_each_profile_converts() {
     assert_eq!(fs::read_dir(dir.path("out")).unwrap().count(), 3, "temporary files are removed");
     for (name, output) in [("fast", "potree2"), ("balanced", "batches"), ("exact", "bintree")] {
         let scan = scan.to_str().unwrap();
-        let ended =
-            dir.succeed(["convert", scan, "-o", name, "--to", output, "--profile", name, "--measured", "out"]);
+        let ended = dir.succeed(["convert", scan, "-o", name, "--to", output, "--profile", name, "--measured", "out"]);
         assert!(ended.stderr().contains(&format!("profile {name}: ")), "{}", ended.stderr());
         dir.validate(name, &[scan]);
     }

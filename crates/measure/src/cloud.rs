@@ -28,9 +28,8 @@ impl Cloud {
 
     pub(crate) fn bounds(&self) -> Aabb {
         let range = |axis: &Vec<f64>| {
-            let of = |part: &[f64]| {
-                part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
-            };
+            let of =
+                |part: &[f64]| part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
             let parts = axis.par_chunks(1 << 20).map(of);
             parts.reduce(|| (f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)))
         };

@@ -169,11 +169,8 @@ fn curve(cloud: &Cloud, min: [f64; 3], side: f64) -> Curve {
     } else {
         order.par_iter().map(|(_, i)| cloud.level[*i as usize]).collect()
     };
-    let rgb = if cloud.rgb.is_empty() {
-        Vec::new()
-    } else {
-        order.par_iter().map(|(_, i)| cloud.rgb[*i as usize]).collect()
-    };
+    let rgb =
+        if cloud.rgb.is_empty() { Vec::new() } else { order.par_iter().map(|(_, i)| cloud.rgb[*i as usize]).collect() };
     Curve { codes: order.into_par_iter().map(|(code, _)| code).collect(), rgb, level }
 }
 

@@ -16,6 +16,7 @@ use crate::image::{compare, popping};
 use crate::position::Sorted;
 use crate::program::{Program, Run, bytes_of};
 use crate::result::{Cost, Measured, Phase, Row, Scene, ViewError};
+use crate::trades::trades;
 use crate::views::{Drawable, NamedView, draw_cloud, flight, image, views};
 use crate::{Axes, MeasureError, Setting, choice, sample};
 
@@ -128,6 +129,7 @@ impl Measurement {
             result.seconds = start.elapsed().as_secs_f64();
             choice::mark_front(&mut result.rows);
             result.profiles = choice::profiles(&result.rows);
+            result.trades = trades(&result.rows);
             watch.measured(&result, &pictures);
         }
         if result.rows.is_empty() { Err(MeasureError::Interrupted) } else { Ok((result, pictures)) }
@@ -298,7 +300,8 @@ impl Work<'_> {
         pictures: &mut Vec<Shown>,
     ) -> Result<(), MeasureError> {
         if matches!(row.output.as_str(), "potree2" | "potree1" | "copc") {
-            let run = self.program.run([OsString::from("validate"), "--json".into(), dataset.as_os_str().to_owned()])?;
+            let run =
+                self.program.run([OsString::from("validate"), "--json".into(), dataset.as_os_str().to_owned()])?;
             row.sampling = run.json.get("quality").and_then(Value::as_array).cloned().unwrap_or_default();
         }
         let fail = |row: &mut Row, error: String| row.failed = Some(error);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::trades::Trade;
 use crate::{AxisError, ImageError, LevelError};
 
 /// The result of a measurement. Lengths are in units of the scene's coordinate system, times in seconds.
@@ -27,6 +28,8 @@ pub struct Measured {
     pub rows: Vec<Row>,
     /// The setting for each output and profile.
     pub profiles: Vec<Profile>,
+    /// What each option buys and costs.
+    pub trades: Vec<Trade>,
     /// From start to end, seconds.
     pub seconds: f64,
 }

@@ -1,7 +1,7 @@
 //! What each option buys and costs, as sentences.
 
 use crate::axis::Axis;
-use crate::result::{Measured, Row};
+use crate::result::Row;
 
 /// An option of an output, two of its values, and what changes from one to the other.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -24,13 +24,13 @@ pub struct Trade {
     pub sentence: String,
 }
 
-/// The trades of a result: each value against the first of its axis.
-pub fn trades(result: &Measured) -> Vec<Trade> {
+/// The trades of rows: each value against the first of its axis.
+pub(crate) fn trades(rows: &[Row]) -> Vec<Trade> {
     let mut trades = Vec::new();
-    let mut outputs: Vec<&str> = result.rows.iter().map(|row| row.output.as_str()).collect();
+    let mut outputs: Vec<&str> = rows.iter().map(|row| row.output.as_str()).collect();
     outputs.dedup();
     for output in outputs {
-        let rows: Vec<&Row> = result.rows.iter().filter(|row| row.output == output && row.cost.is_some()).collect();
+        let rows: Vec<&Row> = rows.iter().filter(|row| row.output == output && row.cost.is_some()).collect();
         for axis in Axis::ALL.into_iter().filter(|axis| *axis != Axis::Output) {
             let mut values: Vec<&String> = rows.iter().filter_map(|row| row.values.get(axis.name())).collect();
             let mut seen = std::collections::HashSet::new();
@@ -50,8 +50,10 @@ fn trade(output: &str, axis: Axis, from: &str, to: &str, rows: &[&Row]) -> Optio
     let with = |value: &str| -> Vec<&Row> {
         rows.iter().copied().filter(|row| row.values.get(axis.name()).is_some_and(|v| v == value)).collect()
     };
-    let pairs: Vec<(&Row, &Row)> =
-        with(from).into_iter().flat_map(|a| with(to).into_iter().filter(|b| is_pair(a, b)).map(move |b| (a, b))).collect();
+    let pairs: Vec<(&Row, &Row)> = with(from)
+        .into_iter()
+        .flat_map(|a| with(to).into_iter().filter(|b| is_pair(a, b)).map(move |b| (a, b)))
+        .collect();
     if pairs.is_empty() {
         return None;
     }
@@ -141,7 +143,7 @@ mod tests {
             row("random", "default", 0.5, 30.0),
             row("random", "brotli", 2.0, 10.0),
         ];
-        let found = trades(&Measured { rows, ..Measured::default() });
+        let found = trades(&rows);
         let sentences: Vec<&str> = found.iter().map(|trade| trade.sentence.as_str()).collect();
         assert_eq!(
             sentences,

@@ -88,8 +88,7 @@ pub(crate) fn draw_cloud(cloud: &Cloud, camera: &Camera, size: Size) -> Result<P
     loop {
         (0..cloud.len().div_ceil(BLOCK)).into_par_iter().for_each(|block| {
             let range = block * BLOCK..((block + 1) * BLOCK).min(cloud.len());
-            let positions: Vec<[f64; 3]> =
-                range.clone().map(|i| cloud.xyz.each_ref().map(|axis| axis[i])).collect();
+            let positions: Vec<[f64; 3]> = range.clone().map(|i| cloud.xyz.each_ref().map(|axis| axis[i])).collect();
             let colours = if cloud.rgb.is_empty() { &grey[..range.len()] } else { &cloud.rgb[range] };
             canvas.add(&positions, colours);
         });

@@ -2,8 +2,8 @@
 
 use std::io;
 
-use crate::result::{Measured, Row};
 use crate::axis::Axis;
+use crate::result::{Measured, Row};
 
 /// The figures of a row, for tables: name, unit, value.
 pub(super) type Figure = (&'static str, fn(&Row) -> Option<f64>);

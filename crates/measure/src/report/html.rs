@@ -8,7 +8,7 @@ use super::csv::FIGURES;
 use super::plots;
 use crate::measurement::Shown;
 use crate::result::{Measured, Row};
-use crate::trades::{length, trades};
+use crate::trades::length;
 
 const HEAD: &str = include_str!("page.html");
 
@@ -79,8 +79,7 @@ fn profiles(result: &Measured) -> String {
 }
 
 fn sentences(result: &Measured) -> String {
-    let items: String =
-        trades(result).iter().map(|trade| format!("<li>{}</li>\n", escaped(&trade.sentence))).collect();
+    let items: String = result.trades.iter().map(|trade| format!("<li>{}</li>\n", escaped(&trade.sentence))).collect();
     if items.is_empty() { items } else { format!("<h2>What each option buys and costs</h2>\n<ul>{items}</ul>\n") }
 }
 
@@ -122,9 +121,10 @@ fn number(value: f64) -> String {
 }
 
 fn side_by_side(result: &Measured, pictures: &[Shown]) -> String {
-    let mut html = "<h2>Pictures</h2>\n<p>First of each view: all points, colours averaged, gaps filled. The others are what a \
+    let mut html =
+        "<h2>Pictures</h2>\n<p>First of each view: all points, colours averaged, gaps filled. The others are what a \
                     renderer shows of the dataset.</p>\n"
-        .to_owned();
+            .to_owned();
     let mut views: Vec<&str> = pictures.iter().filter(|p| p.setting.is_empty()).map(|p| p.view).collect();
     views.dedup();
     for view in views {

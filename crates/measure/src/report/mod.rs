@@ -7,7 +7,7 @@ mod plot;
 use std::path::Path;
 
 use crate::measurement::{Shown, write_whole};
-use crate::{Measured, MeasureError};
+use crate::{MeasureError, Measured};
 
 pub use plot::{Plot, plots};
 

@@ -34,7 +34,13 @@ pub fn plots(result: &Measured) -> Vec<Plot> {
         scatter("Size against pictures", bytes, picture),
         scatter("Time against pictures", time, picture),
         draw("Colours by level", "points per cell", "mean ΔE2000", &by_level(result, |l| l.delta_e), true),
-        draw("Holes by level", "points per cell", "cells without a point", &by_level(result, |l| Some(1.0 - l.covered)), true),
+        draw(
+            "Holes by level",
+            "points per cell",
+            "cells without a point",
+            &by_level(result, |l| Some(1.0 - l.covered)),
+            true,
+        ),
     ];
     all.into_iter().flatten().collect()
 }
