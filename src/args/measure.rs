@@ -60,6 +60,9 @@ pub(crate) struct MeasureArgs {
     #[arg(long, value_name = "DIR", help_heading = "Resources")]
     pub(crate) temp_dir: Option<PathBuf>,
 
+    /// Prints the contents of measure.json on standard output
+    #[arg(long, help_heading = "Reporting")]
+    pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) talk: TalkArgs,
 }

@@ -128,7 +128,10 @@ mod tests {
     #[test]
     fn every_kind_of_mistake_is_one_line_that_names_it() {
         let table: [(&[&str], &str); 14] = [
-            (&[], "no command; the commands are convert, export, validate, extract, info; see 'pointmill --help'"),
+            (
+                &[],
+                "no command; the commands are convert, export, measure, validate, extract, info; see 'pointmill --help'",
+            ),
             (&["convrt"], "there is no command 'convrt'; did you mean convert?; the commands are convert, "),
             (&["convert"], "--output OUT is missing; see 'pointmill convert --help'"),
             (&["extract"], "--output DIR and SCAN are missing"),

@@ -7,7 +7,7 @@ use pointmill_converter::resolve_path;
 use pointmill_measure::{MeasureError, Measured, Measurement, Shown, Watch, report};
 
 use crate::args::{BUDGET, InputArgs, MeasureArgs, SAMPLE};
-use crate::exit::{Failure, print_line};
+use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::measurement;
 use crate::human::progress::{MEASURE, Progress};
 use crate::interrupt::{keeps, no_more_checks, stop_flag, works_in};
@@ -47,6 +47,9 @@ pub(crate) fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let (result, _) = measured?;
     if !result.is_complete {
         return Err(Failure::Interrupted(kept_line(&folder, &result)));
+    }
+    if args.json {
+        emit(&to_json(&result)?)?;
     }
     if for_people {
         measurement::summary(&result, &folder).iter().for_each(|line| print_line(line));

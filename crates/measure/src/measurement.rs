@@ -112,6 +112,9 @@ impl Measurement {
         if result.scene.points_declared > self.sample {
             let points = result.scene.points_declared;
             let part = sample::choose(&scans, points, self.sample, &should_stop)?;
+            if part.points == 0 {
+                return Err(MeasureError::Empty(self.inputs.len()));
+            }
             drop(scans);
             result.scene.chunks = [part.boxes.len(), part.occupied];
             work.write_sample(&part.boxes)?;
@@ -261,12 +264,13 @@ impl Work<'_> {
             return Ok(row);
         }
         row.cost = Some(cost(&run, &dataset, truth.cloud.len()));
-        let checksum = run.json.pointer("/outputs/0/checksum").cloned();
-        row.values.insert("checksum", checksum.as_ref().and_then(Value::as_str).unwrap_or_default().to_owned());
+        let checksum = run.json.pointer("/outputs/0/checksum").and_then(Value::as_str);
+        row.checksum = checksum.unwrap_or_default().to_owned();
         let twin = earlier.iter().find(|other| {
             other.failed.is_none()
                 && other.output == row.output
-                && other.values.get("checksum") == row.values.get("checksum")
+                && !row.checksum.is_empty()
+                && other.checksum == row.checksum
                 && setting.lossless_key() == lossless_key(other)
         });
         if let Some(twin) = twin {
@@ -418,7 +422,11 @@ fn available_memory() -> Option<u64> {
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), MeasureError> {
     let fail = |error| MeasureError::Write { path: path.to_owned(), error };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
+    let mut builder = tempfile::Builder::new();
+    // as any file that the user makes: others may read it if the user's mask lets them
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(fail)?;
     file.write_all(bytes).map_err(fail)?;
     file.persist(path).map_err(|e| fail(e.error))?;
     Ok(())

@@ -66,6 +66,8 @@ pub struct Row {
     pub values: BTreeMap<&'static str, String>,
     /// What `pointmill convert` was told, besides inputs and output.
     pub arguments: Vec<String>,
+    /// Of all points and values of the dataset, in any order; empty if there is none.
+    pub checksum: String,
     /// Why there are no figures.
     pub failed: Option<String>,
     /// What it cost.

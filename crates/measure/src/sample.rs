@@ -35,18 +35,16 @@ pub(crate) fn choose(
     wanted: u64,
     should_stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Sample, MeasureError> {
-    let bounds = bounds(scans, should_stop)?;
     let share = wanted as f64 / points.max(1) as f64;
     let side = (COLUMNS / share).sqrt().ceil().clamp(2.0, MOST_PER_SIDE) as usize;
-    let grid = Grid { bounds, side };
-    let counts: Vec<AtomicU64> = (0..side * side).map(|_| AtomicU64::new(0)).collect();
-    visit(scans, should_stop, &|position| {
-        if let Some(column) = grid.column(position) {
-            counts[column].fetch_add(1, Ordering::Relaxed);
-        }
-    })?;
-    let counts: Vec<u64> = counts.into_iter().map(AtomicU64::into_inner).collect();
-    let chosen = spread(&counts, grid.along_the_curve(), wanted);
+    let mut grid = Grid { bounds: declared_bounds(scans).unwrap_or(Aabb::EMPTY), side };
+    let mut counts = count(scans, &grid, should_stop)?;
+    // headers that are wrong, or say nothing
+    if counts.iter().sum::<u64>() < points / 2 {
+        grid.bounds = measured_bounds(scans, should_stop)?;
+        counts = count(scans, &grid, should_stop)?;
+    }
+    let chosen = spread(&counts, &grid.along_the_curve(), wanted);
     Ok(Sample {
         points: chosen.iter().map(|column| counts[*column]).sum(),
         occupied: counts.iter().filter(|count| **count > 0).count(),
@@ -55,11 +53,12 @@ pub(crate) fn choose(
 }
 
 /// Columns in the order of `order`, so that of every run of them about the same share of points is chosen.
-fn spread(counts: &[u64], order: Vec<usize>, wanted: u64) -> Vec<usize> {
+fn spread(counts: &[u64], order: &[usize], wanted: u64) -> Vec<usize> {
     let total: u64 = counts.iter().sum();
     let share = wanted as f64 / total.max(1) as f64;
     let (mut owed, mut chosen) = (0.0, Vec::new());
-    for column in order.into_iter().filter(|column| counts[*column] > 0) {
+    let occupied = || order.iter().copied().filter(|column| counts[*column] > 0);
+    for column in occupied() {
         let count = counts[column] as f64;
         owed += share * count;
         if owed >= count / 2.0 {
@@ -67,7 +66,26 @@ fn spread(counts: &[u64], order: Vec<usize>, wanted: u64) -> Vec<usize> {
             chosen.push(column);
         }
     }
+    if chosen.is_empty() {
+        // all points in few columns: the smallest
+        chosen.extend(occupied().min_by_key(|column| counts[*column]));
+    }
     chosen
+}
+
+/// Points of each column.
+fn count(
+    scans: &[Box<dyn Scan>],
+    grid: &Grid,
+    should_stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<u64>, MeasureError> {
+    let counts: Vec<AtomicU64> = (0..grid.side * grid.side).map(|_| AtomicU64::new(0)).collect();
+    visit_batches(scans, should_stop, &|positions| {
+        for column in positions.iter().filter_map(|position| grid.column(*position)) {
+            counts[column].fetch_add(1, Ordering::Relaxed);
+        }
+    })?;
+    Ok(counts.into_iter().map(AtomicU64::into_inner).collect())
 }
 
 /// A grid of columns over the ground.
@@ -106,13 +124,14 @@ impl Grid {
     }
 }
 
-/// The bounds that the headers declare, or those of all points.
-fn bounds(scans: &[Box<dyn Scan>], should_stop: &(dyn Fn() -> bool + Sync)) -> Result<Aabb, MeasureError> {
-    let declared = scans.iter().map(|scan| scan.info().bounds_declared).collect::<Option<Vec<_>>>();
+/// The bounds that the headers of all scans declare.
+fn declared_bounds(scans: &[Box<dyn Scan>]) -> Option<Aabb> {
     let is_usable = |b: &Aabb| b.min.iter().chain(&b.max).all(|v| v.is_finite()) && !b.is_empty();
-    if let Some(declared) = declared.filter(|all| all.iter().all(is_usable)) {
-        return Ok(declared.iter().fold(Aabb::EMPTY, |all, bounds| all.union(bounds)));
-    }
+    let declared = scans.iter().map(|scan| scan.info().bounds_declared.filter(is_usable));
+    declared.collect::<Option<Vec<_>>>().map(|all| all.iter().fold(Aabb::EMPTY, |all, bounds| all.union(bounds)))
+}
+
+fn measured_bounds(scans: &[Box<dyn Scan>], should_stop: &(dyn Fn() -> bool + Sync)) -> Result<Aabb, MeasureError> {
     let all = std::sync::Mutex::new(Aabb::EMPTY);
     visit_batches(scans, should_stop, &|positions| {
         let mut mine = Aabb::EMPTY;
@@ -121,14 +140,6 @@ fn bounds(scans: &[Box<dyn Scan>], should_stop: &(dyn Fn() -> bool + Sync)) -> R
         *all = all.union(&mine);
     })?;
     Ok(all.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner))
-}
-
-fn visit(
-    scans: &[Box<dyn Scan>],
-    should_stop: &(dyn Fn() -> bool + Sync),
-    with: &(dyn Fn([f64; 3]) + Sync),
-) -> Result<(), MeasureError> {
-    visit_batches(scans, should_stop, &|positions| positions.iter().for_each(|position| with(*position)))
 }
 
 /// Calls `with` for the positions of all points that are numbers, on all threads.
@@ -179,11 +190,13 @@ mod tests {
         // twice as dense on the right
         let counts: Vec<u64> = (0..256).map(|column| if column % 16 < 8 { 100 } else { 200 }).collect();
         let total: u64 = counts.iter().sum();
-        let chosen = spread(&counts, grid.along_the_curve(), total / 4);
+        let chosen = spread(&counts, &grid.along_the_curve(), total / 4);
         let of = |right: bool| chosen.iter().filter(|c| (**c % 16 >= 8) == right).count();
         assert!(of(false).abs_diff(32) <= 1 && of(true).abs_diff(32) <= 1, "{} {}", of(false), of(true));
-        assert_eq!(spread(&counts, grid.along_the_curve(), total).len(), 256);
-        assert_eq!(spread(&counts, grid.along_the_curve(), 0).len(), 0);
+        assert_eq!(spread(&counts, &grid.along_the_curve(), total).len(), 256);
+        // never nothing
+        assert_eq!(spread(&counts, &grid.along_the_curve(), 0).len(), 1);
+        assert_eq!(spread(&[0, 5, 3, 0], &[0, 1, 2, 3], 1), [2]);
     }
 
     #[test]
