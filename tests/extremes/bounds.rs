@@ -26,12 +26,12 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// The largest number that decoding meets: a coordinate, a corner of the cube, the offset of the lattice.
+    /// F: no number that a reader or a writer meets is larger: a coordinate, a corner of the cube, the offset of the lattice.
     fn farthest(&self) -> f64 {
         self.min.abs().max(self.max.abs()) + self.side + self.offset.abs()
     }
 
-    /// §2: what the lattice does to point `i`.
+    /// §2: what reading and the lattice do to point `i`.
     pub(crate) fn of_lattice(&self, case: &Case, i: usize, axis: usize) -> f64 {
         let far = self.farthest();
         let read = match &case.input {
@@ -41,14 +41,15 @@ impl Axis {
                 let (matrix, denominator) = rotation(*quaternion);
                 let is_turned = matrix != [[denominator, 0.0, 0.0], [0.0, denominator, 0.0], [0.0, 0.0, denominator]];
                 let sizes = points[i].map(|q| f64::from(q).abs() * step);
-                let turned = if is_turned { 24.0 * U * sizes.iter().sum::<f64>() } else { 0.0 };
-                turned + U * sizes[axis] + U * far
+                let turned = if is_turned { 24.0 * U * sizes.iter().sum::<f64>() } else { U * sizes[axis] };
+                turned + U * far
             }
         };
-        match case.kept[axis] {
-            Kept::Same => read,
-            Kept::Decimals => read + U * far,
-            Kept::Rounded => read + self.step / 2.0 + 5.0 * U * far,
+        match (case.kept[axis], &case.input) {
+            (Kept::Same, _) => read,
+            (Kept::Decimals, _) => read + U * far,
+            (Kept::Rounded, Input::Las { .. }) => read + self.step / 2.0 + 32.0 * U * far,
+            (Kept::Rounded, _) => read + self.step / 2.0 + 2.0 * U * far,
         }
     }
 
@@ -56,10 +57,10 @@ impl Axis {
     pub(crate) fn of_format(&self, rule: Rule, level: u8) -> f64 {
         let far = self.farthest();
         match rule {
-            Rule::Integers => 5.0 * U * far,
-            Rule::FromCorners => self.of_corners(level) + (f64::from(level) + 8.0) * U * far,
-            Rule::Singles => self.of_singles() + 6.0 * U * far,
-            Rule::Cells(bits) => self.of_cells(bits) + 14.0 * U * (far + 1.0), // counted from a whole number
+            Rule::Integers => 3.0 * U * far,
+            Rule::FromCorners => self.of_corners(level) + (f64::from(level) + 7.0) * U * far,
+            Rule::Singles => self.of_singles() + 3.0 * U * far,
+            Rule::Cells(bits) => self.of_cells(bits) + 5.0 * U * (far + 1.0), // counted from a whole number
         }
     }
 

@@ -97,7 +97,7 @@ impl Case {
         assert!(side <= extent + 130.0 * coarsest + 1e-15 * extent, "{}: a cube of {side}", self.name);
         let are_equal = scale.iter().all(|s| (s / finest).log2().fract() == 0.0);
         std::array::from_fn(|a| {
-            let ((min, max), step, offset) = (ends[a], scale[a], number(&grid["offset"][a]));
+            let ((min, max), step, offset) = (ends[a], scale[a], self.input.offset()[a]);
             Axis { min, max, step, offset, finest, side, are_equal }
         })
     }

@@ -63,7 +63,9 @@ fn ends_of_eight_and_sixteen_bits() {
         dir.write("a.las", &las.bytes());
         let formats = ["potree2", "potree1", "copc", "bintree", "batches"];
         dir.succeed(
-            ["convert", "a.las", "-o", "out", "-q"].into_iter().chain(formats.iter().flat_map(|f| ["--to", f])),
+            ["convert", "a.las", "-o", "out", "--attributes", "rgb", "-q"]
+                .into_iter()
+                .chain(formats.iter().flat_map(|f| ["--to", f])),
         );
         formats.iter().for_each(|format| dir.validate(&format!("out/{format}"), &["a.las"]));
         let meant: Vec<_> = las.points.iter().map(|p| p.rgb.map(|v| v * factor)).collect();

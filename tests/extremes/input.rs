@@ -51,6 +51,15 @@ impl Input {
         }
     }
 
+    /// Where 0 of the lattice of the run is, which is that of the scan if it has one.
+    pub(crate) fn offset(&self) -> [f64; 3] {
+        match self {
+            Self::Las { offset, .. } => *offset,
+            Self::Posed { translation, .. } => *translation,
+            _ => [0.0; 3],
+        }
+    }
+
     pub(crate) fn file_name(&self) -> &'static str {
         match self {
             Self::Las { .. } => "a.las",
@@ -98,10 +107,10 @@ impl Input {
                 Las { point_format: 6, scale: *scale, offset: *offset, ..Las::new(points) }.bytes()
             }
             Self::Text { decimals, points } => {
-                let mut out = "x,y,z,intensity\n".to_owned();
+                let mut out = "x;y;z;intensity\n".to_owned();
                 for (i, p) in points.iter().enumerate() {
                     let [x, y, z] = p.map(|v| decimal(v, *decimals as usize));
-                    out += &format!("{x},{y},{z},{i}\n");
+                    out += &format!("{x};{y};{z};{i}\n");
                 }
                 out.into_bytes()
             }
