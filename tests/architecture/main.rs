@@ -47,6 +47,7 @@ const LAYERS: [(&str, Layers<'static>); 6] = [
         &[
             &["vector", "error", "style", "workers"],
             &["camera"],
+            &["flight"],
             &["picture", "projection"],
             &["raster", "sources"],
             &["colours", "shading"],

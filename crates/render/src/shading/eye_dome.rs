@@ -2,7 +2,7 @@
 //! Visualization of Large Datasets: Towards a Perceptive-based Approach", 2009), with logarithms of depths, as in Potree: what
 //! is twice as far needs twice the step.
 
-use super::{Pixels, for_rows};
+use super::pixels::{Pixels, for_rows};
 
 /// How much a step by a factor of two darkens at strength 1.
 const STEEPNESS: f32 = 12.0;

@@ -1,6 +1,6 @@
 //! Small gaps between points, closed from their neighbours.
 
-use super::{Pixels, for_rows};
+use super::pixels::{Pixels, for_rows};
 
 /// An empty pixel takes the mean of its neighbours if at least this many of the eight are filled ...
 const LEAST_NEIGHBOURS: usize = 4;

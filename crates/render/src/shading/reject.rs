@@ -5,7 +5,7 @@
 //! the eye, is free of other points. In the neighbourhood of 7 × 7 pixels, each of eight sectors has the widest angle that its
 //! neighbours leave free; the sum of these angles is the opening of the cone.
 
-use super::{Pixels, for_rows};
+use super::pixels::{Pixels, for_rows};
 
 /// Neighbours on each side.
 const REACH: isize = 3;
