@@ -28,7 +28,7 @@ use std::process::ExitCode;
 use args::{Args, Command, mistake};
 use clap::Parser as _;
 use clap::error::ErrorKind;
-use commands::{convert, export, extract, info, measure, validate};
+use commands::{convert, export, extract, info, measure, preview, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {
@@ -68,5 +68,6 @@ fn run(args: &Args) -> Result<(), Failure> {
         Command::Validate(validate) => validate::run(validate),
         Command::Extract(extract) => extract::run(extract),
         Command::Info(info) => info::run(info),
+        Command::Preview(preview) => preview::run(preview),
     }
 }

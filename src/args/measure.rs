@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use pointmill_measure::Axes;
+use pointmill_render::Size;
 
 use super::common::TalkArgs;
-use super::values::{parse_bytes, parse_points, parse_threads};
+use super::values::{parse_bytes, parse_points, parse_size, parse_threads};
 
 /// Scenes up to this size are measured in whole.
 pub(crate) const SAMPLE: u64 = 20_000_000;
@@ -46,7 +47,7 @@ pub(crate) struct MeasureArgs {
     pub(crate) budget: Option<u64>,
     /// Size of the pictures that are compared
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "800x600", help_heading = "Measuring")]
-    pub(crate) size: pointmill_render::Size,
+    pub(crate) size: Size,
 
     /// Memory limit of each conversion, for example 2GiB [default: 60 % of the available memory]
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes, allow_negative_numbers = true,
@@ -65,11 +66,4 @@ pub(crate) struct MeasureArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) talk: TalkArgs,
-}
-
-/// Parses `800x600`.
-fn parse_size(text: &str) -> Result<pointmill_render::Size, String> {
-    let sides = text.split_once(['x', 'X', '×']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    let (width, height) = sides.ok_or("expected a size like 800x600")?;
-    pointmill_render::Size::new(width, height).map_err(|error| error.to_string())
 }

@@ -6,6 +6,7 @@ mod export;
 mod measure;
 pub(crate) mod mistake;
 mod placing;
+mod preview;
 mod values;
 
 use std::num::NonZero;
@@ -21,6 +22,7 @@ pub(crate) use convert::{
 };
 pub(crate) use export::ExportArgs;
 pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
+pub(crate) use preview::PreviewArgs;
 pub(crate) use values::Attributes;
 use values::parse_bytes;
 
@@ -50,6 +52,8 @@ pub(crate) enum Command {
     Extract(ExtractArgs),
     /// Describes scans and datasets, from their headers unless --deep is given
     Info(InfoArgs),
+    /// Draws a picture of a dataset or of scans
+    Preview(Box<PreviewArgs>),
 }
 
 #[derive(Debug, ClapArgs)]

@@ -4,6 +4,7 @@ use std::num::NonZero;
 use std::ops::RangeInclusive;
 
 use pointmill_format::{Aabb, Lattice};
+use pointmill_render::Size;
 
 /// More than the cores of any machine with one memory; a thread needs tens of MiB.
 const MAX_THREADS: u64 = 1024;
@@ -156,6 +157,14 @@ pub(super) fn parse_points(text: &str) -> Result<u64, String> {
     let number = digits.parse::<f64>().ok().filter(|_| digits.bytes().all(|b| b.is_ascii_digit() || b == b'.'));
     let points = number.map(|n| n * factor as f64).filter(|n| (1.0..=1e18).contains(n));
     points.map(|n| n as u64).ok_or_else(|| "expected a number of points, such as 500000, 500k or 5M".to_owned())
+}
+
+/// Parses the size of a picture, such as `1920x1080`.
+pub(super) fn parse_size(text: &str) -> Result<Size, String> {
+    let side = |text: &str| text.parse::<u32>().ok().filter(|_| text.bytes().all(|b| b.is_ascii_digit()));
+    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
+    let (width, height) = sides.ok_or_else(|| "expected pixels, as in 1920x1080".to_owned())?;
+    Size::new(width, height).map_err(|e| e.to_string())
 }
 
 /// Parses `xmin,ymin,zmin..xmax,ymax,zmax`, world coordinates.

@@ -5,5 +5,7 @@ pub(crate) mod export;
 pub(crate) mod extract;
 pub(crate) mod info;
 pub(crate) mod measure;
+pub(crate) mod preview;
 mod report_file;
 pub(crate) mod validate;
+mod whole_file;

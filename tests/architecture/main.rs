@@ -59,6 +59,7 @@ const LAYERS: [(&str, Layers<'static>); 7] = [
         &[
             &["vector", "error", "style", "workers"],
             &["camera"],
+            &["flight"],
             &["picture", "projection"],
             &["raster", "sources"],
             &["colours", "shading"],

@@ -108,7 +108,11 @@ fn check_all(table: &[Mistake]) {
 #[test]
 fn commands_and_options_that_are_none() {
     check_all(&[
-        ("", 2, &["no command", "convert, export, measure, validate, extract, info", "see 'pointmill --help'"]),
+        (
+            "",
+            2,
+            &["no command", "convert, export, measure, validate, extract, info, preview", "see 'pointmill --help'"],
+        ),
         ("convrt", 2, &["'convrt'", "did you mean convert?"]),
         ("bogus", 2, &["no command 'bogus'", "convert, export, validate"]),
         ("--bogus", 2, &["no option --bogus", "pointmill --help"]),

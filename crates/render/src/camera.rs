@@ -173,14 +173,24 @@ impl Camera {
     /// As [`Self::fit`], looking along `direction`, of any length; along y if that is no direction.
     #[must_use]
     pub fn fit_along(bounds: &Aabb, direction: [f64; 3], size: Size) -> Self {
+        let corner = |i: usize| std::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
+        Self::fit_points((0..8).map(corner), bounds, direction, size)
+    }
+
+    /// As [`Self::fit_along`], but what just fits is these points of `bounds`.
+    pub(crate) fn fit_points(
+        points: impl Iterator<Item = [f64; 3]>,
+        bounds: &Aabb,
+        direction: [f64; 3],
+        size: Size,
+    ) -> Self {
         let middle = bounds.center();
         let target = if middle.iter().all(|c| c.is_finite()) { middle } else { [0.0; 3] };
         let forward = unit(direction).unwrap_or([0.0, 1.0, 0.0]);
         let [right, up] = across(forward, [0.0, 0.0, 1.0]);
         let slope = (FIELD_OF_VIEW / 2.0).to_radians().tan();
-        let corner = |i: usize| std::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
-        let needed = (0..8).map(|i| {
-            let at = minus(corner(i), target);
+        let needed = points.map(|point| {
+            let at = minus(point, target);
             let side = (dot(at, right).abs() / (slope * size.aspect())).max(dot(at, up).abs() / slope);
             side * MARGIN - dot(at, forward)
         });

@@ -86,6 +86,11 @@ impl Canvas {
     /// The picture, shaded as the style says.
     #[must_use]
     pub fn finish(self) -> Picture {
+        self.finish_on(0)
+    }
+
+    /// As [`Self::finish`], on that many threads; 0 is one per core.
+    pub(crate) fn finish_on(self, threads: usize) -> Picture {
         let is_counted = self.pass == Pass::Count;
         let size = self.projection.size;
         let mut rgb = if is_counted {
@@ -97,7 +102,7 @@ impl Canvas {
         let mut depth = self.target.depths();
         drop(self.target);
         if !is_counted {
-            shading::shade(&mut rgb, &mut depth, &self.projection, &self.style);
+            shading::shade(&mut rgb, &mut depth, &self.projection, &self.style, threads);
         }
         let mut picture = Picture::new(size, rgb, depth);
         picture.drawn.points = self.added.into_inner();

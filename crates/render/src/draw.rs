@@ -61,7 +61,7 @@ pub(crate) fn draw(
     }
     let Drawing { canvas, paint, units, points, bytes, .. } = drawing;
     let projection = canvas.projection.clone();
-    let mut picture = canvas.finish();
+    let mut picture = canvas.finish_on(threads);
     if style.has_boxes {
         boxes::overlay(&mut picture, &projection, &units);
     }

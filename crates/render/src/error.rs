@@ -46,13 +46,7 @@ pub enum RenderError {
         /// The attributes that are there, for people.
         known: String,
     },
-    /// The flag of [`crate::Run::stop`] was raised.
-    #[error("interrupted")]
-    Stopped,
     /// The picture could not be encoded.
-    #[error("encoding the picture: {0}")]
+    #[error("internal error: encoding the picture: {0}")]
     Encode(String),
-    /// A fault of this program.
-    #[error("internal error: {0}")]
-    Internal(&'static str),
 }

@@ -98,6 +98,13 @@ impl Scene {
         &self.format
     }
 
+    /// Disagreements within scans that did not stop the readers, one line each.
+    pub fn warnings(&self) -> Vec<String> {
+        let Kind::Scans { files, .. } = &self.kind else { return Vec::new() };
+        let lines = |file: &ScanFile| file.warnings.iter().map(|w| format!("{}: {w}", file.path.display())).collect();
+        files.iter().flat_map(|file| -> Vec<String> { lines(file) }).collect()
+    }
+
     /// Where the points are, as far as a sample or the dataset says, world units; points far from all others do not count. A
     /// box without extent at the origin if there are none.
     pub fn bounds(&self) -> Aabb {

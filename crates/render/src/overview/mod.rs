@@ -57,7 +57,9 @@ impl Sample {
             // from the south first, then from the south-east
             let angle = std::f64::consts::FRAC_PI_4 * f64::from(eighth);
             let (sideways, down) = (30f64.to_radians().cos(), 30f64.to_radians().sin());
-            Camera::fit_along(&self.bounds, [-angle.sin() * sideways, angle.cos() * sideways, -down], size)
+            let direction = [-angle.sin() * sideways, angle.cos() * sideways, -down];
+            let inside = self.positions.iter().copied().filter(|p| self.bounds.contains(*p));
+            Camera::fit_points(inside, &self.bounds, direction, size)
         });
         let covered = |camera: &Camera| {
             let colours = vec![[0; 3]; self.positions.len()];

@@ -74,7 +74,7 @@ impl<'a, B: AsRef<[u8]> + Sync> BatchesSource<'a, B> {
         let mut all: Vec<f32> = self.chosen.iter().map(|chosen| chosen.spacing).collect();
         all.sort_unstable_by(f32::total_cmp);
         if let Some(median) = all.get(all.len() / 2) {
-            self.chosen.iter_mut().for_each(|chosen| chosen.spacing = chosen.spacing.min(2.0 * median));
+            self.chosen.iter_mut().for_each(|chosen| chosen.spacing = chosen.spacing.min(8.0 * median));
         }
     }
 

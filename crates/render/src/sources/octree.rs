@@ -14,10 +14,15 @@ use super::{Buffers, Points, Source, Take, Unit, UnitSize};
 /// No node.
 const NONE: u32 = u32::MAX;
 
+/// Points of a leaf are at most this many times as large as those of an inner node of its level.
+const LARGEST_IN_LEAF: f64 = 4.0;
+
 /// A node that is drawn.
 struct Drawn {
     node: OctreeNode,
     points: u64,
+    /// Distance between the points that are drawn there, world units.
+    spacing: f32,
     /// The nodes drawn below it, by child index.
     children: [u32; 8],
 }
@@ -105,13 +110,26 @@ impl<'a> OctreeSource<'a> {
         if let Some(parent) = self.nodes.get_mut(parent as usize) {
             parent.children[usize::from(node.key.child_index())] = index;
         }
-        self.nodes.push(Drawn { node, points, children: [NONE; 8] });
+        let spacing = self.spacing(&node, points);
+        self.nodes.push(Drawn { node, points, spacing, children: [NONE; 8] });
         index
     }
 
-    /// The level of the deepest node drawn at a place, from a node that has it.
-    fn level_at(&self, unit: usize, world: [f64; 3]) -> u8 {
-        let Some(mut drawn) = self.nodes.get(unit) else { return 0 };
+    /// Between points of a node and its ancestors: of an inner node what the level says; a leaf has whatever remained, in the
+    /// best case spread over a face of its box.
+    fn spacing(&self, node: &OctreeNode, points: u64) -> f32 {
+        let info = self.octree.info();
+        let of_level = info.spacing_at(node.key.level);
+        if node.child_mask != 0 {
+            return of_level as f32;
+        }
+        let side = info.node_box(node.key).extent()[0];
+        (side / (points.max(1) as f64).sqrt()).min(LARGEST_IN_LEAF * of_level).max(of_level) as f32
+    }
+
+    /// The distance between points at a place: that of the deepest node drawn there, from a node that has it.
+    fn spacing_at(&self, unit: usize, world: [f64; 3]) -> f32 {
+        let Some(mut drawn) = self.nodes.get(unit) else { return 0.0 };
         let mut bounds = self.octree.info().node_box(drawn.node.key);
         loop {
             let middle = bounds.center();
@@ -119,7 +137,7 @@ impl<'a> OctreeSource<'a> {
             let child = is_high.iter().fold(0, |index, high| index << 1 | usize::from(*high));
             match self.nodes.get(drawn.children[child] as usize) {
                 Some(below) => drawn = below,
-                None => return drawn.node.key.level,
+                None => return drawn.spacing,
             }
             for a in 0..3 {
                 if is_high[a] {
@@ -142,14 +160,13 @@ impl Source for OctreeSource<'_> {
     }
 
     fn unit(&self, index: usize) -> Unit {
-        let Some(Drawn { node, points, children }) = self.nodes.get(index) else { return Unit::new(0) };
+        let Some(Drawn { node, points, spacing, children }) = self.nodes.get(index) else { return Unit::new(0) };
         let info = self.octree.info();
-        let spacing = |level: u8| info.spacing_at(level) as f32;
         let size = match self.size {
             PointSize::Pixels(pixels) => UnitSize::Pixels(pixels),
             PointSize::World(size) => UnitSize::World(size),
             PointSize::Adaptive(factor) if children.iter().all(|child| *child == NONE) => {
-                UnitSize::World(spacing(node.key.level) * factor)
+                UnitSize::World(spacing * factor)
             }
             PointSize::Adaptive(_) => UnitSize::Each,
         };
@@ -171,6 +188,6 @@ impl Source for OctreeSource<'_> {
     fn size_at(&self, unit: usize, points: &Points<'_>, index: usize, _view: [f64; 3]) -> f32 {
         let PointSize::Adaptive(factor) = self.size else { return 0.0 };
         let Some(world) = points.world(index) else { return 0.0 };
-        self.octree.info().spacing_at(self.level_at(unit, world)) as f32 * factor
+        self.spacing_at(unit, world) * factor
     }
 }

@@ -22,6 +22,8 @@ pub(crate) struct ScanFile {
     /// What its header says, unchecked.
     pub(crate) bounds: Option<Aabb>,
     pub(crate) pieces: usize,
+    /// What did not stop the reader.
+    pub(crate) warnings: Vec<String>,
     attributes: Vec<Attribute>,
     scan: Option<Box<dyn Scan>>,
 }
@@ -50,7 +52,17 @@ impl ScanFile {
             let points = scan.pieces().iter().map(|piece| piece.points).sum();
             let (attributes, pieces) = (info.attributes.to_vec(), scan.pieces().len());
             let (format, bounds) = (info.format.clone(), info.bounds_declared);
-            Ok(Self { path: path.clone(), points, format, bounds, pieces, attributes, scan: stay.then_some(scan) })
+            let warnings = info.warnings.iter().map(ToString::to_string).collect();
+            Ok(Self {
+                path: path.clone(),
+                points,
+                format,
+                bounds,
+                pieces,
+                warnings,
+                attributes,
+                scan: stay.then_some(scan),
+            })
         };
         paths.iter().map(open).collect()
     }
