@@ -31,10 +31,12 @@ mod potree1_of_others;
 mod potree1_proofs;
 mod precision;
 mod reporting;
+mod required_precision;
 
 mod same_points;
 mod sameness;
 mod scans_within;
+mod scene_attributes;
 mod several;
 mod stops;
 mod support;
