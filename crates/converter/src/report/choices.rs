@@ -47,7 +47,7 @@ impl PlannedChoice {
     }
 
     /// A value that has a default.
-    pub(crate) fn or_default<T: fmt::Display + PartialEq>(setting: &str, value: T, default: T) -> Self {
+    pub(crate) fn or_default<T: fmt::Display + PartialEq + Copy>(setting: &str, value: T, default: T) -> Self {
         let why = if value == default { ChoiceReason::Default } else { ChoiceReason::Requested };
         Self { output: String::new(), setting: setting.to_owned(), value: Some(value.to_string()), why }
     }

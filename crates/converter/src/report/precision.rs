@@ -34,6 +34,8 @@ pub struct PrecisionReport {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SavedBytes {
+    /// No byte: the precision needs all bits that the coordinates have.
+    NothingDropped,
     /// No byte: a position takes the same whatever the step.
     FixedRecords,
     /// No byte: all planes are needed, or their number was requested.
@@ -53,7 +55,7 @@ impl SavedBytes {
     /// Bytes that are known to be saved; `None`: they are not counted.
     pub const fn bytes(self) -> Option<u64> {
         match self {
-            Self::FixedRecords | Self::NoPlane => Some(0),
+            Self::NothingDropped | Self::FixedRecords | Self::NoPlane => Some(0),
             Self::Planes { bytes, .. } => Some(bytes),
             Self::Compressed => None,
         }
@@ -63,6 +65,7 @@ impl SavedBytes {
 impl fmt::Display for SavedBytes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::NothingDropped => f.write_str("no byte: the step of the scans is not finer than the precision"),
             Self::FixedRecords => f.write_str("no byte: a position takes as many bytes whatever the step"),
             Self::NoPlane => f.write_str("no plane of positions"),
             Self::Planes { planes: 1, .. } => f.write_str("one plane of positions"),
@@ -99,6 +102,8 @@ pub(crate) fn precision(
         return Err(Unsupported::Imprecise { kind, axis, error, allowed }.into());
     }
     let bits_dropped = cloud.lattice.reason.axes.map(|axis| axis.enough.unwrap_or(1.0).log2());
+    let is_same = bits_dropped == [0.0; 3] && saved == SavedBytes::Compressed;
+    let saved = if is_same { SavedBytes::NothingDropped } else { saved };
     Ok(Some(PrecisionReport { allowed, max: total.max, rms: total.rms, bits_dropped, saved }))
 }
 

@@ -110,7 +110,7 @@ impl Output for BatchesSettings {
         vec![
             PlannedChoice::or_chosen("cell of the coarsest level of detail", self.lod_cell, ChoiceReason::CellPoints),
             PlannedChoice::or_chosen("bits of a coordinate", self.planes.map(|p| 10 * u32::from(p)), by),
-            PlannedChoice::or_default("sections", sections, "not compressed".to_owned()),
+            PlannedChoice::or_default("sections", sections.as_str(), "not compressed"),
         ]
     }
 

@@ -97,7 +97,7 @@ impl Output for Potree2Settings {
             Encoding::Brotli { quality } => format!("brotli, quality {quality}"),
         };
         let mut choices = self.tree().choices(Self::default().leaf_capacity);
-        choices.push(PlannedChoice::or_default("encoding", encoding, "default".to_owned()));
+        choices.push(PlannedChoice::or_default("encoding", encoding.as_str(), "default"));
         choices
     }
 
