@@ -7,6 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use pointmill_converter::ConvertError;
 use pointmill_format::{Advice, ErrorKind, ReadError, system_reason};
+use pointmill_render::RenderError;
 
 use crate::flags;
 use crate::printable::{json_escaped, printable, printable_lines};
@@ -108,6 +109,17 @@ impl From<ReadError> for Failure {
             ErrorKind::Unsupported if error.advice() == Some(&Advice::MoreMemory) => Self::Memory(line),
             ErrorKind::Unsupported => Self::Unsupported(line),
             ErrorKind::Io(_) => Self::Io(line),
+        }
+    }
+}
+
+impl From<RenderError> for Failure {
+    fn from(error: RenderError) -> Self {
+        match error {
+            RenderError::Read(read) => read.into(),
+            RenderError::Camera(camera) => Self::Usage(camera.to_string()),
+            RenderError::NoAttribute { .. } => Self::Unsupported(error.to_string()),
+            other => Self::Internal(other.to_string()),
         }
     }
 }

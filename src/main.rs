@@ -27,7 +27,7 @@ use std::process::ExitCode;
 use args::{Args, Command, mistake};
 use clap::Parser as _;
 use clap::error::ErrorKind;
-use commands::{convert, export, extract, info, validate};
+use commands::{convert, export, extract, info, preview, validate};
 use exit::Failure;
 
 fn main() -> ExitCode {
@@ -65,5 +65,6 @@ fn run(args: &Args) -> Result<(), Failure> {
         Command::Validate(validate) => validate::run(validate),
         Command::Extract(extract) => extract::run(extract),
         Command::Info(info) => info::run(info),
+        Command::Preview(preview) => preview::run(preview),
     }
 }

@@ -62,6 +62,14 @@ pub(crate) struct ReadingArgs {
 impl ReadingArgs {
     /// Where no scan is read, an option about reading scans is a mistake.
     pub(crate) fn refuse_without_scans(&self) -> Result<(), Failure> {
+        match self.given() {
+            Some(option) => Err(Failure::Usage(format!("{option} requires --against"))),
+            None => Ok(()),
+        }
+    }
+
+    /// The first option about reading scans that was given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
         let placing = &self.placing;
         let given = [
             ("--columns", self.columns.is_some()),
@@ -75,10 +83,7 @@ impl ReadingArgs {
             ("--transform", placing.transform.is_some()),
             ("--reproject", placing.reproject.is_some()),
         ];
-        match given.iter().find(|(_, is_given)| *is_given) {
-            Some((option, _)) => Err(Failure::Usage(format!("{option} requires --against"))),
-            None => Ok(()),
-        }
+        given.iter().find(|(_, is_given)| *is_given).map(|(option, _)| *option)
     }
 
     /// The options for the readers; invalid columns are reported before any file is opened.

@@ -5,6 +5,7 @@ mod convert;
 mod export;
 pub(crate) mod mistake;
 mod placing;
+mod preview;
 mod values;
 
 use std::num::NonZero;
@@ -18,6 +19,7 @@ pub(crate) use convert::{
     LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg, SplitArg, TargetArg,
 };
 pub(crate) use export::ExportArgs;
+pub(crate) use preview::PreviewArgs;
 pub(crate) use values::Attributes;
 use values::parse_bytes;
 
@@ -45,6 +47,8 @@ pub(crate) enum Command {
     Extract(ExtractArgs),
     /// Describes scans and datasets, from their headers unless --deep is given
     Info(InfoArgs),
+    /// Draws a picture of a dataset or of scans
+    Preview(Box<PreviewArgs>),
 }
 
 #[derive(Debug, ClapArgs)]

@@ -4,5 +4,7 @@ pub(crate) mod convert;
 pub(crate) mod export;
 pub(crate) mod extract;
 pub(crate) mod info;
+pub(crate) mod preview;
 mod report_file;
 pub(crate) mod validate;
+mod whole_file;

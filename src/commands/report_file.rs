@@ -1,16 +1,14 @@
 //! The copy of the run report: at a place that is neither an input nor part of a dataset, all of it or nothing.
 
 use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::resolve_path;
 use pointmill_format::DatasetKind;
 
+use super::whole_file::{beside, is_of_dataset, is_same};
 use crate::exit::Failure;
-
-/// How the hidden folders are called in which outputs are made.
-const UNFINISHED: &str = ".unfinished-";
 
 /// Where the copy goes.
 pub(crate) struct ReportFile {
@@ -70,7 +68,7 @@ impl ReportFile {
         if folder == output {
             return Ok(report(Way::Replace));
         }
-        match beside(&path) {
+        match beside(&path, ".report-") {
             Ok(_) => Ok(report(Way::Replace)),
             Err(_) if meta.is_some() && File::options().append(true).open(&path).is_ok() => Ok(report(Way::Into)),
             Err(e) => Err(Failure::io(given, "writing the report", &e)),
@@ -83,7 +81,7 @@ impl ReportFile {
             Way::IsThere => Ok(()),
             Way::Into => File::options().write(true).truncate(true).open(&self.path)?.write_all(text.as_bytes()),
             Way::Replace => {
-                let mut file = beside(&self.path)?;
+                let mut file = beside(&self.path, ".report-")?;
                 file.write_all(text.as_bytes())?;
                 file.as_file().sync_all()?;
                 if let Ok(meta) = fs::metadata(&self.path) {
@@ -96,42 +94,10 @@ impl ReportFile {
     }
 }
 
-/// A file beside `path`, removed if it does not get its name.
-fn beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".report-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(fs::Permissions::from_mode(0o666)); // less what the user's mask takes
-    }
-    builder.tempfile_in(path.parent().unwrap_or(path))
-}
-
 /// True if an output has files or folders of that name (in small letters: some file systems do not tell them apart).
 fn is_taken(name: &str) -> bool {
-    DatasetKind::ALL.iter().any(|kind| kind.owns(name) || kind.name() == name) || name.starts_with(UNFINISHED)
-}
-
-/// True for a file of any dataset that is there, or of one that is being made.
-fn is_of_dataset(path: &Path, name: &str) -> bool {
-    let is_unfinished = |p: &Path| p.file_name().is_some_and(|n| n.to_string_lossy().contains(UNFINISHED));
-    let kind = path.parent().and_then(DatasetKind::detect);
-    kind.is_some_and(|kind| kind.owns(name)) || path.ancestors().skip(1).any(is_unfinished)
-}
-
-/// True if two paths lead to one file, by whatever name.
-fn is_same(a: &Path, b: &Path) -> bool {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::MetadataExt as _;
-        let id = |path: &Path| fs::metadata(path).map(|m| (m.dev(), m.ino()));
-        matches!((id(a), id(b)), (Ok(a), Ok(b)) if a == b)
-    }
-    #[cfg(not(unix))]
-    {
-        matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
-    }
+    DatasetKind::ALL.iter().any(|kind| kind.owns(name) || kind.name() == name)
+        || name.starts_with(super::whole_file::UNFINISHED)
 }
 
 #[cfg(test)]

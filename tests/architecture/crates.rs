@@ -6,13 +6,21 @@ use std::process::Command;
 use serde_json::Value;
 
 /// What each crate of the workspace may depend on, for whatever purpose, among the crates of the workspace.
-const ALLOWED: [(&str, &[&str]); 6] = [
+const ALLOWED: [(&str, &[&str]); 7] = [
     (
         "pointmill",
-        &["pointmill-converter", "pointmill-crs", "pointmill-format", "pointmill-validate", "pointmill-testkit"],
+        &[
+            "pointmill-converter",
+            "pointmill-crs",
+            "pointmill-format",
+            "pointmill-render",
+            "pointmill-validate",
+            "pointmill-testkit",
+        ],
     ),
     ("pointmill-crs", &["pointmill-format"]),
     ("pointmill-converter", &["pointmill-format", "pointmill-testkit"]),
+    ("pointmill-render", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-validate", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-format", &["pointmill-testkit"]),
     ("pointmill-testkit", &["pointmill-format"]),

@@ -14,6 +14,7 @@ const OTHER_OPTIONS: &[&str] = &[
     "--example",
     "--features",
     "--format",
+    "--ignored",
     "--jobs",
     "--lend",
     "--locked",
@@ -29,6 +30,7 @@ const OTHER_OPTIONS: &[&str] = &[
     "--release",
     "--runs",
     "--scene",
+    "--test",
     "--workspace",
 ];
 
@@ -85,7 +87,7 @@ fn files_and_folders_named_in_the_architecture_exist() {
 #[test]
 fn options_named_in_the_documents_exist() {
     let mut help = String::new();
-    for command in ["convert", "export", "validate", "info", "extract"] {
+    for command in ["convert", "export", "validate", "info", "extract", "preview"] {
         let output = Command::new(env!("CARGO_BIN_EXE_pointmill")).args([command, "--help"]).output().unwrap();
         help += &String::from_utf8(output.stdout).unwrap();
     }

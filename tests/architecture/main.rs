@@ -17,7 +17,7 @@ use layers::Layers;
 
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
-const LAYERS: [(&str, Layers<'static>); 5] = [
+const LAYERS: [(&str, Layers<'static>); 6] = [
     (
         "pointmill",
         &[
@@ -40,6 +40,21 @@ const LAYERS: [(&str, Layers<'static>); 5] = [
             &["dataset_kind"],
             &["dataset_scan"],
             &["open_octree", "open_scan"],
+        ],
+    ),
+    (
+        "pointmill-render",
+        &[
+            &["vector", "error", "style", "workers"],
+            &["camera"],
+            &["flight"],
+            &["picture", "projection"],
+            &["raster", "sources"],
+            &["colours", "shading"],
+            &["canvas", "boxes"],
+            &["draw", "overview"],
+            &["render"],
+            &["scene"],
         ],
     ),
     (

@@ -30,6 +30,7 @@ mod potree1;
 mod potree1_of_others;
 mod potree1_proofs;
 mod precision;
+mod preview;
 mod reporting;
 mod required_precision;
 

@@ -1,0 +1,193 @@
+//! What is drawn of an octree: the nodes in sight that are large in the picture, as many as the budget allows.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use pointmill_format::octree::{Octree, OctreeNode, OctreeNodes};
+use pointmill_format::{Attribute, NodeKey, ReadError};
+
+use crate::projection::Projection;
+use crate::{Order, PointSize, Style};
+
+use super::{Buffers, Points, Source, Take, Unit, UnitSize};
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// Points of a leaf are at most this many times as large as those of an inner node of its level.
+const LARGEST_IN_LEAF: f64 = 4.0;
+
+/// A node that is drawn.
+struct Drawn {
+    node: OctreeNode,
+    points: u64,
+    /// Distance between the points that are drawn there, world units.
+    spacing: f32,
+    /// The nodes drawn below it, by child index.
+    children: [u32; 8],
+}
+
+/// The chosen nodes of an octree.
+pub(crate) struct OctreeSource<'a> {
+    octree: &'a dyn Octree,
+    nodes: Vec<Drawn>,
+    size: PointSize,
+}
+
+/// A node that may be drawn, in a heap: the most urgent first.
+struct Candidate {
+    weight: f64,
+    key: NodeKey,
+    parent: u32,
+}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        // of two that weigh the same, as from inside of both, the coarser one, then the one of the lesser address
+        self.weight.total_cmp(&other.weight).then_with(|| other.key.cmp(&self.key))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
+
+impl<'a> OctreeSource<'a> {
+    /// Walks the tree as viewers do, until a node does not fit the budget any more. The root is drawn whatever the budget
+    /// is.
+    ///
+    /// # Errors
+    /// Those of reading the index.
+    pub(crate) fn new(
+        octree: &'a dyn Octree,
+        projection: &Projection,
+        style: &Style,
+        budget: u64,
+    ) -> Result<Self, ReadError> {
+        let mut source = Self { octree, nodes: Vec::new(), size: style.size };
+        let mut known = OctreeNodes::new(octree)?;
+        let mut heap = BinaryHeap::from([Candidate { weight: f64::INFINITY, key: NodeKey::ROOT, parent: NONE }]);
+        let mut total = 0u64;
+        while let Some(Candidate { key, parent, .. }) = heap.pop() {
+            let bounds = octree.info().node_box(key);
+            if !projection.may_see(&bounds) {
+                continue;
+            }
+            known.load(octree, key)?;
+            let Some(node) = known.get(key).copied() else { continue };
+            let points = octree.count(&node)?;
+            total = total.saturating_add(points);
+            if total > budget && key != NodeKey::ROOT {
+                break;
+            }
+            let index = source.add(node, points, parent);
+            for child in known.children(key) {
+                let [radius, angle] = projection.sphere(&octree.info().node_box(child.key));
+                let weight = match style.order {
+                    Order::Radius => radius,
+                    Order::RadiusAndAngle => radius / (1.0 + angle),
+                };
+                if radius >= style.min_node_pixels {
+                    heap.push(Candidate { weight, key: child.key, parent: index });
+                }
+            }
+        }
+        Ok(source)
+    }
+
+    fn add(&mut self, node: OctreeNode, points: u64, parent: u32) -> u32 {
+        let index = self.nodes.len() as u32;
+        if let Some(parent) = self.nodes.get_mut(parent as usize) {
+            parent.children[usize::from(node.key.child_index())] = index;
+        }
+        let spacing = self.spacing(&node, points);
+        self.nodes.push(Drawn { node, points, spacing, children: [NONE; 8] });
+        index
+    }
+
+    /// Between points of a node and its ancestors: of an inner node what the level says; a leaf has whatever remained, in the
+    /// best case spread over a face of its box.
+    fn spacing(&self, node: &OctreeNode, points: u64) -> f32 {
+        let info = self.octree.info();
+        let of_level = info.spacing_at(node.key.level);
+        if node.child_mask != 0 {
+            return of_level as f32;
+        }
+        let side = info.node_box(node.key).extent()[0];
+        (side / (points.max(1) as f64).sqrt()).min(LARGEST_IN_LEAF * of_level).max(of_level) as f32
+    }
+
+    /// The distance between points at a place: that of the deepest node drawn there, from a node that has it.
+    fn spacing_at(&self, unit: usize, world: [f64; 3]) -> f32 {
+        let Some(mut drawn) = self.nodes.get(unit) else { return 0.0 };
+        let mut bounds = self.octree.info().node_box(drawn.node.key);
+        loop {
+            let middle = bounds.center();
+            let is_high = [0, 1, 2].map(|a| world[a] >= middle[a]);
+            let child = is_high.iter().fold(0, |index, high| index << 1 | usize::from(*high));
+            match self.nodes.get(drawn.children[child] as usize) {
+                Some(below) => drawn = below,
+                None => return drawn.spacing,
+            }
+            for a in 0..3 {
+                if is_high[a] {
+                    bounds.min[a] = middle[a];
+                } else {
+                    bounds.max[a] = middle[a];
+                }
+            }
+        }
+    }
+}
+
+impl Source for OctreeSource<'_> {
+    fn name(&self) -> String {
+        self.octree.locate_index(&self.octree.root()).display().to_string()
+    }
+
+    fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn unit(&self, index: usize) -> Unit {
+        let Some(Drawn { node, points, spacing, children }) = self.nodes.get(index) else { return Unit::new(0) };
+        let info = self.octree.info();
+        let size = match self.size {
+            PointSize::Pixels(pixels) => UnitSize::Pixels(pixels),
+            PointSize::World(size) => UnitSize::World(size),
+            PointSize::Adaptive(factor) if children.iter().all(|child| *child == NONE) => {
+                UnitSize::World(spacing * factor)
+            }
+            PointSize::Adaptive(_) => UnitSize::Each,
+        };
+        let bounds = Some(info.node_box(node.key));
+        Unit { points: *points, level: node.key.level, bits: None, bounds, size }
+    }
+
+    fn attributes(&self, _unit: usize) -> Vec<Attribute> {
+        self.octree.info().attributes.clone()
+    }
+
+    fn read(&self, unit: usize, _: &[&str], buffers: &mut Buffers, take: &mut Take<'_>) -> Result<u64, ReadError> {
+        let Some(Drawn { node, .. }) = self.nodes.get(unit) else { return Ok(0) };
+        self.octree.points(node, &mut buffers.node)?;
+        let _ = take(Points::of_node(&buffers.node));
+        Ok(buffers.node.stored_bytes().len() as u64)
+    }
+
+    fn size_at(&self, unit: usize, points: &Points<'_>, index: usize, _view: [f64; 3]) -> f32 {
+        let PointSize::Adaptive(factor) = self.size else { return 0.0 };
+        let Some(world) = points.world(index) else { return 0.0 };
+        self.spacing_at(unit, world) * factor
+    }
+}
