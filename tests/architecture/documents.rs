@@ -14,6 +14,7 @@ const OTHER_OPTIONS: &[&str] = &[
     "--example",
     "--features",
     "--format",
+    "--ignored",
     "--jobs",
     "--lend",
     "--locked",
@@ -29,6 +30,7 @@ const OTHER_OPTIONS: &[&str] = &[
     "--release",
     "--runs",
     "--scene",
+    "--test",
     "--workspace",
 ];
 

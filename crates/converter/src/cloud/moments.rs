@@ -67,4 +67,32 @@ mod tests {
         assert_eq!(m.sum, [5 * i128::from(far), -5 * i128::from(far), 15]);
         assert_eq!(m.bounds, JobBounds::new([far, -far, 1], [far, -far, 5]));
     }
+
+    /// 4096 coordinates around `middle` on each axis, the second mirrored, and their sums.
+    fn some(middle: i64) -> (JobColumns, [i128; 3]) {
+        let x: Vec<i64> = (0..4096).map(|i| middle + i * i * 7 - 1_000_003 * i).collect();
+        let sum = 4096 * i128::from(middle) + (0..4096i128).map(|i| i * i * 7 - 1_000_003 * i).sum::<i128>();
+        let mirrored = x.iter().map(|v| -v).collect();
+        (JobColumns([x, mirrored, (0..4096).collect()]), [sum, -sum, 4095 * 2048])
+    }
+
+    #[test]
+    fn sums_of_a_thousand_million_coordinates_are_exact_wherever_they_are() {
+        for middle in [0, 5_400_000_000, -(1 << 62), (1 << 62) - 1] {
+            let (q, sum) = some(middle);
+            let mut m = Moments::default();
+            m.add_rows(&q, &(0..4096).collect::<Vec<u32>>());
+            (0..18).for_each(|_| m.merge(&m.clone())); // 2^30 points
+            assert_eq!(m.sum, sum.map(|v| v << 18), "{middle}");
+        }
+    }
+
+    #[test]
+    #[ignore = "long: each is added by itself"]
+    fn so_are_those_of_points_one_by_one() {
+        let (q, sum) = some((1 << 62) - 1);
+        let mut m = Moments::default();
+        (0..1u64 << 18).for_each(|_| (0..4096).for_each(|row| m.add(q.point(row))));
+        assert_eq!(m.sum, sum.map(|v| v << 18));
+    }
 }

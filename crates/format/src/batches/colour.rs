@@ -110,4 +110,37 @@ mod tests {
         twice.merge(&sum);
         assert_eq!((twice.points(), twice.mean()), (4, [2, 255, 0]));
     }
+
+    #[test]
+    fn means_of_a_thousand_million_colours_are_those_of_128_bits() {
+        // so many thousandths of white in red, green and blue; halves and what is next to them are among the means
+        for white in [[0, 1000, 1], [2, 998, 500], [333, 667, 999]] {
+            let mut sum = ColourSum::default();
+            for i in 0..1000 {
+                sum.add(colour_word(white.map(|n| if i < n { 255 } else { 0 }), 3));
+            }
+            (0..20).for_each(|_| sum.merge(&sum.clone()));
+            let points = 1000u128 << 20;
+            let mean = |n: u32| (2 * ((u128::from(n) * 255) << 20) + points) / (2 * points);
+            assert_eq!(sum.points(), points as u64);
+            assert_eq!(sum.mean().map(u128::from), white.map(mean), "{white:?}");
+        }
+        let mut half = ColourSum::default();
+        half.add(colour_word([127, 0, 254], 0));
+        half.add(colour_word([128, 1, 255], 0));
+        (0..29).for_each(|_| half.merge(&half.clone()));
+        assert_eq!((half.points(), half.mean()), (1 << 30, [128, 1, 255]), "halves up");
+        half.add(colour_word([127, 0, 254], 0));
+        assert_eq!(half.mean(), [127, 0, 254], "one in 2^30 tips the half");
+    }
+
+    #[test]
+    #[ignore = "long: each is added by itself"]
+    fn so_are_those_of_colours_one_by_one() {
+        let mut sum = ColourSum::default();
+        (0..1_000_000_000u32).for_each(|i| sum.add(i));
+        let exact = |at: u32| (0..1_000_000_000u128).map(|i| i >> (8 * at) & 255).sum::<u128>();
+        let mean = [0, 1, 2].map(|at| (2 * exact(at) + 1_000_000_000) / 2_000_000_000);
+        assert_eq!(sum.mean().map(u128::from), mean);
+    }
 }

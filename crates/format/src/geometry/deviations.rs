@@ -53,3 +53,37 @@ impl Deviations {
         self.max_squared_3d = self.max_squared_3d.max(other.max_squared_3d);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn largest_and_sums_of_all_axes_whatever_the_sign() {
+        let (mut a, mut b) = (Deviations::default(), Deviations::default());
+        a.add([-3.0, 0.5, 0.0]);
+        b.add([1.0, -2.0, 2.0]);
+        b.add([1.0, 0.0, 0.0]);
+        a.merge(&b);
+        assert_eq!((a.points, a.max, a.sum), (3, [3.0, 2.0, 2.0], [-1.0, -1.5, 2.0]));
+        assert_eq!((a.squares, a.max_squared_3d), ([11.0, 4.25, 4.0], 9.25));
+        b.merge(&a);
+        assert_eq!((b.points, b.max, b.max_squared_3d), (5, [3.0, 2.0, 2.0], 9.25));
+    }
+
+    #[test]
+    fn sums_of_doubles_err_by_no_more_than_their_roundings() {
+        // the doubles next to 0.1 and 1/3: the exact sum is that many times their mantissas, in 128 bits
+        const POINTS: u32 = 1 << 21;
+        let (tenth, third) = (0.1f64, 1.0 / 3.0f64);
+        let mut d = Deviations::default();
+        (0..POINTS).for_each(|_| d.add([tenth, -third, 0.0]));
+        let exact = |v: f64, unit: i32| u128::from(POINTS) * (v / 2f64.powi(unit)) as u128;
+        for (sum, v, unit) in [(d.sum[0], tenth, -56), (-d.sum[1], third, -54)] {
+            let error = exact(v, unit) as i128 - (sum / 2f64.powi(unit)) as i128;
+            // (n - 1) · 2^-53 of the sum of the sizes
+            let bound = (exact(v, unit) * u128::from(POINTS - 1)) >> 53;
+            assert!(error != 0 && error.unsigned_abs() <= bound, "{error} of {bound}");
+        }
+    }
+}

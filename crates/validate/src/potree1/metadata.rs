@@ -75,7 +75,8 @@ fn geometry(root: &Value, judge: &Judge<'_>) {
     let cubic = sides.is_some_and(|s| side > 0.0 && s.iter().all(|v| (v - side).abs() <= tolerance));
     judge.that(cubic, "boundingBox", "a cube with sides above 0", &root["boundingBox"]);
     if let Some(scale) = scale.filter(|_| cubic) {
-        judge.that(side / scale < MAX_STORED, "side of the cube in steps", "below 2^31", &json!(side / scale));
+        let least = side - 2.0 * f64::EPSILON * farthest;
+        judge.that(least / scale < MAX_STORED, "side of the cube in steps", "below 2^31", &json!(side / scale));
     }
     let tight = corners(&root["tightBoundingBox"]);
     judge.that(tight.is_some(), "tightBoundingBox", "six numbers", &root["tightBoundingBox"]);

@@ -17,10 +17,11 @@ struct Exact {
 impl Exact {
     fn new(side: f64, step: f64, scale: f64) -> Option<Self> {
         let (side, ratio) = (side / step, step / scale);
-        let is_whole = |v: f64| (v - v.round()).abs() <= 1e-6 && (1.0..=2f64.powi(31)).contains(&v.round());
-        let power = ratio.round() as u64;
-        (is_whole(side) && is_whole(ratio) && power.is_power_of_two())
-            .then(|| Self { side: side.round() as u64, bits: power.ilog2() })
+        let is_in_range = |v: f64| (1.0..=2f64.powi(31)).contains(&v);
+        let is_whole = (side - side.round()).abs() <= 1e-6 && is_in_range(side.round());
+        // halving is exact, and the 2^31st part of a side of nearly 2^31 steps is nearly a step
+        let is_power = is_in_range(ratio) && ratio.fract() == 0.0 && (ratio as u64).is_power_of_two();
+        (is_whole && is_power).then(|| Self { side: side.round() as u64, bits: (ratio as u64).ilog2() })
     }
 
     /// Steps from the cube's lower corner: the nearest to the place in cell `cell` of a level, the upper one of two.
@@ -133,5 +134,8 @@ mod tests {
     fn what_is_no_power_of_two_is_not_exact() {
         assert!(Exact::new(10.01, 0.01, 0.003).is_none() && Exact::new(10.013, 0.01, 0.01).is_none());
         assert!(Exact::new(10.01, 0.01, 0.01).is_some_and(|exact| exact.bits == 0));
+        // 2^31 - 1 steps of 0.001, divided into 2^31 parts: a whole step off at the far end
+        let (side, parts) = (2_147_483.647, 2f64.powi(31));
+        assert!(Exact::new(side, 0.001, (side / parts).next_up()).is_none());
     }
 }
