@@ -10,12 +10,13 @@ use crate::args::{Args, Command, ConvertArgs, ProfileArg, TargetArg, mistake};
 use crate::exit::{Failure, print_line};
 
 /// What a profile may set, with the number of values: a file of a measurement can do no more.
-const OPTIONS: [(&str, usize); 9] = [
+const OPTIONS: [(&str, usize); 10] = [
     ("--sampling", 1),
     ("--encoding", 1),
     ("--brotli-quality", 1),
     ("--planes", 1),
     ("--scale", 1),
+    ("--precision", 1),
     ("--attributes", 1),
     ("--compress", 1),
     ("--capacity", 1),

@@ -34,8 +34,8 @@ pub(crate) struct MeasureArgs {
     pub(crate) overwrite: bool,
 
     /// The settings to measure: axes separated by commas, each with values where the usual ones will not do, as in
-    /// output=potree2+batches,sampling,scale=0.001+0.01. Axes: output, sampling, encoding, planes, scale, attributes,
-    /// averaging, leaf-capacity [default: output,sampling,encoding,planes,averaging]
+    /// output=potree2+batches,sampling,scale=0.001+0.01. Axes: output, sampling, encoding, planes, scale, precision,
+    /// attributes, averaging, leaf-capacity [default: output,sampling,encoding,planes,averaging]
     #[arg(long, value_name = "LIST", value_parser = Axes::parse, help_heading = "Measuring")]
     pub(crate) axes: Option<Axes>,
     #[arg(long, value_name = "POINTS", value_parser = parse_points, help_heading = "Measuring",

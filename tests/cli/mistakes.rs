@@ -114,7 +114,7 @@ fn commands_and_options_that_are_none() {
             &["no command", "convert, export, measure, validate, extract, info, preview", "see 'pointmill --help'"],
         ),
         ("convrt", 2, &["'convrt'", "did you mean convert?"]),
-        ("bogus", 2, &["no command 'bogus'", "convert, export, validate"]),
+        ("bogus", 2, &["no command 'bogus'", "convert, export, measure, validate"]),
         ("--bogus", 2, &["no option --bogus", "pointmill --help"]),
         ("help~bogus", 2, &["'bogus'"]),
         ("convert", 2, &["--output OUT is missing", "see 'pointmill convert --help'"]),

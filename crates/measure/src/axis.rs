@@ -15,6 +15,8 @@ pub enum Axis {
     Planes,
     /// The coordinate step.
     Scale,
+    /// How exact positions have to be.
+    Precision,
     /// What is kept of each point.
     Attributes,
     /// Whether batches keep the colours that averages replace.
@@ -23,11 +25,12 @@ pub enum Axis {
     LeafCapacity,
 }
 
-use Axis::{Attributes, Averaging, Encoding, LeafCapacity, Output, Planes, Sampling, Scale};
+use Axis::{Attributes, Averaging, Encoding, LeafCapacity, Output, Planes, Precision, Sampling, Scale};
 
 impl Axis {
     /// All of them, in the order of the columns of a table.
-    pub const ALL: [Self; 8] = [Output, Sampling, Encoding, Planes, Scale, Attributes, Averaging, LeafCapacity];
+    pub const ALL: [Self; 9] =
+        [Output, Sampling, Encoding, Planes, Scale, Precision, Attributes, Averaging, LeafCapacity];
 
     /// Those that vary unless others are chosen.
     pub const DEFAULT: [Self; 5] = [Output, Sampling, Encoding, Planes, Averaging];
@@ -40,6 +43,7 @@ impl Axis {
             Encoding => "encoding",
             Planes => "planes",
             Scale => "scale",
+            Precision => "precision",
             Attributes => "attributes",
             Averaging => "averaging",
             LeafCapacity => "leaf-capacity",
@@ -54,6 +58,7 @@ impl Axis {
             Encoding => &["default", "compressed"],
             Planes => &["auto", "10"],
             Scale => &["auto", "0.01", "0.05"],
+            Precision => &["scan", "1mm", "1cm"],
             Attributes => &["all", "scene", "rgb"],
             Averaging => &["keep", "discard"],
             LeafCapacity => &["10000", "20000", "65000"],
@@ -65,6 +70,7 @@ impl Axis {
         match self {
             Encoding => "default",
             Averaging => "keep",
+            Precision => "scan",
             _ => "",
         }
     }
@@ -78,7 +84,7 @@ impl Axis {
     pub fn concerns(self, output: &str) -> bool {
         let is_octree = matches!(output, "potree2" | "potree1" | "copc");
         match self {
-            Output | Scale | Attributes => true,
+            Output | Scale | Precision | Attributes => true,
             Sampling => is_octree,
             LeafCapacity => is_octree || output == "bintree",
             Encoding => matches!(output, "potree2" | "batches"),
@@ -98,6 +104,8 @@ impl Axis {
             Sampling => pair("--sampling"),
             Planes => pair("--planes"),
             Scale => pair("--scale"),
+            Precision if value == "scan" => Ok(Vec::new()),
+            Precision => pair("--precision"),
             Attributes => pair("--attributes"),
             LeafCapacity if output == "bintree" => pair("--capacity"),
             LeafCapacity => pair("--leaf-capacity"),
@@ -253,6 +261,7 @@ impl Setting {
         let word = |(axis, value): &(Axis, String)| match axis {
             Planes => format!("{value} bits"),
             Scale => format!("step {value}"),
+            Precision => format!("within {value}"),
             LeafCapacity => format!("leaves of {value}"),
             Attributes => format!("attributes {value}"),
             Averaging => "originals discarded".to_owned(),

@@ -44,4 +44,3 @@ pub use image::ImageError;
 pub use measurement::{Measurement, Shown, Watch};
 pub use position::AxisError;
 pub use result::Measured;
-pub use trades::Trade;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::trades::Trade;
 use crate::{AxisError, ImageError, LevelError};
 
 /// The result of a measurement. Lengths are in units of the scene's coordinate system, times in seconds.
@@ -146,6 +145,27 @@ pub struct Profile {
     pub arguments: Vec<String>,
     /// The figures that stand behind it, as a sentence.
     pub why: String,
+}
+
+/// An option of an output, two of its values, and what changes from one to the other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Trade {
+    /// The format.
+    pub output: String,
+    /// The axis.
+    pub axis: &'static str,
+    /// The value that is compared with.
+    pub from: String,
+    /// The other value.
+    pub to: String,
+    /// Processor time, bytes, error of pictures: `to` over `from`, geometric mean over all pairs of settings that differ in this
+    /// alone.
+    pub ratios: [Option<f64>; 3],
+    /// The largest error of a coordinate with either.
+    pub position: [Option<f64>; 2],
+    /// For people.
+    pub sentence: String,
 }
 
 impl Row {

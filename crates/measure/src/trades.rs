@@ -1,28 +1,7 @@
 //! What each option buys and costs, as sentences.
 
 use crate::axis::Axis;
-use crate::result::Row;
-
-/// An option of an output, two of its values, and what changes from one to the other.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-#[non_exhaustive]
-pub struct Trade {
-    /// The format.
-    pub output: String,
-    /// The axis.
-    pub axis: &'static str,
-    /// The value that is compared with.
-    pub from: String,
-    /// The other value.
-    pub to: String,
-    /// Processor time, bytes, error of pictures: `to` over `from`, geometric mean over all pairs of settings that differ in this
-    /// alone.
-    pub ratios: [Option<f64>; 3],
-    /// The largest error of a coordinate with either.
-    pub position: [Option<f64>; 2],
-    /// For people.
-    pub sentence: String,
-}
+use crate::result::{Row, Trade};
 
 /// The trades of rows: each value against the first of its axis.
 pub(crate) fn trades(rows: &[Row]) -> Vec<Trade> {
