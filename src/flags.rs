@@ -15,6 +15,7 @@ fn option(setting: Setting) -> &'static str {
         Setting::LodCell => "--lod-cell",
         Setting::Planes => "--planes",
         Setting::Scale => "--scale",
+        Setting::Precision => "--precision",
         Setting::Bounds => "--bounds",
         Setting::TempDir => "--temp-dir",
         Setting::Attributes => "--attributes",
@@ -60,6 +61,12 @@ fn advice(advice: &Advice) -> String {
             "--max-node-points limits all but those whose points share one place (--duplicates drop)".to_owned()
         }
         Advice::CoarserStep { least } => format!("choose a step of at least {least} with --scale"),
+        Advice::CoarserPrecision { is_by_format: false } => {
+            "pass a larger --precision, or convert parts of the scene with --bounds".to_owned()
+        }
+        Advice::CoarserPrecision { is_by_format: true } => {
+            "pass a larger --precision, or choose --to potree2 or copc, which keep integers".to_owned()
+        }
         Advice::PackLeaves => "--layout packed puts them into one".to_owned(),
         other => other.to_string(),
     }
@@ -126,6 +133,11 @@ fn plan_line(error: &PlanError) -> String {
     let option = option(error.setting);
     match &error.fault {
         PlanFault::Cell(what) if error.setting == Setting::LodCell => format!("{option}: {what}, or auto"),
+        PlanFault::UnknownUnit => format!(
+            "{option}: the unit of the coordinates is unknown; name their system with --crs, or pass a number in units of \
+             the coordinates"
+        ),
+        PlanFault::NotPositive if error.setting == Setting::Precision => format!("{option}: must be a length above 0"),
         PlanFault::NotPositive => format!("{option}: must be a number above 0, or auto"),
         PlanFault::NotOneOf(_) if error.setting == Setting::Planes => format!("{option}: must be 10, 20, 30 or auto"),
         fault => format!("{option}: {fault}"),

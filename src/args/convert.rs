@@ -4,13 +4,13 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use pointmill_converter::{BatchesSettings, BintreeSettings, Potree2Settings};
+use pointmill_converter::{BatchesSettings, BintreeSettings, PositionPrecision, Potree2Settings};
 use pointmill_format::Aabb;
 
 use super::common::{InputArgs, TalkArgs};
 use super::values::{
     Attributes, Planes, Scale, ZSTD_LEVEL, or_auto, parse_attributes, parse_bounds, parse_bytes, parse_class,
-    parse_compress, parse_planes, parse_scale, parse_threads, whole,
+    parse_compress, parse_planes, parse_precision, parse_scale, parse_threads, whole,
 };
 
 /// The Brotli quality for node payloads; above 9 the time grows a hundred times for up to eight per cent.
@@ -75,8 +75,15 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "STEP", default_value = "auto", value_parser = parse_scale,
           allow_negative_numbers = true, help_heading = "Output")]
     pub(crate) scale: Scale,
+    /// How exact positions must be: no coordinate of a written point differs from its scan by more than LENGTH (mm, cm, m,
+    /// km, um, ft, us-ft; a number alone is in units of the CRS). The coarsest step and the fewest planes that keep it are
+    /// chosen; not with --scale
+    #[arg(long, value_name = "LENGTH", value_parser = parse_precision, allow_negative_numbers = true,
+          help_heading = "Output")]
+    pub(crate) precision: Option<PositionPrecision>,
 
-    /// Attributes to write: all, scene (those that are not constant), or a list such as intensity,rgb
+    /// Attributes to write: all, scene (those that are not constant and do not follow from others; export gives the rest
+    /// back), or a list such as intensity,rgb
     /// [default: all for potree2 and copc, colour for potree1 and batches, classification for bintree]
     #[arg(long, value_name = "all|scene|LIST", value_parser = parse_attributes, help_heading = "Selecting data")]
     pub(crate) attributes: Option<Attributes>,

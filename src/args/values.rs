@@ -3,6 +3,7 @@
 use std::num::NonZero;
 use std::ops::RangeInclusive;
 
+use pointmill_converter::{LengthUnit, PositionPrecision};
 use pointmill_format::{Aabb, Lattice};
 
 /// More than the cores of any machine with one memory; a thread needs tens of MiB.
@@ -90,6 +91,30 @@ pub(super) fn parse_scale(text: &str) -> Result<Scale, String> {
         )),
         _ => Err("expected a number above 0, for example 0.001, or auto".to_owned()),
     }
+}
+
+/// `--precision`: a length such as `1mm`, or a number in units of the coordinates.
+pub(super) fn parse_precision(text: &str) -> Result<PositionPrecision, String> {
+    let advice =
+        || "expected a length above 0 such as 1mm, 0.5cm or 0.02ft, or a number in units of the CRS".to_owned();
+    let text = text.trim();
+    let is_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
+    // an exponent is a part of the number, the m of mm is not
+    let digits = text.find(|c: char| !is_number(c)).unwrap_or(text.len());
+    let exponent = text[digits..].strip_prefix(['e', 'E']).filter(|rest| rest.starts_with(is_number));
+    let end = exponent
+        .map_or(digits, |rest| text.len() - rest.len() + rest.find(|c: char| !is_number(c)).unwrap_or(rest.len()));
+    let length = text[..end].parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0).ok_or_else(advice)?;
+    let unit = match text[end..].trim_start().to_ascii_lowercase().as_str() {
+        "" => LengthUnit::Coordinates,
+        "µm" | "μm" => LengthUnit::Micrometre,
+        name => LengthUnit::NAMED.into_iter().find(|unit| unit.name() == name).ok_or_else(advice)?,
+    };
+    let metres = length * unit.metres().unwrap_or(1.0);
+    if (Lattice::FINEST_STEP..=Lattice::COARSEST_STEP).contains(&metres) {
+        return Ok(PositionPrecision { length, unit });
+    }
+    Err(format!("no coordinates are that exact; expected {:e} to {:e}", Lattice::FINEST_STEP, Lattice::COARSEST_STEP))
 }
 
 /// A distance.
@@ -196,6 +221,21 @@ mod tests {
         assert_eq!((step("auto"), step("0.001"), step("1e-15")), (Ok(None), Ok(Some(0.001)), Ok(Some(1e-15))));
         for text in ["0", "-1", "nan", "inf", "5e-310", "1e-300", "1e300", "x", ""] {
             assert!(step(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn precisions_are_lengths_or_plain_numbers() {
+        let parsed = |text| parse_precision(text).map(|p| (p.length, p.unit));
+        assert_eq!(parsed("1mm"), Ok((1.0, LengthUnit::Millimetre)));
+        assert_eq!(parsed("0.5 cm"), Ok((0.5, LengthUnit::Centimetre)));
+        assert_eq!(parsed("2e2µm"), Ok((200.0, LengthUnit::Micrometre)));
+        assert_eq!(parsed("5E-2M"), Ok((0.05, LengthUnit::Metre)));
+        assert_eq!(parsed("0.001km"), Ok((0.001, LengthUnit::Kilometre)));
+        assert_eq!(parsed(".02us-ft"), Ok((0.02, LengthUnit::UsSurveyFoot)));
+        assert_eq!(parsed("1e-7"), Ok((1e-7, LengthUnit::Coordinates)));
+        for text in ["", "mm", "0mm", "-1mm", "1inch", "1 m m", "nan", "inf", "1e", "1e-400", "1e300km", "auto", "é"] {
+            assert!(parse_precision(text).is_err(), "{text}");
         }
     }
 

@@ -78,6 +78,9 @@ fn targets(args: &ConvertArgs) -> Result<Vec<Target>, Failure> {
     if args.seed.is_some() && args.sampling != Some(SamplingArg::Random) {
         return Err(Failure::Usage("--seed requires --sampling random".to_owned()));
     }
+    if args.scale.0.is_some() && args.precision.is_some() {
+        return Err(Failure::Usage("--precision chooses the step; leave out --scale".to_owned()));
+    }
     if args.brotli_quality.is_some() && args.encoding != Some(EncodingArg::Brotli) {
         return Err(Failure::Usage("--brotli-quality requires --encoding brotli".to_owned()));
     }
@@ -208,7 +211,11 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         Some(Attributes::Scene) => AttributeChoice::Scene,
         Some(Attributes::List(names)) => AttributeChoice::List(names.clone()),
     };
-    plan.scale = args.scale.0.map_or(ScaleChoice::Auto, ScaleChoice::Fixed);
+    plan.scale = match (args.scale.0, args.precision) {
+        (Some(step), _) => ScaleChoice::Fixed(step),
+        (None, Some(precision)) => ScaleChoice::Within(precision),
+        (None, None) => ScaleChoice::Auto,
+    };
     let origin_points = match args.origin_points {
         OriginPointsArg::Keep => OriginPoints::Keep,
         OriginPointsArg::Skip => OriginPoints::Skip,

@@ -1,8 +1,8 @@
 //! The accuracy of an output in one line.
 
-use pointmill_converter::{Accuracy, OutputReport, Report};
+use pointmill_converter::{Accuracy, OutputReport, Report, SavedBytes};
 
-use super::quantities::{at_most, count, number, plural, three_digits};
+use super::quantities::{at_most, bytes, count, number, plural, three_digits};
 
 /// What a reader of the output decodes, against the sources.
 pub(crate) fn line(output: &OutputReport, report: &Report) -> String {
@@ -13,6 +13,26 @@ pub(crate) fn line(output: &OutputReport, report: &Report) -> String {
     parts.extend(merged(accuracy));
     parts.push(format!("step {}", steps(&report.grid.scale)));
     format!("{}: {}", output.format, parts.join("; "))
+}
+
+/// What became of a requested precision: the error that is left, by axis, and what that saves.
+pub(crate) fn precision_line(output: &OutputReport, report: &Report) -> Option<String> {
+    let precision = output.precision.as_ref()?;
+    let by_axis = |v: [f64; 3]| v.map(at_most).join(" ");
+    let requested = report.options.get("precision").and_then(|text| text.as_str()).unwrap_or_default();
+    let bits: f64 = precision.bits_dropped.iter().sum();
+    let saved = match precision.saved {
+        SavedBytes::Planes { bytes: n, .. } => format!("{}, {} before any compression", precision.saved, bytes(n)),
+        other => other.to_string(),
+    };
+    Some(format!(
+        "{}: precision {requested} is kept: errors by axis at most {}, root mean square {}, allowed {}; {bits:.1} bits of \
+         position less per point; saved: {saved}",
+        output.format,
+        by_axis(precision.max),
+        by_axis(precision.rms),
+        by_axis(precision.allowed),
+    ))
 }
 
 /// How far decoded positions are from those of the sources. Only what is the same is called unchanged.

@@ -27,6 +27,7 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
     lines.extend(points_lines(report));
     lines.extend(colours_line(report));
     lines.extend(report.outputs.iter().map(|output| accuracy::line(output, report)));
+    lines.extend(report.outputs.iter().filter_map(|output| accuracy::precision_line(output, report)));
     for output in &report.outputs {
         lines.extend(dropped_line(output, report.outputs.len() > 1));
     }
@@ -132,6 +133,12 @@ pub(crate) fn estimate(estimate: &Estimate, plan: &Plan) -> String {
     t.row("step", format!("{}, {}", numbers(&estimate.grid.scale), estimate.grid.why));
     t.row("cube side", number(estimate.grid.cube_side));
     t.row("attributes", estimate.attributes.join(", "));
+    for choice in &estimate.choices {
+        let value = choice.value.as_deref().unwrap_or("known once the points are read");
+        let name = if choice.output.is_empty() { &choice.setting } else { &choice.output };
+        let setting = if choice.output.is_empty() { String::new() } else { format!("{}: ", choice.setting) };
+        t.row(name, format!("{setting}{value}, {}", choice.why));
+    }
     t.row("bytes/point", estimate.bytes_per_point.to_string());
     let memory = format!(
         "{}, limit {}, at least {} needed",

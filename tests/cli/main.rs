@@ -32,10 +32,12 @@ mod potree1_proofs;
 mod precision;
 mod preview;
 mod reporting;
+mod required_precision;
 
 mod same_points;
 mod sameness;
 mod scans_within;
+mod scene_attributes;
 mod several;
 mod stops;
 mod support;

@@ -72,6 +72,11 @@ pub enum Advice {
         /// The shortest, world units.
         least: f64,
     },
+    /// Request a coarser precision; `is_by_format`: or make a dataset of another format.
+    CoarserPrecision {
+        /// True if formats differ in what they keep.
+        is_by_format: bool,
+    },
     /// Leave out the input whose offset or scale is wrong, or convert the inputs separately.
     ConvertApart,
     /// Move the file away, or choose another output.
@@ -93,6 +98,12 @@ impl fmt::Display for Advice {
             Self::CutOutliers { bounds: b } => {
                 let (min, max) = (b.min, b.max);
                 return write!(f, "keep only the points from {min:?} to {max:?}, drop outliers, or keep them");
+            }
+            Self::CoarserPrecision { is_by_format: false } => {
+                "request a coarser precision, or convert parts of the scene separately"
+            }
+            Self::CoarserPrecision { is_by_format: true } => {
+                "request a coarser precision, or choose a format that keeps integers"
             }
             Self::ReplaceOutput => "choose another output, or allow it to be replaced",
             Self::FreeDisk => "free some space there, or choose an output on another disk",

@@ -67,7 +67,7 @@ fn write(
     clock: &mut Clock<'_>,
 ) -> Result<Report, ConvertError> {
     let peak_before = peak_resident_bytes();
-    let mut sources = Sources::open(plan, events)?;
+    let mut sources = Sources::open(plan, events)?.within_precision(plan, outputs::keep_lattice(targets))?;
     let mut warnings = std::mem::take(&mut sources.warnings);
     warnings.extend(staged.warnings.iter().cloned());
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
@@ -83,6 +83,7 @@ fn write(
     let reading = rt.budget.reading(&rt.memory)?;
     let cloud = gather(plan, &sources, &intake, demand, warnings, &rt, clock)?;
     drop(reading);
+    report::check_lattice(&cloud)?;
 
     let mut outputs = Vec::new();
     for group in groups {
@@ -134,6 +135,8 @@ fn build(
         report.folder = dataset.name().into();
         let others = targets.iter().filter(|target| target.kind() != targets[i].kind());
         report.built_with = others.map(|target| target.kind().name().to_owned()).collect();
+        let (kind, saved) = (targets[i].kind(), report.saved.unwrap_or_else(|| targets[i].output().saved_bytes()));
+        report.precision = report::precision(cloud, kind, &report.accuracy, saved)?;
         report.seconds = start.elapsed().as_secs_f64();
     }
     Ok(reports)

@@ -90,6 +90,28 @@ pub enum Unsupported {
         /// The shortest step that the cube allows, world units.
         least: f64,
     },
+    /// The extent of the cloud needs a step that is coarser than the requested precision.
+    CoarseLattice {
+        /// The axis: 0, 1 or 2.
+        axis: usize,
+        /// Its step, world units.
+        step: f64,
+        /// Largest error, world units.
+        error: f64,
+        /// Largest error that was allowed, world units.
+        allowed: f64,
+    },
+    /// A format does not keep the requested precision.
+    Imprecise {
+        /// The format.
+        kind: DatasetKind,
+        /// The axis: 0, 1 or 2.
+        axis: usize,
+        /// Largest error, or a bound of it, world units.
+        error: f64,
+        /// Largest error that was allowed, world units.
+        allowed: f64,
+    },
     /// A file of this format cannot hold these points.
     Export {
         /// The format.
@@ -329,6 +351,8 @@ impl Unsupported {
             Self::CrowdedNode { .. } => Some(Advice::DropDuplicates),
             Self::TooFarApart => Some(Advice::ConvertApart),
             Self::FineAxis { least, .. } => Some(Advice::CoarserStep { least: *least }),
+            Self::CoarseLattice { .. } => Some(Advice::CoarserPrecision { is_by_format: false }),
+            Self::Imprecise { .. } => Some(Advice::CoarserPrecision { is_by_format: true }),
             Self::Export { .. } => Some(Advice::NameAttributes),
             Self::Format { .. } => None,
         }
@@ -352,6 +376,21 @@ impl fmt::Display for Unsupported {
                 write!(
                     f,
                     "{kind}: positions have one step for all axes, at least {least} here; that of {axis} is {step}"
+                )
+            }
+            Self::CoarseLattice { axis, step, error, allowed } => {
+                let axis = ['x', 'y', 'z'][*axis];
+                write!(
+                    f,
+                    "the step of {axis} is {step}, the finest for this extent and these coordinates; that is off by up to \
+                     {error:.3e}, and the requested precision allows {allowed:.3e}"
+                )
+            }
+            Self::Imprecise { kind, axis, error, allowed } => {
+                let axis = ['x', 'y', 'z'][*axis];
+                write!(
+                    f,
+                    "{kind}: {axis} would be off by up to {error:.3e}; the requested precision allows {allowed:.3e}"
                 )
             }
             Self::Export { format, what } => write!(f, "{format}: {what}"),

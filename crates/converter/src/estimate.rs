@@ -5,8 +5,8 @@ use crate::convert::least;
 use crate::error::ConvertError;
 use crate::gather::{from_headers, is_coarse, is_lossless, quantized};
 use crate::outputs::{self, DiskSize, Target, choose_attributes};
-use crate::plan::Plan;
-use crate::report::{Estimate, grid_report, input_reports};
+use crate::plan::{AttributeChoice, Plan};
+use crate::report::{ChoiceReason, Estimate, PlannedChoice, grid_report, input_reports};
 use crate::runtime::{Budget, Silent};
 use crate::sources::{Sources, resolve_crs_of_all};
 
@@ -19,7 +19,7 @@ const JSON_BYTES: u64 = 16 << 10;
 /// Inputs that cannot be opened, settings that cannot be used, or a memory ceiling that is too small.
 pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertError> {
     outputs::check(plan, targets)?;
-    let mut sources = Sources::open(plan, &Silent)?;
+    let mut sources = Sources::open(plan, &Silent)?.within_precision(plan, outputs::keep_lattice(targets))?;
     let mut warnings = std::mem::take(&mut sources.warnings);
     let wants = outputs::wants(plan, targets, &sources.attributes)?;
     let intake = Intake::new(plan, &sources, &wants.attributes, is_coarse(plan, &sources)?);
@@ -29,7 +29,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
     let lattice = from_headers(plan, &sources)?;
     // Which attributes are constant is not known before the points are read.
     let ranges: Vec<Range> = schema.attributes.iter().map(|a| Range::new(a.elements)).collect();
-    let kept = choose_attributes(&plan.attributes, schema, &intake.unread, &ranges).kept;
+    let kept = choose_attributes(&plan.attributes, schema, &intake.unread, &ranges, &[]).kept;
     warnings.extend(targets.iter().flat_map(|t| t.output().foresee(schema, &kept, &crs)));
     let kept_bytes = kept.iter().map(|i| schema.attributes[*i].size()).sum::<usize>() as u64;
     let sizes: Vec<DiskSize> = targets.iter().map(|t| t.output().disk_size(plan, schema, kept_bytes)).collect();
@@ -49,6 +49,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
         crs: if crs.projection.is_empty() { crs.label } else { crs.projection },
         grid: cube.map(|c| grid_report(&lattice, lossless, &c)).unwrap_or_default(),
         attributes: std::iter::once("position".to_owned()).chain(names).collect(),
+        choices: choices(plan, targets),
         bytes_per_point,
         least_memory_bytes: budget.least_ceiling,
         memory_bytes: budget.estimate_peak(points, schema.stride),
@@ -56,4 +57,13 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
         output_bytes: points * bytes_per_point + of_nodes + JSON_BYTES,
         warnings,
     })
+}
+
+/// What is chosen beside the lattice. Which attributes the scene requires only the points tell.
+fn choices(plan: &Plan, targets: &[Target]) -> Vec<PlannedChoice> {
+    let mut choices = outputs::choices(plan, targets);
+    if plan.attributes == AttributeChoice::Scene {
+        choices.insert(0, PlannedChoice::or_chosen("attributes", None::<&str>, ChoiceReason::Values));
+    }
+    choices
 }

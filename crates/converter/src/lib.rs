@@ -62,14 +62,14 @@ pub use outputs::potree1::{Potree1Settings, Potree1Version};
 pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
 pub use outputs::{StagedFiles, Target, resolve_path};
 pub use plan::{
-    AttributeChoice, Duplicates, ExportFormat, Filter, OnFault, OriginPoints, Outliers, Plan, PlanError, PlanFault,
-    RgbDepth, ScaleChoice, Setting,
+    AttributeChoice, Duplicates, ExportFormat, Filter, LengthUnit, OnFault, OriginPoints, Outliers, Plan, PlanError,
+    PlanFault, PositionPrecision, RgbDepth, ScaleChoice, Setting,
 };
 pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
-    Accuracy, AttributeReport, ChangedAttribute, ChangedValues, DropReason, DroppedAttribute, Estimate, GridReport,
-    How, InputReport, Integers, Merged, Metres, MissingValues, OtherFilesReport, OutputReport, PhaseReport,
-    PointsReport, PositionErrors, Report, SharedPlaceReport, TreeReport,
+    Accuracy, AttributeReport, ChangedAttribute, ChangedValues, ChoiceReason, DropReason, DroppedAttribute, Estimate,
+    GridReport, How, InputReport, Integers, Merged, Metres, MissingValues, OtherFilesReport, OutputReport, PhaseReport,
+    PlannedChoice, PointsReport, PositionErrors, PrecisionReport, Report, SavedBytes, SharedPlaceReport, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
 pub use sources::{ResolvedCrs, resolve_crs};

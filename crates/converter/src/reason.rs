@@ -20,6 +20,8 @@ pub struct AxisReason {
     pub basis: LatticeBasis,
     /// It had to be coarser than that.
     pub coarser: Option<Coarser>,
+    /// It is this many times coarser again, because the requested precision needs no finer step.
+    pub enough: Option<f64>,
 }
 
 /// How much coarser a step had to be, and why.
@@ -79,9 +81,14 @@ pub enum LatticeBasis {
 }
 
 impl LatticeReason {
+    /// True if the step of an axis is coarser than that of the sources, and nobody requested it.
+    pub(crate) fn is_forced_coarser(&self) -> bool {
+        self.axes.iter().any(|axis| axis.coarser.is_some() && axis.enough.is_none())
+    }
+
     /// The same reason for all axes.
     pub(crate) fn of_all(basis: LatticeBasis) -> Self {
-        Self { axes: [AxisReason { basis, coarser: None }; 3] }
+        Self { axes: [AxisReason { basis, coarser: None, enough: None }; 3] }
     }
 }
 
@@ -111,20 +118,31 @@ impl fmt::Display for LatticeBasis {
     }
 }
 
+/// A factor: a step that was absurdly fine would give hundreds of digits.
+struct Factor(f64);
+
+impl fmt::Display for Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(factor) = self;
+        if *factor < 1e9 { write!(f, "{factor}") } else { write!(f, "{factor:e}") }
+    }
+}
+
 impl fmt::Display for AxisReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.basis.fmt(f)?;
-        let Some(Coarser { factor, cause }) = self.coarser else { return Ok(()) };
-        // a step that was absurdly fine would give hundreds of digits
-        if factor < 1e9 {
-            write!(f, "; made {factor}")?;
-        } else {
-            write!(f, "; made {factor:e}")?;
+        if let Some(Coarser { factor, cause }) = self.coarser {
+            write!(f, "; made {} times coarser, because ", Factor(factor))?;
+            f.write_str(match cause {
+                CoarserCause::Extent => "31 bits do not hold the extent",
+                CoarserCause::Doubles => "doubles as large as the coordinates are further apart",
+            })?;
         }
-        f.write_str(" times coarser, because ")?;
-        match cause {
-            CoarserCause::Extent => f.write_str("31 bits do not hold the extent"),
-            CoarserCause::Doubles => f.write_str("doubles as large as the coordinates are further apart"),
+        match self.enough {
+            Some(factor) => {
+                write!(f, "; made {} times coarser, because the requested precision needs no finer", Factor(factor))
+            }
+            None => Ok(()),
         }
     }
 }

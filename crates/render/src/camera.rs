@@ -11,6 +11,9 @@ const FIELD_OF_VIEW: f64 = 60.0;
 /// The corners of a box are that many times as deep as where they would touch the border of the picture.
 const MARGIN: f64 = 1.04;
 
+/// Steps towards the camera that has points in the middle of its picture; each leaves a small part of what was missing.
+const STEPS: usize = 4;
+
 /// Directions whose angle has a smaller sine than this are parallel.
 const PARALLEL: f64 = 1e-9;
 
@@ -174,23 +177,44 @@ impl Camera {
     #[must_use]
     pub fn fit_along(bounds: &Aabb, direction: [f64; 3], size: Size) -> Self {
         let corner = |i: usize| std::array::from_fn(|a| if i >> a & 1 == 0 { bounds.min[a] } else { bounds.max[a] });
-        Self::fit_points((0..8).map(corner), bounds, direction, size)
+        Self::around(&(0..8).map(corner).collect::<Vec<_>>(), bounds.center(), bounds, direction, size)
     }
 
-    /// As [`Self::fit_along`], but what just fits is these points of `bounds`.
-    pub(crate) fn fit_points(
-        points: impl Iterator<Item = [f64; 3]>,
-        bounds: &Aabb,
-        direction: [f64; 3],
-        size: Size,
-    ) -> Self {
-        let middle = bounds.center();
+    /// As [`Self::fit_along`], but what just fits is these points of `bounds`, and they are in the middle of the picture.
+    pub(crate) fn fit_points(points: &[[f64; 3]], bounds: &Aabb, direction: [f64; 3], size: Size) -> Self {
+        let mut camera = Self::around(points, bounds.center(), bounds, direction, size);
+        for _ in 0..STEPS {
+            let Ok([right, up, forward]) = camera.axes() else { break };
+            // where they are in the picture, as tangents, and how far the middle of that is from its own
+            let (mut low, mut high, mut depths) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0.0);
+            for point in points {
+                let at = minus(*point, camera.eye);
+                let depth = dot(at, forward);
+                depths += depth;
+                for (axis, along) in [right, up].into_iter().enumerate() {
+                    let tangent = dot(at, along) / depth;
+                    (low[axis], high[axis]) = (low[axis].min(tangent), high[axis].max(tangent));
+                }
+            }
+            let depth = depths / points.len() as f64;
+            let [aside, above] = [0, 1].map(|axis| (low[axis] + high[axis]) / 2.0 * depth);
+            let target = plus(plus(camera.target, right, aside), up, above);
+            if target.iter().any(|c| !c.is_finite()) {
+                break;
+            }
+            camera = Self::around(points, target, bounds, direction, size);
+        }
+        camera
+    }
+
+    /// The camera that looks at `middle` along `direction`, and has all points in its picture.
+    fn around(points: &[[f64; 3]], middle: [f64; 3], bounds: &Aabb, direction: [f64; 3], size: Size) -> Self {
         let target = if middle.iter().all(|c| c.is_finite()) { middle } else { [0.0; 3] };
         let forward = unit(direction).unwrap_or([0.0, 1.0, 0.0]);
         let [right, up] = across(forward, [0.0, 0.0, 1.0]);
         let slope = (FIELD_OF_VIEW / 2.0).to_radians().tan();
-        let needed = points.map(|point| {
-            let at = minus(point, target);
+        let needed = points.iter().map(|point| {
+            let at = minus(*point, target);
             let side = (dot(at, right).abs() / (slope * size.aspect())).max(dot(at, up).abs() / slope);
             side * MARGIN - dot(at, forward)
         });
@@ -275,6 +299,21 @@ mod tests {
                 reach = [reach[0].max((x - 100.0).abs() / 100.0), reach[1].max((y - 50.0).abs() / 50.0)];
             }
             assert!((reach[0].max(reach[1]) - 1.0 / MARGIN).abs() < 1e-9, "{view}: {reach:?}");
+        }
+    }
+
+    #[test]
+    fn points_at_one_end_of_their_box_are_in_the_middle_of_the_picture() {
+        let points = [[8.0, 1.0, 4.0], [10.0, 1.0, 4.0], [9.0, 3.0, 5.0]];
+        let camera = Camera::fit_points(&points, &bounds(), [-0.3, 1.0, -0.5], SIZE);
+        let projection = Projection::new(&camera, SIZE).unwrap();
+        let at = points.map(|point| projection.pixel(point).unwrap());
+        for (axis, side) in [200.0, 100.0].into_iter().enumerate() {
+            let low = at.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
+            let high = at.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
+            assert!(low > 0.0 && high < side, "{at:?}");
+            // steps towards it, not the solution
+            assert!(((low + high) / 2.0 - side / 2.0).abs() < side / 50.0, "{at:?}");
         }
     }
 

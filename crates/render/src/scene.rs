@@ -98,6 +98,11 @@ impl Scene {
         &self.format
     }
 
+    /// True for scans, which are drawn piece by piece, and whole.
+    pub fn is_scans(&self) -> bool {
+        matches!(self.kind, Kind::Scans { .. })
+    }
+
     /// Disagreements within scans that did not stop the readers, one line each.
     pub fn warnings(&self) -> Vec<String> {
         let Kind::Scans { files, .. } = &self.kind else { return Vec::new() };

@@ -142,7 +142,7 @@ impl Default for Style {
         Self {
             colour: Colour::Auto,
             shape: Shape::Paraboloid,
-            size: PointSize::Adaptive(1.0),
+            size: PointSize::Adaptive(1.3),
             is_averaged: false,
             depth_tolerance: 0.01,
             is_filled: true,

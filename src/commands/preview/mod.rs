@@ -125,7 +125,7 @@ fn tell(file: &Path, scene: &Scene, picture: &Picture, times: &Times) {
     } else if picture.covered() == 0 {
         print_line(&format!("{shown}: no point is in the picture; it is empty"));
     }
-    let nodes = plural(drawn.nodes, "node");
+    let nodes = plural(drawn.nodes, if scene.is_scans() { "piece" } else { "node" });
     let (points, read) = (plural(drawn.points, "point"), bytes(drawn.bytes));
     let (format, colour) = (scene.format(), drawn.colour.name());
     let time = seconds(times.opened + times.rendered + times.written);

@@ -3,6 +3,7 @@
 
 use super::intake::Intake;
 use super::range::Range;
+use super::relations::Relation;
 use super::shortfall::{self, Shortfall};
 use super::stats::{SourceStats, Stats};
 use super::widening::Widening;
@@ -19,6 +20,8 @@ pub(crate) struct Facts {
     pub(crate) class: Option<usize>,
     /// Ranges as outputs have them, by index of the schema.
     pub(crate) ranges: Vec<Range>,
+    /// What attributes follow from that the scene does not require, by index of the schema.
+    pub(crate) relations: Vec<Option<Relation>>,
     /// What is missing or changed of each attribute, by index of the schema.
     pub(crate) shortfalls: Vec<Shortfall>,
     pub(crate) crs: ResolvedCrs,
@@ -61,8 +64,15 @@ impl Facts {
             warnings.extend(mixed_depths(sources, intake, stats, &depths, rgb));
         }
         let crs = resolve_crs_of_all(plan, &sources.all, warnings)?;
+        let relations = match &stats.relations {
+            Some(relations) => {
+                let is_constant: Vec<bool> = ranges.iter().map(|range| range.constant().is_some()).collect();
+                relations.choose(schema, &is_constant)
+            }
+            None => vec![None; schema.attributes.len()],
+        };
         let class = schema.find("classification").filter(|&i| schema.attributes[i].size() == 1);
-        Ok(Self { widening, class: class.map(|i| schema.offsets[i]), ranges, shortfalls, crs })
+        Ok(Self { widening, class: class.map(|i| schema.offsets[i]), ranges, relations, shortfalls, crs })
     }
 }
 

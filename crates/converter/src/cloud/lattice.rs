@@ -2,7 +2,7 @@
 
 use pointmill_format::Lattice;
 
-use crate::reason::{LatticeBasis, LatticeReason};
+use crate::reason::{AxisReason, LatticeBasis, LatticeReason};
 
 /// The lattice of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,7 @@ impl JobLattice {
     /// True if the extent of the cloud decided the step of an axis.
     pub(crate) fn is_held_back(&self) -> bool {
         let by_extent = |basis| matches!(basis, LatticeBasis::Decimal | LatticeBasis::PowerOfTwo);
-        self.reason.axes.iter().any(|axis| axis.coarser.is_some() || by_extent(axis.basis))
+        let is_held_back = |axis: &AxisReason| axis.coarser.is_some() || by_extent(axis.basis);
+        self.reason.axes.iter().any(|axis| axis.enough.is_none() && is_held_back(axis))
     }
 }

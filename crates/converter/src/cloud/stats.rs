@@ -6,6 +6,7 @@ use super::checksum::Checksum;
 use super::colour_range::ColourRange;
 use super::frames::JobBounds;
 use super::range::Range;
+use super::relations::Relations;
 use crate::sources::Schema;
 use crate::warning::Warning;
 
@@ -22,6 +23,8 @@ pub(crate) struct Stats {
     pub(crate) odd_classes: Changes,
     /// 64-bit integers that doubles do not hold: by attribute of the schema, empty where there are none.
     pub(crate) doubled: Vec<Changes>,
+    /// Attributes that follow from others; `None`: nobody asked.
+    pub(crate) relations: Option<Relations>,
     /// By source; empty while a pass goes on, since there may be very many ([`SourceStats`] are kept apart).
     pub(crate) sources: Vec<SourceStats>,
     /// Of the records as they are stored.
@@ -181,6 +184,7 @@ impl Stats {
             classes: vec![0; 256],
             odd_classes: Changes::default(),
             doubled: Vec::new(),
+            relations: None,
             sources: Vec::new(),
             checksum: Checksum::default(),
             change: Change::default(),
@@ -211,6 +215,11 @@ impl Stats {
         self.classes.iter_mut().zip(&other.classes).for_each(|(a, b)| *a += b);
         self.odd_classes.merge(&other.odd_classes);
         other.doubled.iter().enumerate().for_each(|(attribute, changes)| self.count_doubled(attribute, changes));
+        match (&mut self.relations, &other.relations) {
+            (Some(ours), Some(theirs)) => ours.merge(theirs),
+            (ours @ None, theirs) => ours.clone_from(theirs),
+            (Some(_), None) => {}
+        }
         self.checksum.merge(&other.checksum);
         self.change.merge(&other.change);
         self.points += other.points;

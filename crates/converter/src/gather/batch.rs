@@ -52,7 +52,7 @@ impl<'a> Worker<'a> {
     pub(super) fn new(pass: &'a Context<'a>) -> Self {
         Self {
             pass,
-            stats: Stats::new(&pass.intake.schema),
+            stats: Stats { relations: pass.relations(), ..Stats::new(&pass.intake.schema) },
             collected: Collected::default(),
             room: Reservation::new(pass.memory, Consumer::Cells),
             q: JobColumns::default(),
@@ -146,6 +146,9 @@ impl<'a> Worker<'a> {
         self.records.resize(written + points * assembly.schema.stride, 0);
         let records = &mut self.records[written..];
         self.assembler.put(&assembly, &self.grouping.places, records, &mut self.stats.checksum);
+        if let Some(relations) = &mut self.stats.relations {
+            relations.add(records, assembly.schema.stride);
+        }
         if is_loose {
             let cells = self.grouping.groups.iter().map(|(cell, count)| (morton_of(*cell), *count));
             self.collected.leave(Segment { block, start, count: points as u32 }, cells);

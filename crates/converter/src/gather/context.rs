@@ -9,7 +9,8 @@ use super::census::Counts;
 use super::lattice::ulp;
 use super::partition::Partition;
 use super::visit::Reading;
-use crate::cloud::{CellHash, JobBounds, Moments, Segment, Segments, Store};
+use crate::cloud::{CellHash, JobBounds, Moments, Relations, Segment, Segments, Store};
+use crate::plan::AttributeChoice;
 use crate::runtime::Pool;
 
 /// Bytes of a list of segments beside the segments themselves.
@@ -47,6 +48,11 @@ impl<'a> Deref for Context<'a> {
 }
 
 impl Context<'_> {
+    /// Attributes that follow from others, if they are to be left out: nothing of them is known yet.
+    pub(super) fn relations(&self) -> Option<Relations> {
+        (self.plan.attributes == AttributeChoice::Scene).then(|| Relations::new(&self.intake.schema))
+    }
+
     /// What the arithmetic of doubles may move world coordinates within `bounds` by.
     pub(super) fn rounding(&self, axis: usize, bounds: &JobBounds) -> f64 {
         let world = |q: i64| (q as f64 * self.lattice.scale[axis] + self.lattice.offset[axis]).abs();

@@ -92,7 +92,7 @@ pub(crate) fn gather<'a>(
             PassEnd::Misled(stats) => (Some(stats), None),
             PassEnd::Complete(mut gathered) => {
                 // a step that was requested may put points together that the sources have apart
-                if gathered.is_lossless || !matches!(plan.scale, ScaleChoice::Fixed(_)) {
+                if gathered.is_lossless || plan.scale == ScaleChoice::Auto {
                     gathered.shared_places = places::find(&mut gathered, rt)?;
                 }
                 (None, Some(gathered))
@@ -130,7 +130,7 @@ pub(crate) fn gather<'a>(
                 if let Some(mark) = intake.mark {
                     gathered.stats.fallen_together = fallen::count(&gathered, mark)?;
                 }
-                if gathered.lattice.reason.axes.iter().any(|axis| axis.coarser.is_some()) && !is_said {
+                if gathered.lattice.reason.is_forced_coarser() && !is_said {
                     let (scale, reason) = (gathered.lattice.lattice.scale, gathered.lattice.reason);
                     warn(Warning::CoarserStep { scale, reason });
                 }

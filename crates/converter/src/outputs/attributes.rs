@@ -2,7 +2,7 @@
 
 use pointmill_format::{Attribute, AttributeType, Changes, DatasetKind};
 
-use crate::cloud::Range;
+use crate::cloud::{Range, Relation};
 use crate::plan::AttributeChoice;
 use crate::report::{ChangedAttribute, DropReason, DroppedAttribute};
 use crate::sources::Schema;
@@ -15,18 +15,27 @@ pub(crate) struct Choice {
     pub(crate) dropped: Vec<DroppedAttribute>,
 }
 
-/// All, those that vary, or those that were named. `unread`: names that were not even read.
-pub(crate) fn choose(choice: &AttributeChoice, schema: &Schema, unread: &[String], ranges: &[Range]) -> Choice {
+/// All, those that the scene requires, or those that were named. `unread`: names that were not even read; `relations`: what
+/// attributes follow from, nothing where the format could not give them back.
+pub(crate) fn choose(
+    choice: &AttributeChoice,
+    schema: &Schema,
+    unread: &[String],
+    ranges: &[Range],
+    relations: &[Option<Relation>],
+) -> Choice {
     let all = 0..schema.attributes.len();
     match choice {
         AttributeChoice::Usual | AttributeChoice::All => Choice { kept: all.collect(), dropped: Vec::new() },
         AttributeChoice::Scene => {
-            let (kept, constant): (Vec<usize>, Vec<usize>) = all.partition(|i| ranges[*i].constant().is_none());
-            let dropped = constant.into_iter().map(|i| {
-                let values = ranges[i].constant().unwrap_or_default().to_vec();
-                DroppedAttribute { name: schema.attributes[i].name.clone(), why: DropReason::Constant(values) }
-            });
-            Choice { kept, dropped: dropped.collect() }
+            let (mut kept, mut dropped) = (Vec::new(), Vec::new());
+            for i in all {
+                match not_required(schema, ranges, relations, i) {
+                    Some(why) => dropped.push(DroppedAttribute { name: schema.attributes[i].name.clone(), why }),
+                    None => kept.push(i),
+                }
+            }
+            Choice { kept, dropped }
         }
         AttributeChoice::List(names) => {
             // A name that no input has was refused before anything was read.
@@ -39,6 +48,24 @@ pub(crate) fn choose(choice: &AttributeChoice, schema: &Schema, unread: &[String
             let dropped = left_out(schema, unread, |i| kept.contains(&i), &DropReason::NotRequested);
             Choice { kept, dropped }
         }
+    }
+}
+
+/// Why the scene does not require an attribute of the schema; `None`: it does.
+pub(super) fn not_required(
+    schema: &Schema,
+    ranges: &[Range],
+    relations: &[Option<Relation>],
+    i: usize,
+) -> Option<DropReason> {
+    let name = |i: usize| schema.attributes[i].name.clone();
+    match (ranges[i].constant(), relations.get(i).and_then(Option::as_ref)) {
+        (Some(values), _) => Some(DropReason::Constant(values.to_vec())),
+        (None, Some(Relation::SameAs(other))) => Some(DropReason::SameAs(name(*other))),
+        (None, Some(Relation::FollowsFrom { attribute, table })) => {
+            Some(DropReason::FollowsFrom { attribute: name(*attribute), table: table.clone() })
+        }
+        (None, None) => None,
     }
 }
 

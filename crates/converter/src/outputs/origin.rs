@@ -1,5 +1,6 @@
 //! What every dataset says of its making: what a validator or a later run needs to know, and no viewer reads.
 
+use pointmill_format::AttributeType;
 use serde_json::{Map, Value, json};
 
 use crate::cloud::Cloud;
@@ -29,5 +30,38 @@ pub(super) fn own_key(cloud: &Cloud<'_>, dropped: &[DroppedAttribute]) -> Map<St
     if !constants.is_empty() {
         own.insert("attributesDropped".into(), constants.into());
     }
+    // in order of name: in that of the sources they would differ once the dataset is converted again
+    let mut in_order: Vec<&DroppedAttribute> = dropped.iter().collect();
+    in_order.sort_by(|a, b| a.name.cmp(&b.name));
+    let omitted: Vec<Value> = in_order.into_iter().filter_map(|d| omitted(cloud, d)).collect();
+    if !omitted.is_empty() {
+        own.insert("attributesOmitted".into(), omitted.into());
+    }
     own
+}
+
+/// How the values of an attribute that is not stored are found again; `None` for those that are gone. JSON has no place for
+/// 64-bit integers that doubles do not hold.
+fn omitted(cloud: &Cloud<'_>, dropped: &DroppedAttribute) -> Option<Value> {
+    let schema = cloud.schema();
+    let attribute = &schema.attributes[schema.find(&dropped.name)?];
+    let is_wide = matches!(attribute.ty, AttributeType::Int64 | AttributeType::UInt64);
+    // what colours mean is not in the values that were read
+    if is_wide || Some(&attribute.name) == schema.rgb().map(|i| &schema.attributes[i].name) {
+        return None;
+    }
+    let mut entry = Map::new();
+    entry.insert("name".into(), attribute.name.clone().into());
+    entry.insert("type".into(), attribute.ty.to_string().into());
+    entry.insert("elements".into(), attribute.elements.into());
+    match &dropped.why {
+        DropReason::Constant(values) => entry.insert("constant".into(), json!(values)),
+        DropReason::SameAs(other) => entry.insert("sameAs".into(), other.clone().into()),
+        DropReason::FollowsFrom { attribute, table } => {
+            entry.insert("table".into(), json!(table));
+            entry.insert("followsFrom".into(), attribute.clone().into())
+        }
+        _ => return None,
+    };
+    Some(entry.into())
 }

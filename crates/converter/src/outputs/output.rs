@@ -12,7 +12,7 @@ use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::octree::{AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
-use crate::report::OutputReport;
+use crate::report::{OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::Runtime;
 use crate::sources::{ResolvedCrs, Schema};
 use crate::warning::Warning;
@@ -44,9 +44,22 @@ pub(crate) trait Output: Debug + Send + Sync {
     /// Adds the settings that shape the dataset to those of the report.
     fn describe_settings(&self, settings: &mut Map<String, Value>);
 
+    /// What it would be made with, and why.
+    fn choices(&self, plan: &Plan) -> Vec<PlannedChoice>;
+
     /// What there is to say before any point was read. `kept`: the attributes of the schema that go in, in order.
     fn foresee(&self, _schema: &Schema, _kept: &[usize], _crs: &ResolvedCrs) -> Vec<Warning> {
         Vec::new()
+    }
+
+    /// True if points of the lattice come back as they are, but for the rounding of doubles.
+    fn keeps_lattice(&self) -> bool {
+        false
+    }
+
+    /// What a coarser step of positions saves, as far as that is known before the dataset is made.
+    fn saved_bytes(&self) -> SavedBytes {
+        SavedBytes::FixedRecords
     }
 
     /// The octree that it is, if it is one: then it is built together with others that have the same nodes, and
@@ -191,6 +204,21 @@ fn check_names(plan: &Plan, all: &Schema, each: &[Wants]) -> Result<(), PlanErro
     let Some(name) = names.iter().find(|n| !is_known(n)) else { return Ok(()) };
     let known = all.attributes.iter().map(|a| a.name.clone()).collect();
     Err(PlanError::new(Setting::Attributes, PlanFault::UnknownAttribute { name: name.clone(), known }))
+}
+
+/// True if all outputs hold points of the lattice as they are.
+pub(crate) fn keep_lattice(targets: &[Target]) -> bool {
+    targets.iter().all(|target| target.output().keeps_lattice())
+}
+
+/// What all outputs would be made with, and why; the lattice and the attributes aside.
+pub(crate) fn choices(plan: &Plan, targets: &[Target]) -> Vec<PlannedChoice> {
+    let of = |target: &Target| {
+        let output = target.kind().name().to_owned();
+        let named = move |choice| PlannedChoice { output: output.clone(), ..choice };
+        target.output().choices(plan).into_iter().map(named)
+    };
+    targets.iter().flat_map(of).collect()
 }
 
 /// Refuses plans and targets that cannot be used, before anything is read.

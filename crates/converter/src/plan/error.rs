@@ -29,6 +29,8 @@ pub enum Setting {
     Planes,
     /// Coordinate step.
     Scale,
+    /// Largest error of a coordinate.
+    Precision,
     /// Box of the points to keep.
     Bounds,
     /// Folder of temporary files.
@@ -53,6 +55,7 @@ impl Setting {
             Self::LodCell => "cell of the coarsest level of detail",
             Self::Planes => "planes",
             Self::Scale => "scale",
+            Self::Precision => "precision",
             Self::Bounds => "bounds",
             Self::TempDir => "folder of temporary files",
             Self::Attributes => "attributes",
@@ -117,6 +120,12 @@ pub enum PlanFault {
     /// A value that is none of the choices.
     #[error("must be {0}")]
     NotOneOf(&'static str),
+    /// A length in a unit, of coordinates whose unit is unknown.
+    #[error(
+        "the unit of the coordinates is unknown; name their coordinate reference system, or give a number in units of \
+         the coordinates"
+    )]
+    UnknownUnit,
     /// A box without content.
     #[error("the minimum is above the maximum")]
     EmptyBox,

@@ -2,6 +2,7 @@
 
 mod error;
 mod export;
+mod precision;
 
 use std::path::PathBuf;
 
@@ -9,6 +10,7 @@ use pointmill_format::{Aabb, OpenOptions};
 
 pub use error::{PlanError, PlanFault, Setting};
 pub use export::ExportFormat;
+pub use precision::{LengthUnit, PositionPrecision};
 
 /// What every output shares: inputs, filter, lattice, policies, resources. [`Plan::new`] gives the defaults of the
 /// command line. The datasets to make are [`crate::Target`]s beside it.
@@ -79,6 +81,8 @@ pub enum ScaleChoice {
     Auto,
     /// This step on all axes, world units, > 0.
     Fixed(f64),
+    /// By axis, the coarsest one that keeps every position this exact; see `docs/accuracy.md`.
+    Within(PositionPrecision),
 }
 
 /// Which points go in.
@@ -217,6 +221,9 @@ impl Plan {
         }
         if matches!(self.scale, ScaleChoice::Fixed(s) if !(s.is_finite() && s > 0.0)) {
             return refuse(Setting::Scale, PlanFault::NotPositive);
+        }
+        if matches!(self.scale, ScaleChoice::Within(p) if !(p.length.is_finite() && p.length > 0.0)) {
+            return refuse(Setting::Precision, PlanFault::NotPositive);
         }
         if self.filter.bounds.is_some_and(|b| b.is_empty()) {
             return refuse(Setting::Bounds, PlanFault::EmptyBox);

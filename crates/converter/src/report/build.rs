@@ -13,7 +13,7 @@ use super::types::{
 use crate::cloud::{Cloud, Cube, JobLattice, SharedPlace};
 use crate::error::ConvertError;
 use crate::memory;
-use crate::plan::{AttributeChoice, Filter, OriginPoints, Plan};
+use crate::plan::{AttributeChoice, Filter, OriginPoints, Plan, ScaleChoice};
 use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
 use crate::sources::{Source, Sources, resolve_crs};
@@ -155,6 +155,9 @@ pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value>
         AttributeChoice::List(names) => json!(names),
     };
     settings.insert("attributes".into(), attributes);
+    if let ScaleChoice::Within(precision) = plan.scale {
+        settings.insert("precision".into(), precision.to_string().into());
+    }
     settings.insert("memory".into(), plan.memory_bytes.into());
     settings.insert("threads".into(), plan.threads.into());
     settings.insert("duplicates".into(), plan.duplicates.name().into());

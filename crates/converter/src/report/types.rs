@@ -9,6 +9,8 @@ use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::accuracy::Accuracy;
+use super::choices::PlannedChoice;
+use super::precision::{PrecisionReport, SavedBytes};
 use crate::reason::GridReason;
 use crate::warning::{RenamedAttribute, Warning};
 
@@ -64,6 +66,9 @@ pub struct OutputReport {
     pub duplicates_dropped: u64,
     /// How far the positions that a reader decodes are from those of the sources.
     pub accuracy: Accuracy,
+    /// What became of the precision that was requested; `None`: none was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub precision: Option<PrecisionReport>,
     /// Attributes that were kept.
     pub attributes: Vec<String>,
     /// Attributes that were omitted, and why.
@@ -85,6 +90,9 @@ pub struct OutputReport {
     pub checksum: String,
     /// Nodes of a tree.
     pub tree: TreeReport,
+    /// What a coarser step of positions saved, where only the finished dataset tells.
+    #[serde(skip)]
+    pub(crate) saved: Option<SavedBytes>,
     /// What is particular to the format.
     #[serde(skip_serializing_if = "Map::is_empty")]
     pub details: Map<String, Value>,
@@ -282,6 +290,15 @@ pub struct DroppedAttribute {
 pub enum DropReason {
     /// All points agree on these values, one per element.
     Constant(Vec<f64>),
+    /// Every point has the value that it has of this attribute.
+    SameAs(String),
+    /// The value follows from that of another attribute.
+    FollowsFrom {
+        /// Which.
+        attribute: String,
+        /// Its values, ascending, with what follows from each.
+        table: Vec<[f64; 2]>,
+    },
     /// The plan lists the attributes to keep, and this is none of them.
     NotRequested,
     /// The format does not store it unless it is requested.
@@ -308,6 +325,10 @@ impl std::fmt::Display for DropReason {
             Self::Constant(values) => {
                 let texts: Vec<String> = values.iter().map(f64::to_string).collect();
                 write!(f, "constant {}", texts.join(" "))
+            }
+            Self::SameAs(other) => write!(f, "the same as {other}"),
+            Self::FollowsFrom { attribute, table } => {
+                write!(f, "follows from {attribute} by a table of {} values", table.len())
             }
             Self::NotRequested => f.write_str("not requested"),
             Self::NotUsual => f.write_str("not part of the usual record"),
@@ -379,6 +400,8 @@ pub struct Estimate {
     pub grid: GridReport,
     /// Attributes of the output.
     pub attributes: Vec<String>,
+    /// What would be chosen beside the lattice, and why.
+    pub choices: Vec<PlannedChoice>,
     /// Bytes per point of the output (before compression).
     pub bytes_per_point: u64,
     /// The least memory ceiling with which the run could begin, bytes.

@@ -3,6 +3,7 @@
 mod bytes;
 mod crs;
 mod decimals;
+mod degrees;
 mod divisor;
 mod open_scans;
 mod opener;
@@ -13,6 +14,7 @@ mod schema;
 mod shared;
 mod source;
 mod survey;
+mod tolerance;
 mod union;
 
 use std::cmp::Reverse;
@@ -25,12 +27,14 @@ use pointmill_format::{Aabb, Attribute, Scan, Wanted};
 pub use crs::{ResolvedCrs, resolve_crs};
 pub(crate) use crs::{declared_by as given_crs, resolve_all as resolve_crs_of_all};
 pub(crate) use decimals::tidy_product;
+pub(crate) use degrees::metres_per_radian;
 pub(crate) use recast::{Recast, doubled};
 pub(crate) use schema::{MARK_BYTES, POSITION_BYTES, Schema};
 pub(crate) use source::Source;
 #[cfg(test)]
 pub(crate) use source::Stored;
 pub(crate) use survey::{Fineness, far_out, intersection, single_step};
+pub(crate) use tolerance::Tolerance;
 pub(crate) use union::Layout;
 
 use self::divisor::Divisors;
@@ -41,7 +45,7 @@ use self::shared::Shared;
 use self::source::PIECES_TOGETHER;
 use self::union::Union;
 use crate::error::{ConvertError, InputFault};
-use crate::plan::Plan;
+use crate::plan::{Plan, ScaleChoice};
 use crate::runtime::{Events, Workers};
 use crate::warning::Warning;
 
@@ -67,6 +71,8 @@ pub(crate) struct Sources {
     /// Points declared by headers but not there.
     pub(crate) points_missing: u64,
     pub(crate) warnings: Vec<Warning>,
+    /// How far coordinates may be from those of the scans, if a precision is requested.
+    pub(crate) tolerance: Option<Tolerance>,
     /// What all inputs take of the memory until the end of the run, bytes; open scans aside: of these there are few.
     pub(crate) bytes: u64,
     open: OpenScans,
@@ -118,7 +124,8 @@ impl Found {
         settle_fineness(&mut all, &divisors);
         let (attributes, layouts) = (union.schema, union.layouts);
         let bytes = bytes::of(&all, &layouts, warnings.len());
-        Ok(Sources { bytes, all, attributes, layouts, points_declared, points_missing, warnings, open })
+        let tolerance = None;
+        Ok(Sources { bytes, all, attributes, layouts, points_declared, points_missing, warnings, tolerance, open })
     }
 }
 
@@ -153,6 +160,18 @@ impl Sources {
         let sources = found.combine(open)?;
         sources.warnings.iter().for_each(|w| events.warning(w));
         Ok(sources)
+    }
+
+    /// The same, with what the plan requests of positions. `keeps_lattice`: all outputs hold points of the lattice as they are.
+    ///
+    /// # Errors
+    /// A length in a unit where that of the coordinates is unknown.
+    pub(crate) fn within_precision(self, plan: &Plan, keeps_lattice: bool) -> Result<Self, ConvertError> {
+        if !matches!(plan.scale, ScaleChoice::Within(_)) {
+            return Ok(self);
+        }
+        let crs = resolve_crs_of_all(plan, &self.all, &mut Vec::new())?;
+        Ok(Self { tolerance: Tolerance::of(plan, &crs, keeps_lattice)?, ..self })
     }
 
     /// The scan of a source, open.
@@ -222,8 +241,9 @@ impl Sources {
     pub(crate) fn of_headers(all: Vec<Source>) -> Self {
         let open = OpenScans::new(Opener::new(&Plan::new(Vec::new(), "out".into()), 1), 1);
         let attributes = Schema::new(Vec::new());
-        let (layouts, warnings) = (Vec::new(), Vec::new());
-        Self { all, attributes, layouts, points_declared: 0, points_missing: 0, warnings, bytes: 0, open }
+        let (layouts, warnings, tolerance) = (Vec::new(), Vec::new(), None);
+        let (points_declared, points_missing, bytes) = (0, 0, 0);
+        Self { all, attributes, layouts, points_declared, points_missing, warnings, tolerance, bytes, open }
     }
 }
 

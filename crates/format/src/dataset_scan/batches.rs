@@ -12,6 +12,7 @@ use super::columns::{Becomes, Columns};
 use super::crs::crs_of;
 use super::described::{Described, NodeMemory, advised, file_bytes};
 use super::node_scan::{NodeScan, Nodes};
+use super::own_key::OwnKey;
 use super::pieces::{PIECE_POINTS, Place};
 use super::placing::held;
 
@@ -192,7 +193,8 @@ fn columns(batches: &Batches<Bytes>) -> Columns {
     let rgb = (Attribute::new("rgb", AttributeType::UInt16, 3), 0, Becomes::Channels);
     let attributes = batches.attributes().enumerate().filter(|(_, a)| !(is_shown && a.name == "rgb"));
     let attributes = attributes.map(|(i, a)| (a.clone(), i + 1, Becomes::Same));
-    Columns::list(is_shown.then_some(rgb).into_iter().chain(attributes))
+    let own = OwnKey::of_map(&batches.description().extra);
+    Columns::list(is_shown.then_some(rgb).into_iter().chain(attributes)).with_restored(own)
 }
 
 /// Positions whose integers may not come back, by the file's own figures.

@@ -124,7 +124,8 @@ fn columns(header: &Header) -> Columns {
             _ => Some((attribute, i + 1, Becomes::Same)),
         }
     });
-    Columns::list(std::iter::once(class).chain(extras))
+    let own = OwnKey::of_map(&header.pointmill);
+    Columns::list(std::iter::once(class).chain(extras)).with_restored(own)
 }
 
 fn has(header: &Header, name: &str) -> bool {

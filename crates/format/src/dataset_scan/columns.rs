@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::own_key::OwnKey;
+use super::restored::Restored;
 use crate::scan::resize;
 use crate::{Attribute, Changes, Column, NodePoints, PointBatch, Wanted, with_column};
 
@@ -15,6 +17,8 @@ const CHANNEL: u16 = 257;
 pub(super) struct Columns {
     attributes: Arc<[Attribute]>,
     sources: Vec<Source>,
+    /// Attributes that are not stored, behind those that are, each with the place among these that it follows from.
+    restored: Vec<(Restored, Option<usize>)>,
 }
 
 /// A column of the dataset, and what becomes of it.
@@ -44,7 +48,7 @@ impl Columns {
     pub(super) fn list(columns: impl IntoIterator<Item = (Attribute, usize, Becomes)>) -> Self {
         let (attributes, sources): (Vec<_>, _) =
             columns.into_iter().map(|(attribute, index, becomes)| (attribute, Source { index, becomes })).unzip();
-        Self { attributes: attributes.into(), sources }
+        Self { attributes: attributes.into(), sources, restored: Vec::new() }
     }
 
     /// All columns of a dataset but those that `is_made` says are none of the points that it was made from. `renamed`: name in
@@ -70,7 +74,23 @@ impl Columns {
             sources.push(Source { index, becomes });
             attributes.push(attribute);
         }
-        Self { attributes: attributes.into(), sources }
+        Self { attributes: attributes.into(), sources, restored: Vec::new() }
+    }
+
+    /// The same, and what the dataset says of attributes that the scene did not require.
+    pub(super) fn with_restored(self, own: OwnKey<'_>) -> Self {
+        let stored = self.sources.len();
+        let (mut attributes, mut restored) = (self.attributes.to_vec(), Vec::new());
+        for one in Restored::list(own) {
+            let place = |name: &str| attributes[..stored].iter().position(|a| a.name == name);
+            let from = one.source().map(place);
+            let is_sound = from.is_none_or(|from| from.is_some_and(|from| one.can_follow(&attributes[from])));
+            if is_sound && !attributes.iter().any(|a| a.name == one.attribute.name) {
+                attributes.push(one.attribute.clone());
+                restored.push((one, from.flatten()));
+            }
+        }
+        Self { attributes: attributes.into(), restored, ..self }
     }
 
     pub(super) fn attributes(&self) -> Arc<[Attribute]> {
@@ -89,6 +109,24 @@ impl Columns {
                 None => out.clear(),
             }
         }
+        for (n, (restored, from)) in self.restored.iter().enumerate() {
+            let i = self.sources.len() + n;
+            if !wanted.is_wanted(i) {
+                batch.columns[i].clear();
+                continue;
+            }
+            let from = from.and_then(|from| self.stored(from, points, range));
+            let changes = restored.put(from.as_ref(), range.len(), &mut batch.columns[i]);
+            batch.count_changes(i, &changes);
+        }
+    }
+
+    /// The values of a stored attribute of some points.
+    fn stored(&self, i: usize, points: &NodePoints, range: &Range<usize>) -> Option<Column> {
+        let (source, attribute) = (self.sources.get(i)?, self.attributes.get(i)?);
+        let mut column = Column::new(attribute.ty);
+        source.becomes.put(points.columns().get(source.index)?, attribute.elements, range, &mut column);
+        Some(column)
     }
 }
 

@@ -19,6 +19,7 @@ mod pieces;
 mod placing;
 mod potree1;
 mod potree2;
+mod restored;
 
 use std::path::Path;
 

@@ -86,7 +86,7 @@ fn described(path: &Path, dataset: &Dataset, depth: u8) -> Described {
         bounds: Some(bounds),
         lattice: if is_bin { lattice(metadata, own, &bounds, depth) } else { None },
         step: [metadata.scale; 3],
-        columns: Columns::new(stored, &own.renamed(), |name| made && name == "rgb", is_bin),
+        columns: Columns::new(stored, &own.renamed(), |name| made && name == "rgb", is_bin).with_restored(own),
         crs,
         rgb_is_16_bit: false,
         bytes: file_bytes(&dataset.locate(METADATA_FILE)),

@@ -85,7 +85,7 @@ fn described(path: &Path, dataset: &Dataset) -> Described {
         bounds: Some(bounds),
         lattice: Some(lattice(metadata, own, &bounds)),
         step: metadata.lattice.scale,
-        columns: Columns::new(&dataset.info().attributes, &own.renamed(), |_| false, false),
+        columns: Columns::new(&dataset.info().attributes, &own.renamed(), |_| false, false).with_restored(own),
         crs,
         // colours of 8 bits were stored as 16 then
         rgb_is_16_bit: own.is_there() && metadata.rgb_index().is_some(),

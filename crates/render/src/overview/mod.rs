@@ -53,13 +53,13 @@ impl Sample {
     pub(crate) fn best_view(&self, size: Size) -> Camera {
         let height = (f64::from(SMALL) / size.aspect()).round().clamp(1.0, f64::from(SMALL) * 4.0) as u32;
         let small = Size::new(SMALL, height).unwrap_or(size);
+        let inside: Vec<_> = self.positions.iter().copied().filter(|p| self.bounds.contains(*p)).collect();
         let around = (0..8).map(|eighth| {
             // from the south first, then from the south-east
             let angle = std::f64::consts::FRAC_PI_4 * f64::from(eighth);
             let (sideways, down) = (30f64.to_radians().cos(), 30f64.to_radians().sin());
             let direction = [-angle.sin() * sideways, angle.cos() * sideways, -down];
-            let inside = self.positions.iter().copied().filter(|p| self.bounds.contains(*p));
-            Camera::fit_points(inside, &self.bounds, direction, size)
+            Camera::fit_points(&inside, &self.bounds, direction, size)
         });
         let covered = |camera: &Camera| {
             let colours = vec![[0; 3]; self.positions.len()];

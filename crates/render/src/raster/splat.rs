@@ -130,16 +130,19 @@ impl<'a> Splats<'a> {
         let Some([top, bottom]) = covered(point.y, radius, self.height) else { return };
         // the radius in world units: how far a paraboloid goes back at its border
         let back = radius * point.depth / self.focal;
+        let per_square = 1.0 / (radius * radius);
+        let (is_round, is_weighed) = (self.shape == Shape::Paraboloid, self.pass == Pass::Gather);
+        let is_one = right - left == 1;
         for row in top..bottom {
             let dy = row as f32 + 0.5 - point.y;
             for column in left..right {
                 let dx = column as f32 + 0.5 - point.x;
-                let from_centre = (dx * dx + dy * dy) / (radius * radius);
-                if self.shape == Shape::Paraboloid && from_centre > 1.0 && right - left > 1 {
+                let from_centre = (dx * dx + dy * dy) * per_square;
+                if is_round && from_centre > 1.0 && !is_one {
                     continue;
                 }
-                let behind = if self.shape == Shape::Paraboloid { back * from_centre } else { 0.0 };
-                let weight = 1.0 + (CENTRE_WEIGHT - 1.0) * (1.0 - from_centre).max(0.0);
+                let behind = if is_round { back * from_centre } else { 0.0 };
+                let weight = if is_weighed { 1.0 + (CENTRE_WEIGHT - 1.0) * (1.0 - from_centre).max(0.0) } else { 1.0 };
                 self.hit(row, column, (point.depth + behind).min(f32::MAX), point.rgb, weight as u32);
             }
         }

@@ -191,3 +191,77 @@ impl<B: AsRef<[u8]> + Sync> Source for BatchesSource<'_, B> {
         chosen.spacing.max(self.target(clod, view)) * factor
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use pointmill_format::Lattice;
+    use pointmill_format::batches::{AlignedBytes, Cloud, WriteOptions, write};
+
+    use super::*;
+    use crate::{Camera, Colour, Size, render_batches};
+
+    /// 256 × 256 points, 1 apart, on a plane; cells of 8.
+    fn plane() -> Batches<AlignedBytes> {
+        let lattice = Lattice { scale: [0.01; 3], offset: [500_000.0, 0.0, 0.0] };
+        let x: Vec<i64> = (0..65_536).map(|i| i % 256 * 100).collect();
+        let y: Vec<i64> = (0..65_536).map(|i| i / 256 * 100).collect();
+        let colours: Vec<u32> = (0..65_536).collect();
+        let z = vec![0; 65_536];
+        let cloud = Cloud::new(lattice, [&x, &y, &z], &colours);
+        let mut file = Cursor::new(Vec::new());
+        let options = WriteOptions::new(lattice).cell(8.0).precision(Precision::Thirty);
+        write(&mut file, &cloud, &options).unwrap();
+        let bytes = AlignedBytes::from(&file.get_ref()[..]);
+        Batches::from_bytes(bytes, "plane").unwrap()
+    }
+
+    /// Above the middle, looking down.
+    fn above(height: f64) -> Camera {
+        Camera::new([500_128.0, 128.0, height], [500_128.0, 128.0, 0.0])
+    }
+
+    fn drawn(batches: &Batches<AlignedBytes>, camera: &Camera, style: &Style, budget: u64) -> u64 {
+        let size = Size::new(400, 400).unwrap();
+        render_batches(batches, camera, size, style, budget, 1).unwrap().drawn.points
+    }
+
+    #[test]
+    fn a_budget_is_met_by_levels() {
+        let batches = plane();
+        assert_eq!(drawn(&batches, &above(300.0), &Style::plain(), u64::MAX), 65_536);
+        for budget in [40_000, 10_000, 1000] {
+            let points = drawn(&batches, &above(300.0), &Style::plain(), budget);
+            // all 7 batches are sampled: the limit is that of the points themselves, but for equal weights
+            assert!(points <= budget && points + budget / 50 > budget, "{points} of {budget}");
+        }
+    }
+
+    #[test]
+    fn continuous_levels_draw_fewer_points_far_away() {
+        let batches = plane();
+        let of =
+            |height, clod| drawn(&batches, &above(height), &Style { clod: Some(clod), ..Style::plain() }, u64::MAX);
+        // points of the last level have 8/2^4 or more; T is at most 350 · 0.4 / (1000 · 0.3), in the corners
+        assert_eq!(of(300.0, 0.4), 65_536);
+        let points = [of(300.0, 4.0), of(300.0, 8.0), of(600.0, 8.0)];
+        assert!(points.is_sorted_by(|a, b| a > b) && points[0] < 65_536, "{points:?}");
+    }
+
+    #[test]
+    fn bits_are_those_of_the_distance() {
+        let batches = plane();
+        let size = Size::new(400, 400).unwrap();
+        let bits = |height: f64, bits| {
+            let projection = Projection::new(&above(height), size).unwrap();
+            let style = Style { bits, colour: Colour::Bits, ..Style::plain() };
+            let source = BatchesSource::new(&batches, &projection, &style, u64::MAX).unwrap();
+            (0..source.len()).filter_map(|i| source.unit(i).bits).max()
+        };
+        // focal length 346: a box of about 128 is 1,024 pixels at 43
+        assert_eq!([bits(300.0, Bits::HalfPixel), bits(10.0, Bits::HalfPixel)], [Some(10), Some(20)]);
+        assert_eq!(bits(300.0, Bits::Always(Precision::Thirty)), Some(30));
+        assert_eq!([bits(300.0, Bits::Published), bits(20.0, Bits::Published)], [Some(10), Some(20)]);
+    }
+}

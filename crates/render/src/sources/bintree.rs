@@ -97,3 +97,64 @@ impl Source for BintreeSource<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Camera, Size, View, render_bintree};
+
+    fn tree() -> Bintree {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/bintree/packed");
+        Bintree::open(folder).unwrap()
+    }
+
+    fn sizes(tree: &Bintree, camera: &Camera, size: PointSize) -> Vec<UnitSize> {
+        let projection = Projection::new(camera, Size::default()).unwrap();
+        let source = BintreeSource::new(tree, &projection, &Style { size, ..Style::default() }, u64::MAX);
+        (0..source.len()).map(|leaf| source.unit(leaf).size).collect()
+    }
+
+    #[test]
+    fn leaves_far_away_are_single_pixels() {
+        let tree = tree();
+        let bounds = tree.nodes()[0].bounds;
+        let fit = Camera::fit(&bounds, View::South, Size::default());
+        let distance = fit.target[1] - fit.eye[1];
+        // the radius that becomes a pixel at that distance: 60 degrees are 1080 pixels
+        let at = |part: f64| 2.0 * (distance * part * (60f64 / 1080.0).to_radians().tan()) as f32;
+        let extent = length(bounds.extent()) / distance;
+        assert!(sizes(&tree, &fit, PointSize::World(at(1.0 - extent))).iter().all(|s| *s == UnitSize::One));
+        let near = at(1.0 + extent);
+        assert!(sizes(&tree, &fit, PointSize::World(near)).iter().all(|s| *s == UnitSize::World(near)));
+        let leaf = tree.node(tree.leaves().next().unwrap()).unwrap();
+        let middle = distance_range(&leaf.bounds, fit.eye).iter().sum::<f64>() / 2.0;
+        assert!(sizes(&tree, &fit, PointSize::World(at(middle / distance))).contains(&UnitSize::Each));
+        assert!(sizes(&tree, &fit, PointSize::Pixels(2.0)).iter().all(|s| *s == UnitSize::Pixels(2.0)));
+    }
+
+    #[test]
+    fn a_leaf_at_the_switch_decides_point_by_point() {
+        let tree = tree();
+        let fit = Camera::fit(&tree.nodes()[0].bounds, View::South, Size::default());
+        let projection = Projection::new(&fit, Size::default()).unwrap();
+        let style = Style { size: PointSize::World(0.1), ..Style::default() };
+        let source = BintreeSource::new(&tree, &projection, &style, u64::MAX);
+        let switch = switch_distance(f64::from(0.1f32) / 2.0, 60f64.to_radians(), 1080.0);
+        let node = pointmill_format::NodePoints::default();
+        let size = |depth| source.size_at(0, &Points::of_node(&node), 0, [0.0, 0.0, depth]);
+        assert_eq!([size(switch * 0.999), size(switch * 1.001)], [0.1, 0.0]);
+    }
+
+    #[test]
+    fn every_nth_point_is_drawn_within_the_budget() {
+        let tree = tree();
+        let size = Size::new(100, 100).unwrap();
+        let camera = Camera::fit(&tree.nodes()[0].bounds, View::South, size);
+        let drawn = |budget| render_bintree(&tree, &camera, size, &Style::plain(), budget, 1).unwrap().drawn.points;
+        let leaves = tree.leaves().count() as u64;
+        let all = drawn(u64::MAX);
+        assert_eq!(all, tree.header().points);
+        // each leaf begins with one
+        assert!(drawn(all / 2) < all && drawn(all / 2) <= all / 2 + leaves && drawn(1) == leaves);
+    }
+}

@@ -191,3 +191,122 @@ impl Source for OctreeSource<'_> {
         self.spacing_at(unit, world) * factor
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use pointmill_format::octree::OctreeInfo;
+    use pointmill_format::{Aabb, NodePoints};
+
+    use super::*;
+    use crate::{Camera, Size};
+
+    /// All nodes of three levels, 10 points in each, in a cube of 8 units; the index says it at once.
+    struct Full(OctreeInfo);
+
+    impl Full {
+        fn new() -> Self {
+            Self(OctreeInfo::new("full", Aabb { min: [0.0; 3], max: [8.0; 3] }, 0.8, Vec::new()))
+        }
+    }
+
+    impl Octree for Full {
+        fn info(&self) -> &OctreeInfo {
+            &self.0
+        }
+
+        fn root(&self) -> OctreeNode {
+            let mut root = OctreeNode::new(NodeKey::ROOT);
+            root.is_proxy = true;
+            root
+        }
+
+        fn chunk(&self, _: &OctreeNode) -> Result<Vec<OctreeNode>, ReadError> {
+            let mut nodes = vec![OctreeNode::new(NodeKey::ROOT)];
+            let mut at = 0;
+            while let Some(node) = nodes.get_mut(at) {
+                let key = node.key;
+                node.points = 10;
+                if key.level < 2 {
+                    node.child_mask = 0xff;
+                    nodes.extend((0..8).filter_map(|child| key.child(child)).map(OctreeNode::new));
+                }
+                at += 1;
+            }
+            Ok(nodes)
+        }
+
+        fn count(&self, node: &OctreeNode) -> Result<u64, ReadError> {
+            Ok(node.points)
+        }
+
+        fn points(&self, _: &OctreeNode, out: &mut NodePoints) -> Result<(), ReadError> {
+            *out = NodePoints::default();
+            Ok(())
+        }
+
+        fn locate_index(&self, _: &OctreeNode) -> PathBuf {
+            "full".into()
+        }
+    }
+
+    fn chosen(octree: &Full, camera: &Camera, style: &Style, budget: u64) -> Vec<String> {
+        let projection = Projection::new(camera, Size::new(200, 200).unwrap()).unwrap();
+        let source = OctreeSource::new(octree, &projection, style, budget).unwrap();
+        source.nodes.iter().map(|drawn| drawn.node.key.to_string()).collect()
+    }
+
+    #[test]
+    fn coarse_and_near_nodes_come_first_until_the_budget_is_used() {
+        let (octree, camera) = (Full::new(), Camera::new([4.0, -20.0, 4.0], [4.0; 3]));
+        let all = Style { min_node_pixels: 0.0, ..Style::plain() };
+        assert_eq!(chosen(&octree, &camera, &all, u64::MAX).len(), 1 + 8 + 64);
+        assert_eq!(chosen(&octree, &camera, &all, 0), ["r"]);
+        // the near half has y below the middle, which is bit 1 of the child
+        let mut near = chosen(&octree, &camera, &all, 50);
+        near.sort();
+        assert_eq!(near, ["r", "r0", "r1", "r4", "r5"]);
+    }
+
+    #[test]
+    fn small_nodes_and_those_out_of_sight_are_left_out() {
+        let (octree, camera) = (Full::new(), Camera::new([4.0, -20.0, 4.0], [4.0; 3]));
+        let of =
+            |min_node_pixels| chosen(&octree, &camera, &Style { min_node_pixels, ..Style::plain() }, u64::MAX).len();
+        // radius 3.46 at about 22 to 26, focal length 173: 23 to 27 pixels, half of that one level below
+        assert_eq!([of(18.0), of(40.0), of(1000.0)], [9, 1, 1]);
+        let away = Camera::new([4.0, -20.0, 4.0], [4.0, -40.0, 4.0]);
+        assert_eq!(chosen(&octree, &away, &Style::plain(), u64::MAX), [""; 0]);
+    }
+
+    #[test]
+    fn the_angle_moves_nodes_aside_back() {
+        // beside a corner of the cube, looking along its face: near nodes are aside, far ones ahead
+        let (octree, camera) = (Full::new(), Camera::new([-1.0, -1.0, 4.0], [7.0, 7.0, 4.0]));
+        let of = |order| {
+            chosen(
+                &octree,
+                &Camera { vertical_fov: 100.0, ..camera },
+                &Style { order, min_node_pixels: 0.0, ..Style::plain() },
+                300,
+            )
+        };
+        assert_ne!(of(Order::Radius), of(Order::RadiusAndAngle));
+    }
+
+    #[test]
+    fn points_are_as_far_apart_as_in_the_deepest_node_drawn_there() {
+        let octree = Full::new();
+        let projection = Projection::new(&Camera::new([4.0, -20.0, 4.0], [4.0; 3]), Size::default()).unwrap();
+        // the root and its near half
+        let all = Style { min_node_pixels: 0.0, ..Style::default() };
+        let source = OctreeSource::new(&octree, &projection, &all, 50).unwrap();
+        let spacings = [[1.0, 1.0, 1.0], [1.0, 7.0, 1.0], [7.0, 3.9, 7.0]].map(|place| source.spacing_at(0, place));
+        assert_eq!(spacings, [0.4, 0.8, 0.4]);
+        // leaves of 10 points in cubes of 2: 2/√10
+        let whole = OctreeSource::new(&octree, &projection, &all, u64::MAX).unwrap();
+        let spacing = whole.spacing_at(0, [1.0; 3]);
+        assert!((spacing - 2.0 / 10f32.sqrt()).abs() < 1e-6, "{spacing}");
+    }
+}

@@ -55,6 +55,12 @@ impl Meaning {
         })
     }
 
+    /// The meant value of an attribute of one element.
+    pub(super) fn one(&self, stored: f64) -> f64 {
+        let (scale, offset) = (self.scale.first().unwrap_or(&1.0), self.offset.first().unwrap_or(&0.0));
+        (stored * scale + offset) * self.unit
+    }
+
     /// True if `stored` or what it means is `value`.
     pub(super) fn is(&self, stored: f64, element: usize, value: f64) -> bool {
         let (scale, offset) = (self.scale.get(element).unwrap_or(&1.0), self.offset.get(element).unwrap_or(&0.0));

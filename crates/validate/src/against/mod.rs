@@ -8,6 +8,7 @@
 pub(crate) mod block;
 mod distinct;
 mod exact;
+mod follows;
 mod meaning;
 mod measured;
 mod narrow;
@@ -96,8 +97,7 @@ impl Against {
             }
             _ => narrow::narrow(self, &colours, context)?,
         }
-        for (name, count) in self.sources.deviating(rules) {
-            let expected = "one value throughout, as stated in attributesDropped";
+        for (name, expected, count) in self.sources.deviating(rules) {
             let finding = Finding::new(Check::Against, format!("dropped attribute {name}"), expected, "other values");
             context.findings.push(finding.points(count));
         }

@@ -8,6 +8,7 @@ use pointmill_format::{Attribute, AttributeType, AxisGrid, Column, PointBatch, P
 use super::block::{Block, append_exact_words, append_words};
 use super::distinct::Residue;
 use super::exact::Exact;
+use super::follows::Followed;
 use super::meaning::{Feed, Meaning, feed, fine_angles};
 use super::rules::Conversion::{self, AsStored, FineAngle, Grey, NotWritten, WholeClass};
 use super::rules::{Rules, grey};
@@ -29,6 +30,8 @@ pub(super) struct Opened {
     /// Columns that must have one value, by the metadata: column, what its values mean, value, and its place among the
     /// constants of the rules.
     constants: Vec<(usize, Meaning, Vec<f64>, usize)>,
+    /// Columns that must follow from others, by the metadata.
+    follows: Vec<Followed>,
 }
 
 /// What all scans together decide for each.
@@ -39,6 +42,8 @@ pub(super) struct Common {
     pub(super) is_marked: bool,
     /// Points that differ from what is said to be one value throughout, by entry of the rules' constants; of the last pass.
     pub(super) deviating: Vec<AtomicU64>,
+    /// The same of what is said to follow from another attribute, by rule.
+    pub(super) not_following: Vec<AtomicU64>,
 }
 
 /// What is learned of a scan when it is opened first.
@@ -72,12 +77,14 @@ impl Opened {
             Some((column, Meaning::of(&info.attributes[column]), value.clone(), i))
         };
         let constants = rules.constants.iter().enumerate().filter_map(constant).collect();
+        let follows = rules.follows.iter().enumerate();
+        let follows = follows.filter_map(|rule| Followed::of(rule, &info.attributes)).collect();
         let exact = std::array::from_fn(|a| {
             let own = info.lattice.map(|l| AxisGrid { step: l.scale[a], offset: l.offset[a] });
             own.and_then(|own| Exact::new(own, rules.job_grid(a)))
         });
         let selection = Selection::new(info, rules);
-        Self { exact, columns, classification, selection, constants, scan }
+        Self { exact, columns, classification, selection, constants, follows, scan }
     }
 
     pub(super) fn look(&self, rules: &Rules) -> Look {
@@ -102,7 +109,8 @@ impl Opened {
     pub(super) fn wanted(&self) -> Wanted {
         let mut wanted = Wanted::positions(self.scan.info());
         let columns = self.columns.iter().flatten().map(|c| c.column);
-        for i in columns.chain(self.classification).chain(self.constants.iter().map(|c| c.0)) {
+        let follows = self.follows.iter().flat_map(|f| [f.column, f.from]);
+        for i in columns.chain(self.classification).chain(self.constants.iter().map(|c| c.0)).chain(follows) {
             wanted.set(i, true);
         }
         wanted
@@ -177,6 +185,10 @@ impl Opened {
             let is_rgb = self.scan.info().attributes[*column].name == "rgb";
             let count = count_deviating(&batch.columns[*column], start, (meaning, value), &block.keep, is_rgb);
             all.deviating[*constant].fetch_add(count, Relaxed);
+        }
+        for follows in &self.follows {
+            let count = follows.count_deviating(&batch.columns, start, &block.keep);
+            all.not_following[follows.rule].fetch_add(count, Relaxed);
         }
     }
 

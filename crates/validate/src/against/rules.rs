@@ -6,6 +6,8 @@ use std::sync::Arc;
 use pointmill_format::{Aabb, Attribute, AxisGrid, Lattice};
 use serde_json::Value;
 
+use super::follows::Follows;
+
 /// Meaning of 16-bit colours of the sources.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RgbDepth {
@@ -104,6 +106,8 @@ pub(crate) struct Rules {
     pub(crate) foreign: bool,
     /// Attributes that were not written because they have one value throughout: name and that value.
     pub(crate) constants: Vec<(String, Vec<f64>)>,
+    /// Those that were not written because they follow from others.
+    pub(crate) follows: Vec<Follows>,
 }
 
 impl Rules {
@@ -143,6 +147,7 @@ impl Rules {
             drop_duplicates: own["duplicates"] == "drop",
             foreign: own.is_null(),
             constants: constants(&own["attributesDropped"]),
+            follows: Follows::list(&own["attributesOmitted"]),
         }
     }
 

@@ -50,6 +50,7 @@ impl Sources {
                 rounds: all.types.into_iter().zip(&rules.attributes).map(rounds).collect(),
                 is_marked: all.may_move,
                 deviating: rules.constants.iter().map(|_| AtomicU64::new(0)).collect(),
+                not_following: rules.follows.iter().map(|_| AtomicU64::new(0)).collect(),
             },
             not_in_dataset: all.names.into_iter().collect(),
             decode_bytes: all.decode_bytes,
@@ -67,11 +68,15 @@ impl Sources {
         BLOCK + self.decode_bytes
     }
 
-    /// Attributes that were dropped as constant but are not: name, points that differ.
-    pub(crate) fn deviating(&self, rules: &Rules) -> Vec<(String, u64)> {
-        let counts = rules.constants.iter().zip(&self.common.deviating);
-        let counts = counts.map(|((name, _), count)| (name.clone(), count.load(Relaxed)));
-        counts.filter(|(_, count)| *count > 0).collect()
+    /// Attributes that were not written for a reason that does not hold: name, the reason, points that differ.
+    pub(crate) fn deviating(&self, rules: &Rules) -> Vec<(String, &'static str, u64)> {
+        let constant = "one value throughout, as stated in attributesDropped";
+        let follows = "values that follow from another attribute, as stated in attributesOmitted";
+        let constants = rules.constants.iter().map(|(name, _)| (name, constant)).zip(&self.common.deviating);
+        let followers = rules.follows.iter().map(|rule| (&rule.name, follows)).zip(&self.common.not_following);
+        let counts = constants.chain(followers);
+        let counts = counts.map(|((name, expected), count)| (name.clone(), expected, count.load(Relaxed)));
+        counts.filter(|(_, _, count)| *count > 0).collect()
     }
 
     /// Decodes everything in parallel and hands it over in blocks, with the index of the source and whether the block
@@ -86,7 +91,8 @@ impl Sources {
         let idle: Mutex<Vec<(Scratch, Block)>> = Mutex::default();
         let done = AtomicU64::new(0);
         let failed = AtomicBool::new(false);
-        self.common.deviating.iter().for_each(|count| count.store(0, Relaxed));
+        let counts = self.common.deviating.iter().chain(&self.common.not_following);
+        counts.for_each(|count| count.store(0, Relaxed));
         self.pairs.par_iter().with_max_len(1).try_for_each(|&(at, first)| {
             if failed.load(Relaxed) {
                 return Ok(()); // another piece brings the error

@@ -91,6 +91,8 @@ pub(super) struct AxisChoice {
     pub(super) is_prescribed: bool,
     /// No source asks for a step.
     pub(super) is_free: bool,
+    /// All coordinates are points of the grid, and no sample vouches for it.
+    pub(super) holds_all: bool,
 }
 
 /// The step for these needs.
@@ -121,9 +123,10 @@ pub(super) fn choose(needs: &[Need], room: Room) -> AxisChoice {
 fn plain(step: f64, basis: LatticeBasis) -> AxisChoice {
     AxisChoice {
         grid: AxisGrid { step, offset: 0.0 },
-        reason: AxisReason { basis, coarser: None },
+        reason: AxisReason { basis, coarser: None, enough: None },
         is_prescribed: false,
         is_free: false,
+        holds_all: false,
     }
 }
 
@@ -178,7 +181,10 @@ fn with_grids(grids: &[(AxisGrid, GridOrigin)], wanted: Option<f64>, room: Room)
         Coarser { factor, cause }
     });
     let is_prescribed = grids.iter().any(|(_, o)| matches!(o, GridOrigin::Lattice | GridOrigin::Divisor));
-    AxisChoice { grid, reason: AxisReason { basis, coarser }, is_prescribed, is_free: false }
+    let are_integers = grids.iter().all(|(_, o)| *o == GridOrigin::Lattice);
+    let holds_all = are_integers && common.is_some() && wanted.is_none() && coarser.is_none();
+    let reason = AxisReason { basis, coarser, enough: None };
+    AxisChoice { grid, reason, is_prescribed, is_free: false, holds_all }
 }
 
 /// The largest power of ten by which a step can be divided so that it stays at least `wanted`.

@@ -3,6 +3,7 @@
 //! Per axis: never finer than what the sources resolve, never so coarse that a source loses what 31 bits could hold.
 
 mod axis;
+mod enough;
 mod needs;
 mod steps;
 
@@ -52,7 +53,7 @@ pub(crate) fn is_coarse(plan: &Plan, sources: &Sources) -> Result<bool, ConvertE
     let is_requested = matches!(plan.scale, ScaleChoice::Fixed(_));
     let is_coarse = |a: usize| match resolved[a] {
         Some(step) => chosen.lattice.scale[a] > step,
-        None => is_requested,
+        None => is_requested || chosen.reason.axes[a].enough.is_some(),
     };
     Ok((0..3).any(is_coarse))
 }
@@ -68,7 +69,8 @@ pub(crate) fn settled(plan: &Plan, sources: &Sources, present: &JobLattice, stat
     let differs = |a: usize| {
         let (now, then) = (present.lattice.scale[a], wanted.lattice.scale[a]);
         let is_lost = resolved[a].is_none_or(|step| step < 0.75 * now);
-        let worth = match (known.is_broken(a), resolved[a]) {
+        let is_imprecise = sources.tolerance.as_ref().is_some_and(|t| now > 2.0 * t.lattice[a]);
+        let worth = match (known.is_broken(a) || is_imprecise, resolved[a]) {
             (true, _) => 1.0,
             (false, Some(_)) if is_lost => 1.5,
             _ => WORTH_READING_AGAIN,
@@ -101,7 +103,9 @@ pub(super) fn losses(
     let resolved = finest_of_sources(sources, &known);
     std::array::from_fn(|a| {
         // a step that was requested is no loss, one that had to be coarser is
-        let is_requested = matches!(plan.scale, ScaleChoice::Fixed(_)) && lattice.reason.axes[a].coarser.is_none();
+        let reason = lattice.reason.axes[a];
+        let is_fixed = matches!(plan.scale, ScaleChoice::Fixed(_)) && reason.coarser.is_none();
+        let is_requested = is_fixed || reason.enough.is_some();
         match resolved[a] {
             _ if is_requested => Loss::Nothing,
             Some(step) if lattice.lattice.scale[a] > COSTLY_STEPS * step => Loss::Of(step),
@@ -122,7 +126,10 @@ fn choose_for(plan: &Plan, sources: &Sources, known: &Knowledge<'_>) -> JobLatti
         return requested(step, sources, rooms);
     }
     let choices = std::array::from_fn(|a| choose(&needs(sources, known, a), rooms[a]));
-    let choices = equal_where_possible(choices, rooms);
+    let mut choices = equal_where_possible(choices, rooms);
+    if let Some(tolerance) = &sources.tolerance {
+        choices.iter_mut().zip(tolerance.lattice).for_each(|(choice, allowed)| enough::coarsen(choice, allowed));
+    }
     let lattice = Lattice { scale: choices.map(|c| c.grid.step), offset: choices.map(|c| c.grid.offset) };
     JobLattice { lattice, reason: LatticeReason { axes: choices.map(|c| c.reason) } }
 }
@@ -139,7 +146,8 @@ fn requested(step: f64, sources: &Sources, rooms: [Room; 3]) -> JobLattice {
     if factor > 1.0 {
         let by_doubles = rooms.iter().any(|r| r.doubles >= certain);
         let cause = if by_doubles { CoarserCause::Doubles } else { CoarserCause::Extent };
-        let reason = AxisReason { basis: LatticeBasis::Requested, coarser: Some(Coarser { factor, cause }) };
+        let reason =
+            AxisReason { basis: LatticeBasis::Requested, coarser: Some(Coarser { factor, cause }), enough: None };
         made.lattice.scale = [tidy_product(step, factor); 3];
         made.reason.axes = [reason; 3];
     }

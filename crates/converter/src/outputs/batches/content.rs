@@ -4,7 +4,7 @@ use pointmill_format::batches::{ColourSource, colour_word, eight_bit};
 use pointmill_format::{Attribute, AttributeType, DatasetKind};
 
 use crate::cloud::{Cloud, Widening};
-use crate::outputs::attributes::{choose, left_out};
+use crate::outputs::attributes::{choose, left_out, not_required};
 use crate::outputs::colour::{colour_notes, colour_of, extremes, grey_of};
 use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
@@ -56,7 +56,7 @@ impl Content {
         let is_rgb = schema.rgb().is_some();
         let choice = match requested {
             AttributeChoice::Usual => Vec::new(),
-            other => choose(other, schema, &cloud.intake.unread, &facts.ranges).kept,
+            other => choose(other, schema, &cloud.intake.unread, &facts.ranges, &facts.relations).kept,
         };
         let extras: Vec<usize> = choice.into_iter().filter(|i| !(is_rgb && Some(*i) == colour_index)).collect();
         let mut kept: Vec<usize> = colour_index.filter(|_| is_rgb).into_iter().collect();
@@ -64,9 +64,9 @@ impl Content {
         let is_usual = *requested == AttributeChoice::Usual;
         let unwanted = if is_usual { DropReason::NotUsual } else { DropReason::NotRequested };
         let left = |i: usize| {
-            let constant = facts.ranges[i].constant().filter(|_| *requested == AttributeChoice::Scene);
-            let why = match constant {
-                Some(values) => DropReason::Constant(values.to_vec()),
+            let is_scene = *requested == AttributeChoice::Scene;
+            let why = match not_required(schema, &facts.ranges, &facts.relations, i).filter(|_| is_scene) {
+                Some(why) => why,
                 None if !is_rgb && Some(i) == colour_index => DropReason::ShownAsGrey,
                 None => unwanted.clone(),
             };

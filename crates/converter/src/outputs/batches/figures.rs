@@ -51,6 +51,7 @@ fn planes_dropped(finished: &Finished, settings: &BatchesSettings) -> Option<Str
     let bits = finished.precision.bits();
     Some(match settings.planes {
         Some(_) => format!("{plane}: {bits} bits as requested"),
+        None if finished.spared > 0 => format!("{plane}: {bits} bits keep the requested precision"),
         None => format!("{plane}: in every batch the coordinate step is coarser than a cell of {bits} bits"),
     })
 }

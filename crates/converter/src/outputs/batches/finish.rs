@@ -13,13 +13,14 @@ use super::content::Content;
 use super::frame::{Frame, refused};
 use super::lod::{LEVELS, join, shown_word};
 use super::output::{BatchFile, ORIGINAL_BYTES, State};
+use super::planes;
 use super::settings::BatchesSettings;
 use super::task::TaskResults;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::outputs::origin::own_key;
 use crate::outputs::recovery::Lost;
-use crate::report::FormatErrors;
+use crate::report::{FormatErrors, SavedBytes};
 
 /// Bytes of originals that are written at once.
 const WRITE_BYTES: usize = 4 << 20;
@@ -44,6 +45,8 @@ impl Patch {
 /// What the finished file is.
 pub(super) struct Finished {
     pub(super) precision: Precision,
+    /// Planes that a requested precision spared.
+    pub(super) spared: u32,
     pub(super) records: Vec<BatchRecord>,
     /// Of all plane counts, whether they are in the file or not.
     pub(super) errors: ErrorSums,
@@ -58,6 +61,14 @@ pub(super) struct Finished {
 }
 
 impl Finished {
+    /// What a requested precision saved.
+    pub(super) fn saved(&self) -> SavedBytes {
+        match self.spared {
+            0 => SavedBytes::NoPlane,
+            planes => SavedBytes::Planes { planes, bytes: 4 * u64::from(planes) * self.layout.points },
+        }
+    }
+
     /// What the planes in the file did to positions.
     pub(super) fn format_errors(&self) -> FormatErrors {
         FormatErrors::measured(&self.errors.deviations(self.precision), self.lost.points, self.lost.merged)
@@ -80,13 +91,13 @@ pub(super) fn finish(
         output.put_values(output.layout.colour, 4, *index, &patch.shown.to_le_bytes())?;
     }
     let records: Vec<BatchRecord> = state.records.iter().flatten().copied().collect();
+    let mut errors = ErrorSums::default();
+    state.errors.iter().for_each(|e| errors.merge(e));
     let mut layout = output.layout.clone();
-    if settings.planes.is_none() {
-        let needed = Precision::for_steps(&records, frame.lattice.scale);
-        if needed < layout.precision() {
-            layout = layout.with_precision(needed);
-            output.file.set_len(layout.end_of_points(), "leaving out a plane")?;
-        }
+    let planes = planes::needed(cloud, settings.planes, &records, frame.lattice.scale, &errors);
+    if let Some(needed) = planes.needed.filter(|needed| *needed < layout.precision()) {
+        layout = layout.with_precision(needed);
+        output.file.set_len(layout.end_of_points(), "leaving out a plane")?;
     }
     output.write(&record_bytes(&records), layout.records.offset)?;
     let changes = |when: usize| patches.values().filter(|patch| patch.changes()[when]).count() as u64;
@@ -94,8 +105,6 @@ pub(super) fn finish(
     if let Averaging::Changed { originals: Some(count) } = averaging {
         put_originals(output, &layout, &state, &patches, count)?;
     }
-    let mut errors = ErrorSums::default();
-    state.errors.iter().for_each(|e| errors.merge(e));
     let mut description = describe(cloud, frame, content);
     description.errors = errors.figures();
     let end = layout.finish(&frame.grid, &frame.tight, averaging, description).map_err(refused)?;
@@ -103,7 +112,8 @@ pub(super) fn finish(
     output.write(&end.header_bytes, 0)?;
     let bytes = end.description_offset + end.header.description_bytes;
     let (precision, lost) = (layout.precision(), state.lost);
-    Ok(Finished { precision, records, errors, lost, lod_points, layout, averaging, end, bytes })
+    let spared = planes.spared;
+    Ok(Finished { precision, spared, records, errors, lost, lod_points, layout, averaging, end, bytes })
 }
 
 /// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.
@@ -226,11 +236,11 @@ fn describe(cloud: &Cloud<'_>, frame: &Frame, content: &Content) -> Description 
         entry
     };
     description.attributes = content.extras.iter().map(|e| entry(&e.attribute, e.index)).collect();
-    let mut own = own_key(cloud, &[]);
+    let mut own = own_key(cloud, &content.dropped);
     if let Some(range) = content.intensity_range() {
         own.insert("intensityRange".into(), json!(range));
     }
-    let keys = ["intensityRange", "filter", "duplicates", "rgbDepth", "wkt"];
+    let keys = ["intensityRange", "filter", "duplicates", "rgbDepth", "wkt", "attributesOmitted"];
     description.extra.extend(keys.iter().filter_map(|key| Some(((*key).to_owned(), own.remove(*key)?))));
     description
 }

@@ -12,13 +12,14 @@ mod large;
 mod lod;
 mod order;
 mod output;
+mod planes;
 mod settings;
 mod task;
 #[cfg(test)]
 mod tests;
 
 use pointmill_format::DatasetKind;
-use pointmill_format::batches::{BatchRecord, Layout, Precision, f32_above, f32_below};
+use pointmill_format::batches::Layout;
 use serde_json::{Map, Value};
 
 pub use settings::BatchesSettings;
@@ -29,8 +30,8 @@ use super::recovery::Recovery;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
-use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
-use crate::report::{self, OutputReport};
+use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, ScaleChoice, Setting};
+use crate::report::{self, ChoiceReason, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{Consumer, Reservation, Runtime};
 use crate::sources::Schema;
 use buckets::Task;
@@ -100,6 +101,23 @@ impl Output for BatchesSettings {
         }
     }
 
+    fn choices(&self, plan: &Plan) -> Vec<PlannedChoice> {
+        let by = match plan.scale {
+            ScaleChoice::Within(_) => ChoiceReason::Precision,
+            ScaleChoice::Auto | ScaleChoice::Fixed(_) => ChoiceReason::Step,
+        };
+        let sections = self.zstd_level.map_or("not compressed".to_owned(), |level| format!("zstd, level {level}"));
+        vec![
+            PlannedChoice::or_chosen("cell of the coarsest level of detail", self.lod_cell, ChoiceReason::CellPoints),
+            PlannedChoice::or_chosen("bits of a coordinate", self.planes.map(|p| 10 * u32::from(p)), by),
+            PlannedChoice::or_default("sections", sections.as_str(), "not compressed"),
+        ]
+    }
+
+    fn saved_bytes(&self) -> SavedBytes {
+        SavedBytes::NoPlane // the finished file tells
+    }
+
     fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
         let (points, per_point) = (cloud.points(), bytes_per_point(cloud.frame.stride));
         let most = rt.budget.task_points(per_point, MAX_TASK_POINTS);
@@ -107,7 +125,7 @@ impl Output for BatchesSettings {
         let content = Content::choose(cloud);
         let frame = Frame::new(cloud, self.lod_cell)?;
         let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();
-        let layout = Layout::new(points, &attributes, planes_at_most(&frame, self.planes)).map_err(refused)?;
+        let layout = Layout::new(points, &attributes, planes::at_most(cloud, &frame, self.planes)).map_err(refused)?;
         let tasks = buckets::tasks(cloud, rt, &frame, task_points)?;
         let sorted = Store::new(rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
@@ -143,23 +161,12 @@ impl Output for BatchesSettings {
             attributes_dropped: content.dropped,
             bytes: finished.bytes,
             checksum: results.ledger.unaltered().to_string(),
+            saved: Some(finished.saved()),
             details: figures::details(&frame, &finished, self),
             warnings: content.warnings,
             ..OutputReport::default()
         })
     }
-}
-
-/// The planes that are written at first; more are never needed.
-fn planes_at_most(frame: &Frame, planes: Option<u8>) -> Precision {
-    if let Some(planes) = planes {
-        return Precision::from_bits(10 * u32::from(planes)).unwrap_or(Precision::Thirty);
-    }
-    // no batch is larger than the cloud
-    let far = frame.grid.relative(frame.tight.max);
-    let near = frame.grid.relative(frame.tight.min);
-    let cloud = BatchRecord { min: near.map(f32_below), first_point: 0, max: far.map(f32_above), points: 1 };
-    Precision::for_steps([&cloud], frame.lattice.scale)
 }
 
 /// Encodes all tasks; edges come back in the order of the tasks.

@@ -6,9 +6,9 @@ use pointmill_format::bintree::{RecordLayout, class_value};
 use pointmill_format::{Attribute, AttributeType};
 
 use super::settings::{RGBA, class_of};
-use crate::cloud::{Cloud, Range};
+use crate::cloud::{Cloud, Facts};
 use crate::error::{ConvertError, Unsupported};
-use crate::outputs::attributes::left_out;
+use crate::outputs::attributes::{left_out, not_required};
 use crate::outputs::number::number;
 use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
@@ -62,7 +62,7 @@ impl Columns {
         };
         let mut dropped = left_out(schema, &cloud.intake.unread, kept, &why);
         if cloud.plan.attributes == AttributeChoice::Scene {
-            name_constants(schema, &cloud.facts.ranges, &mut dropped);
+            name_reasons(schema, &cloud.facts, &mut dropped);
         }
         let class = class.map(|i| (schema.offsets[i], schema.attributes[i].ty));
         Ok(Self { record, dropped, class, moves })
@@ -137,8 +137,9 @@ fn extras(cloud: &Cloud<'_>, class: Option<usize>) -> (Vec<Extra>, DropReason) {
         AttributeChoice::Usual => (Vec::new(), DropReason::NotUsual),
         AttributeChoice::All => (others.map(Extra::Own).collect(), DropReason::NotUsual),
         AttributeChoice::Scene => {
-            let varies = |i: &usize| cloud.facts.ranges[*i].constant().is_none();
-            (others.filter(varies).map(Extra::Own).collect(), DropReason::NotUsual)
+            let facts = &cloud.facts;
+            let is_required = |i: &usize| not_required(schema, &facts.ranges, &facts.relations, *i).is_none();
+            (others.filter(is_required).map(Extra::Own).collect(), DropReason::NotUsual)
         }
         AttributeChoice::List(names) => (named(schema, names, class), DropReason::NotRequested),
     }
@@ -161,11 +162,12 @@ fn named(schema: &Schema, names: &[String], class: Option<usize>) -> Vec<Extra> 
     extras
 }
 
-/// Where constant attributes are omitted, names the value that each has.
-fn name_constants(schema: &Schema, ranges: &[Range], dropped: &mut [DroppedAttribute]) {
+/// Where attributes that the scene does not require are omitted, says why each is.
+fn name_reasons(schema: &Schema, facts: &Facts, dropped: &mut [DroppedAttribute]) {
     for d in dropped {
-        if let Some(values) = schema.find(&d.name).and_then(|i| ranges[i].constant()) {
-            d.why = DropReason::Constant(values.to_vec());
+        let why = schema.find(&d.name).and_then(|i| not_required(schema, &facts.ranges, &facts.relations, i));
+        if let Some(why) = why {
+            d.why = why;
         }
     }
 }

@@ -43,7 +43,7 @@ use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
-use crate::report::{self, FormatErrors, OutputReport};
+use crate::report::{self, FormatErrors, OutputReport, PlannedChoice};
 use crate::runtime::{Consumer, Reservation, Runtime, Sequential};
 use crate::sources::Schema;
 use crate::warning::Warning;
@@ -104,6 +104,15 @@ impl Output for BintreeSettings {
         settings.insert("capacity".into(), self.capacity.into());
         settings.insert("split".into(), self.split.name().into());
         settings.insert("layout".into(), self.layout.name().into());
+    }
+
+    fn choices(&self, _: &Plan) -> Vec<PlannedChoice> {
+        let default = Self::default();
+        vec![
+            PlannedChoice::or_default("points of a leaf, at most", self.capacity, default.capacity),
+            PlannedChoice::or_default("split", self.split.name(), default.split.name()),
+            PlannedChoice::or_default("layout", self.layout.name(), default.layout.name()),
+        ]
     }
 
     fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {

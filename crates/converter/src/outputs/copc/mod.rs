@@ -30,7 +30,7 @@ use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
 use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::Plan;
-use crate::report::{self, OutputReport};
+use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{DiskFile, Runtime};
 use crate::sources::{ResolvedCrs, Schema};
 use crate::warning::Warning;
@@ -79,8 +79,20 @@ impl Output for CopcSettings {
         self.tree().describe(settings);
     }
 
+    fn choices(&self, _: &Plan) -> Vec<PlannedChoice> {
+        self.tree().choices(Self::default().leaf_capacity)
+    }
+
     fn foresee(&self, _: &Schema, _: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {
         notes::foresee(crs)
+    }
+
+    fn keeps_lattice(&self) -> bool {
+        true
+    }
+
+    fn saved_bytes(&self) -> SavedBytes {
+        SavedBytes::Compressed
     }
 
     fn octree(&self) -> Option<&dyn OctreeOutput> {

@@ -13,7 +13,7 @@ use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::octree::{Octree, OctreeSettings, Sampling};
 use crate::plan::{AttributeChoice, PlanError, PlanFault, Setting};
-use crate::report::TreeReport;
+use crate::report::{ChoiceReason, PlannedChoice, TreeReport};
 use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
 use crate::warning::ViewerNote;
 use serde_json::{Map, Value};
@@ -61,6 +61,15 @@ impl TreeSettings {
         settings.insert("leaf-capacity".into(), self.leaf_capacity.into());
     }
 
+    /// What shapes the tree. `leaf_capacity`: the default.
+    pub(super) fn choices(&self, leaf_capacity: u32) -> Vec<PlannedChoice> {
+        vec![
+            PlannedChoice::or_default("sampling", self.sampling.name(), Sampling::Poisson.name()),
+            PlannedChoice::or_chosen("spacing of the root", self.spacing, ChoiceReason::RootPoints),
+            PlannedChoice::or_default("points of a leaf, at most", self.leaf_capacity, leaf_capacity),
+        ]
+    }
+
     /// The tree of a cloud.
     pub(super) fn of(&self, spacing: &ChosenSpacing, cloud: &Cloud<'_>) -> OctreeSettings {
         OctreeSettings {
@@ -91,7 +100,7 @@ fn chosen_bytes(cloud: &Cloud<'_>) -> usize {
             AttributeChoice::List(names) => of(all, &|i| names.contains(&all.attributes[i].name)),
             AttributeChoice::Scene => {
                 let schema = cloud.schema();
-                let kept = choose(&plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges).kept;
+                let kept = choose(&plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]).kept;
                 of(schema, &|i| kept.contains(&i))
             }
         }

@@ -66,7 +66,7 @@ impl Content {
         let (schema, requested) = (cloud.schema(), &cloud.plan.attributes);
         let asked = match requested {
             AttributeChoice::Usual => Vec::new(),
-            other => choose(other, schema, &cloud.intake.unread, &cloud.facts.ranges).kept,
+            other => choose(other, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]).kept,
         };
         if let Some(wide) = asked.iter().map(|&i| &schema.attributes[i]).find(|a| a.elements > MAX_ELEMENTS) {
             let (kind, name, elements) = (DatasetKind::Potree1, wide.name.clone(), wide.elements);

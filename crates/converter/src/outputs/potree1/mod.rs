@@ -36,7 +36,7 @@ use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
 use crate::octree::{self, AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
-use crate::report::{self, ChangedAttribute, OutputReport};
+use crate::report::{self, ChangedAttribute, OutputReport, PlannedChoice};
 use crate::runtime::Runtime;
 use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
 use crate::warning::Warning;
@@ -96,6 +96,12 @@ impl Output for Potree1Settings {
         if let Some(most) = self.max_node_points {
             settings.insert("max-node-points".into(), most.into());
         }
+    }
+
+    fn choices(&self, _: &Plan) -> Vec<PlannedChoice> {
+        let mut choices = self.tree().choices(Self::default().leaf_capacity);
+        choices.push(PlannedChoice::or_default("version", self.version.name(), Self::default().version.name()));
+        choices
     }
 
     fn foresee(&self, _: &Schema, _: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {

@@ -29,7 +29,7 @@ use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
 use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
-use crate::report::{self, OutputReport};
+use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{DiskFile, Events, Runtime};
 use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
 use crate::warning::Warning;
@@ -91,8 +91,29 @@ impl Output for Potree2Settings {
         settings.insert("dark-colours".into(), self.dark_colours.name().into());
     }
 
+    fn choices(&self, _: &Plan) -> Vec<PlannedChoice> {
+        let encoding = match self.encoding {
+            Encoding::Default => "default".to_owned(),
+            Encoding::Brotli { quality } => format!("brotli, quality {quality}"),
+        };
+        let mut choices = self.tree().choices(Self::default().leaf_capacity);
+        choices.push(PlannedChoice::or_default("encoding", encoding.as_str(), "default"));
+        choices
+    }
+
     fn foresee(&self, schema: &Schema, kept: &[usize], crs: &ResolvedCrs) -> Vec<Warning> {
         notes::foresee(self, schema, kept, crs)
+    }
+
+    fn keeps_lattice(&self) -> bool {
+        true
+    }
+
+    fn saved_bytes(&self) -> SavedBytes {
+        match self.encoding {
+            Encoding::Brotli { .. } => SavedBytes::Compressed,
+            Encoding::Default => SavedBytes::FixedRecords,
+        }
     }
 
     fn octree(&self) -> Option<&dyn OctreeOutput> {
@@ -114,7 +135,8 @@ impl OctreeOutput for Potree2Settings {
         to: &'a StagedDataset,
     ) -> Result<Box<dyn OctreeWriter + 'a>, ConvertError> {
         let schema = cloud.schema();
-        let choice = choose(&cloud.plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges);
+        let choice =
+            choose(&cloud.plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges, &cloud.facts.relations);
         if let Some(wide) = choice.kept.iter().map(|&i| &schema.attributes[i]).find(|a| a.elements > MAX_ELEMENTS) {
             let (kind, name, elements) = (self.kind(), wide.name.clone(), wide.elements);
             return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());
