@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn far_from_the_origin_nothing_jitters() {
-        let eye = [4.4e7, -5.2e7, 100.0];
+        let eye = [4.4e7 + 0.123, -5.2e7 - 0.457, 100.1];
         let (near, far) = (projection([0.0; 3]), projection(eye));
         let lattice = Lattice { scale: [0.001; 3], offset: eye };
         for stored in [[123.0, 4567.0, 89.0], [-2001.0, 10_000.0, 1.0]] {

@@ -71,6 +71,16 @@ mod tests {
     }
 
     #[test]
+    fn of_errors_at_the_same_time_the_lowest_is_given() {
+        let all_are_there = std::sync::Barrier::new(4);
+        let result = for_each(4, 4, |unit, (): &mut ()| {
+            all_are_there.wait();
+            Err::<(), _>(unit)
+        });
+        assert_eq!(result, Err(0));
+    }
+
+    #[test]
     fn the_lowest_error_is_given_whatever_the_threads_do() {
         for _ in 0..20 {
             let result = for_each(50, 4, |unit, (): &mut ()| if unit % 10 == 7 { Err(unit) } else { Ok(()) });

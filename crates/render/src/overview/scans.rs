@@ -22,7 +22,7 @@ pub(crate) fn of_scans(files: &[ScanFile], options: &OpenOptions, threads: usize
     let pieces = files.iter().map(|file| file.pieces).sum::<usize>();
     let (read, is_part) =
         if pieces >= MANY_PIECES && files.len() < UNITS { (UNITS.min(pieces), true) } else { (pieces, false) };
-    let expected = total * read as u64 / pieces.max(1) as u64;
+    let expected = total.saturating_mul(read as u64) / pieces.max(1) as u64;
     let step = usize::try_from(expected.div_ceil(WANTED as u64)).unwrap_or(usize::MAX).max(1);
     let units = units(files, is_part);
     let found: Mutex<Vec<(usize, Vec<[f64; 3]>)>> = Mutex::default();

@@ -103,6 +103,8 @@ mod tests {
         // all on one side: the left column and the middle one, seen from the right one
         let (rgb, _) = filled([n, n, None, n, n, None, n, n, None]);
         assert_eq!([rgb[2], rgb[5], rgb[8]], [BACKGROUND; 3]);
+        let (rgb, _) = filled([None, None, None, None, None, n, n, n, n]);
+        assert_eq!(rgb[4], BACKGROUND, "four, but none is opposite another");
         let (rgb, _) = filled([n, None, None, None, None, None, None, None, n]);
         assert_eq!(rgb[4], BACKGROUND, "two opposite ones are a pair, but too few");
     }
