@@ -16,7 +16,7 @@ const MOST_CELLS: usize = 500_000;
 const BITS: u32 = 21;
 
 /// What a level of detail shows of the whole cloud: the points of that level and all above it, in cells as large as the
-/// spacing of the level, rounded to a power of two of the scene's cube.
+/// spacing of the level or up to twice as large: a power of two of the scene's cube.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LevelError {
@@ -63,11 +63,26 @@ impl Reference {
     /// The errors of each level, whose points are `spacings` apart. Without levels the whole cloud is one.
     pub(crate) fn levels(&self, cloud: &Cloud, spacings: &[f64]) -> Vec<LevelError> {
         let drawn = curve(cloud, self.min, self.side);
-        (0..spacings.len()).map(|level| self.level(&drawn, level, spacings[level])).collect()
+        (0..spacings.len()).into_par_iter().map(|level| self.level(&drawn, level, spacings[level])).collect()
+    }
+
+    /// How far apart the points are, world units: the side of cells of which each that holds a point holds two on average, over
+    /// the root of two. Of a cloud of one place 0.
+    pub(crate) fn spacing(&self) -> f64 {
+        let codes = &self.curve.codes;
+        let occupied = |halvings: u32| {
+            let shift = 3 * (BITS - halvings);
+            1 + codes.par_windows(2).filter(|pair| pair[0] >> shift != pair[1] >> shift).count()
+        };
+        let is_fine = |halvings: &u32| codes.len() <= 2 * occupied(*halvings);
+        let finest = (0..=BITS).find(is_fine);
+        finest.map_or(0.0, |halvings| self.side / 2_f64.powi(halvings as i32) / 2_f64.sqrt())
     }
 
     fn level(&self, drawn: &Curve, level: usize, spacing: f64) -> LevelError {
-        let halvings = (self.side / spacing).log2().round().clamp(0.0, f64::from(BITS)) as u32;
+        // cells are no smaller than the spacing, or a sample that keeps it would have holes; the cube of a dataset may be a
+        // little larger than that of the points
+        let halvings = ((self.side / spacing).log2() + 0.05).floor().clamp(0.0, f64::from(BITS)) as u32;
         let shift = 3 * (BITS - halvings);
         let is_in = |i: usize| usize::from(drawn.level[i]) <= level;
         let mut sums = Sums::default();
@@ -223,6 +238,15 @@ mod tests {
         // averaged: the same level shows the means
         let averaged = row(|i| [if i % 2 == 0 { 105 } else { 110 }, 50, 50], |i| (i % 2) as u8);
         assert_eq!(reference.levels(&averaged, &[2.0])[0].delta_e, Some(0.0));
+    }
+
+    #[test]
+    fn the_spacing_is_that_of_the_points() {
+        let cloud = row(|_| [0; 3], |_| 0);
+        // two of eight points in each of four cells
+        assert_eq!(Reference::new(&cloud, &cloud.bounds()).spacing(), 2.0 / 2.0_f64.sqrt());
+        let one_place = Cloud { xyz: [vec![5.0; 9], vec![5.0; 9], vec![5.0; 9]], ..Cloud::default() };
+        assert_eq!(Reference::new(&one_place, &one_place.bounds()).spacing(), 0.0);
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::views::{Drawable, NamedView, draw_cloud, flight, image, views};
 use crate::{Axes, MeasureError, Setting, choice, sample};
 
 /// Pictures of a flight.
-const FRAMES: usize = 6;
+const FRAMES: usize = 4;
 
 /// A change of luma, 0 to 255, that is seen to pop.
 const POP: f64 = 24.0;
@@ -220,8 +220,10 @@ impl Work<'_> {
         scene.has_colours = !cloud.rgb.is_empty();
         scene.bounds = [bounds.min, bounds.max].concat().try_into().unwrap_or_default();
         let size = self.measurement.size;
+        let colours = Reference::new(&cloud, &bounds);
+        let spacing = colours.spacing();
         let drawn = |camera: &pointmill_render::Camera| {
-            if should_stop() { Err(MeasureError::Interrupted) } else { Ok(draw_cloud(&cloud, camera, size)?) }
+            if should_stop() { Err(MeasureError::Interrupted) } else { Ok(draw_cloud(&cloud, camera, size, spacing)?) }
         };
         let mut pictures = Vec::new();
         for view in views(&cloud, size) {
@@ -233,13 +235,7 @@ impl Work<'_> {
             let picture = drawn(&camera)?;
             frames.push((camera, picture));
         }
-        Ok(Truth {
-            sorted: Sorted::new(&cloud.xyz),
-            colours: Reference::new(&cloud, &bounds),
-            views: pictures,
-            flight: frames,
-            cloud,
-        })
+        Ok(Truth { sorted: Sorted::new(&cloud.xyz), colours, views: pictures, flight: frames, cloud })
     }
 
     /// Measures a setting. A conversion that fails is a row without figures.

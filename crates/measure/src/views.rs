@@ -6,7 +6,8 @@ use pointmill_format::batches::Batches;
 use pointmill_format::bintree::Bintree;
 use pointmill_format::{Aabb, DatasetKind, locate, open_octree};
 use pointmill_render::{
-    Camera, Canvas, Picture, RenderError, Size, Style, View, render_batches, render_bintree, render_octree,
+    Camera, Canvas, Picture, PointSize, RenderError, Shape, Size, Style, View, render_batches, render_bintree,
+    render_octree,
 };
 use rayon::prelude::*;
 
@@ -19,6 +20,9 @@ const BLOCK: usize = 8192;
 /// What is left out at each end of an axis when looking for the middle of a scene, as a share of the points: far outliers must
 /// not make a picture of nothing.
 const TAIL: f64 = 0.005;
+
+/// Diameter of discs that close a surface, in multiples of the mean distance between points.
+const OVERLAP: f32 = 2.0;
 
 /// A camera with a name.
 #[derive(Debug, Clone)]
@@ -80,9 +84,11 @@ fn nearest(cloud: &Cloud, place: [f64; 3]) -> [f64; 3] {
     first.map_or(place, |(_, i)| at(i))
 }
 
-/// The picture of all points, the best that there is: colours averaged, gaps filled.
-pub(crate) fn draw_cloud(cloud: &Cloud, camera: &Camera, size: Size) -> Result<Picture, RenderError> {
-    let style = Style { is_filled: true, ..Style::averaged() };
+/// The picture of all points, the best that there is: discs as large as the distance between points, colours averaged, gaps
+/// filled. `spacing`: that distance, world units.
+pub(crate) fn draw_cloud(cloud: &Cloud, camera: &Camera, size: Size, spacing: f64) -> Result<Picture, RenderError> {
+    let disc = PointSize::World(OVERLAP * spacing as f32);
+    let style = Style { is_filled: true, shape: Shape::Paraboloid, size: disc, ..Style::averaged() };
     let mut canvas = Canvas::new(size, camera, &style)?;
     let grey = [[160; 3]; BLOCK];
     loop {
