@@ -51,13 +51,34 @@ pub(crate) fn apply(args: Args, typed: &[OsString]) -> Result<Args, Failure> {
         print_line(&format!("profile {}: {options}; {}", profile.name(), chosen.why));
     }
     // behind the name of the command, before what was typed
-    let at = typed.iter().position(|word| word == "convert").map_or(typed.len(), |at| at + 1);
+    let at = typed.iter().skip(1).position(|word| word == "convert").map_or(typed.len(), |at| at + 2);
     let (before, after) = typed.split_at(at);
-    let all = before.iter().cloned().chain(chosen.options.into_iter().map(Into::into)).chain(after.iter().cloned());
+    let options = without_conflicts(chosen.options, convert);
+    let all = before.iter().cloned().chain(options.into_iter().map(Into::into)).chain(after.iter().cloned());
     let mut command = Args::command().mut_subcommand("convert", |convert| convert.args_override_self(true));
     let matches = command.try_get_matches_from_mut(all);
     let again = matches.and_then(|matches| Args::from_arg_matches(&matches));
     again.map_err(|error| Failure::Usage(mistake::line(&error, typed)))
+}
+
+/// The options of a profile, less those that cannot stand beside what was typed.
+fn without_conflicts(options: Vec<String>, typed: &ConvertArgs) -> Vec<String> {
+    let is_out = |option: &str| match option {
+        "--precision" => typed.scale.0.is_some(),
+        "--scale" => typed.precision.is_some(),
+        "--brotli-quality" => typed.encoding.is_some(),
+        _ => false,
+    };
+    let mut kept = Vec::new();
+    let mut rest = options.into_iter().peekable();
+    while let Some(option) = rest.next() {
+        let value = rest.next_if(|word| !word.starts_with("--"));
+        if !is_out(&option) {
+            kept.push(option);
+            kept.extend(value);
+        }
+    }
+    kept
 }
 
 fn choose(convert: &ConvertArgs, profile: ProfileArg) -> Result<Chosen, Failure> {
@@ -88,8 +109,11 @@ fn add(options: &mut Vec<String>, more: Vec<Vec<String>>) {
 
 fn read(path: &Path) -> Result<Value, Failure> {
     let fail = |what: &str| Failure::Usage(format!("{}: {what}; name a folder that `measure` made", path.display()));
-    let bytes = std::fs::metadata(path).map_err(|_| fail("no such file"))?.len();
-    if bytes > MAX_FILE_BYTES {
+    let meta = std::fs::metadata(path).map_err(|_| fail("no such file"))?;
+    if !meta.is_file() {
+        return Err(fail("no file"));
+    }
+    if meta.len() > MAX_FILE_BYTES {
         return Err(fail("too large for a measurement"));
     }
     let text = std::fs::read(path).map_err(|error| Failure::io(path, "reading", &error))?;
@@ -117,6 +141,9 @@ fn allowed(arguments: &[String], path: &Path) -> Result<Vec<Vec<String>>, Failur
         let values =
             values.ok_or_else(|| Failure::Usage(format!("{}: a profile may not set {option}", path.display())))?;
         let whole: Vec<String> = [option].into_iter().chain(rest.by_ref().take(values)).cloned().collect();
+        if whole.len() != 1 + values {
+            return Err(Failure::Usage(format!("{}: {option} of a profile has no value", path.display())));
+        }
         if option != "--to" {
             options.push(whole);
         }
@@ -187,6 +214,11 @@ mod tests {
         let line = format!("pointmill convert a.las -o out -q --measured {} --profile", dir.path().display());
         write(&["--to", "potree2", "--scale", "0.5"]);
         assert_eq!(applied(&format!("{line} fast")).unwrap().scale.0, Some(0.5));
+        write(&["--to", "potree2", "--precision", "1cm", "--encoding", "brotli", "--brotli-quality", "9"]);
+        let both = applied(&format!("{line} fast --scale 0.5 --encoding default")).unwrap();
+        assert!(both.scale.0 == Some(0.5) && both.precision.is_none() && both.brotli_quality.is_none());
+        write(&["--to", "potree2", "--scale"]);
+        assert!(applied(&format!("{line} fast")).unwrap_err().line().contains("has no value"));
         let missing = applied(&format!("{line} exact")).unwrap_err();
         assert!(missing.line().contains("no profile exact of potree2"), "{missing:?}");
         for evil in ["--overwrite", "--output", "-o", "--report"] {

@@ -73,6 +73,9 @@ def table(result):
              "picture error | SSIM | holes, % | pops, % |", "|---|---|---|---|---|---|---|---|---|---|"]
     million = result["scene"]["points"] / 1e6
     for row in result["rows"]:
+        if row["failed"]:
+            lines.append(f"| {row['name']} | {row['failed']} |" + " |" * 8)
+            continue
         cost, views = row["cost"], row["views"]
         cells = [
             f"**{row['name']}**" if row["is_on_front"] else row["name"],

@@ -48,6 +48,9 @@ pub(crate) fn run(args: &MeasureArgs) -> Result<(), Failure> {
     if !result.is_complete {
         return Err(Failure::Interrupted(kept_line(&folder, &result)));
     }
+    if let Some(failure) = all_failed(&result) {
+        return Err(failure);
+    }
     if args.json {
         emit(&to_json(&result)?)?;
     }
@@ -55,6 +58,23 @@ pub(crate) fn run(args: &MeasureArgs) -> Result<(), Failure> {
         measurement::summary(&result, &folder).iter().for_each(|line| print_line(line));
     }
     Ok(())
+}
+
+/// The first failure, if no setting has figures.
+fn all_failed(result: &Measured) -> Option<Failure> {
+    let reasons = result.rows.iter().map(|row| row.failed.as_deref());
+    let reasons: Vec<&str> = reasons.collect::<Option<_>>()?;
+    let first = reasons.first()?;
+    let code = first.strip_prefix("exit code ").and_then(|rest| rest.split(':').next());
+    let line = format!("no setting could be measured; the first: {first}");
+    Some(match code {
+        Some("2") => Failure::Usage(line),
+        Some("3") => Failure::Input(line),
+        Some("4") => Failure::Unsupported(line),
+        Some("5") => Failure::Io(line),
+        Some("6") => Failure::Memory(line),
+        _ => Failure::Internal(line),
+    })
 }
 
 /// This program: what is measured is what runs.
@@ -80,13 +100,25 @@ fn prepare(args: &MeasureArgs, inputs: &[PathBuf]) -> Result<PathBuf, Failure> {
     if folder.exists() && !folder.is_dir() {
         return Err(Failure::Usage(format!("{shown}: this is a file; name a folder")));
     }
-    if let Some(file) = report::FILES.iter().find(|file| folder.join(file).exists())
-        && !args.overwrite
-    {
-        return Err(Failure::Usage(format!("{shown}: {file} is there already; pass --overwrite to replace it")));
+    if let Some(file) = report::FILES.iter().find(|file| folder.join(file).symlink_metadata().is_ok()) {
+        if !args.overwrite {
+            return Err(Failure::Usage(format!("{shown}: {file} is there already; pass --overwrite to replace it")));
+        }
+        if !is_measurement(&folder) {
+            return Err(Failure::Usage(format!("{shown}: {file} is of no measurement; choose another folder")));
+        }
     }
     fs::create_dir_all(&folder).map_err(|error| Failure::io(&args.output, "making the folder", &error))?;
     Ok(folder)
+}
+
+/// True if the files that would be replaced are those of a measurement, known by its content.
+fn is_measurement(folder: &Path) -> bool {
+    let is_file = |file: &&str| folder.join(file).symlink_metadata().map_or(true, |meta| meta.is_file());
+    let text = fs::read(folder.join(report::FILES[0])).ok();
+    let result: Option<serde_json::Value> = text.and_then(|text| serde_json::from_slice(&text).ok());
+    report::FILES.iter().all(|file| is_file(&file))
+        && result.is_some_and(|result| result.get("rows").is_some() && result.get("profiles").is_some())
 }
 
 fn temporary(parent: &Path) -> Result<tempfile::TempDir, Failure> {
@@ -135,6 +167,7 @@ impl From<MeasureError> for Failure {
             MeasureError::Empty(_) => Self::Input(error.to_string()),
             MeasureError::TooMany { .. } => Self::Memory(format!("{error}; pass a smaller --sample")),
             MeasureError::Write { .. } => Self::Io(error.to_string()),
+            MeasureError::Render(_) => Self::Unsupported(error.to_string()),
             MeasureError::Sample(_) => Self::Input(error.to_string()),
             other => Self::Internal(other.to_string()),
         }

@@ -79,6 +79,22 @@ fn of_a_large_scene_whole_columns_are_measured() {
 }
 
 #[test]
+fn samples_of_scans_without_bounds_and_without_colours_are_measured() {
+    let dir = Dir::new();
+    let rows = (0..20_000).map(|i| format!("{} {} {}\n", i % 141, i / 141, f64::from(i % 9) * 0.5));
+    dir.write("in.xyz", rows.collect::<String>().as_bytes());
+    let result = measured(&dir, "in.xyz", &["--axes", "output=potree2+batches", "--sample", "5k"]);
+    let points = result["scene"]["points"].as_u64().unwrap();
+    assert!((4_000..=6_000).contains(&points), "{}", result["scene"]);
+    for row in result["rows"].as_array().unwrap() {
+        assert!(row["failed"].is_null() && row["levels"][0]["delta_e"].is_null(), "{row}");
+        // drawn alike: shaded by depth, whatever colours a renderer would take
+        assert!(row["views"][0]["error"]["psnr"].as_f64().is_none_or(|psnr| psnr > 15.0), "{row}");
+        assert_eq!(row["levels"].as_array().unwrap().last().unwrap()["points"], points);
+    }
+}
+
+#[test]
 fn scenes_of_one_point_are_measured_and_of_none_are_not() {
     let dir = Dir::new();
     dir.write("one.las", &Las::new(vec![Point::numbered(0, [5, 6, 7])]).bytes());
@@ -115,7 +131,9 @@ fn mistakes_are_one_line_before_anything_is_measured() {
     dir.run(["measure", "in.las", "-o", "in.las"]).failed_with(2, &["in.las"]);
     dir.write("taken/measure.json", b"{}");
     dir.run(["measure", "in.las", "-o", "taken"]).failed_with(2, &["measure.json", "--overwrite"]);
+    dir.run(["measure", "in.las", "-o", "taken", "--overwrite"]).failed_with(2, &["of no measurement"]);
     assert_eq!(fs::read(dir.path("taken/measure.json")).unwrap(), b"{}");
+    dir.run(["measure", "in.las", "-o", "failed", "--axes", "attributes=rainbow"]).failed_with(2, &["rainbow"]);
     dir.run(["convert", "in.las", "-o", "x", "--measured", "out"]).failed_with(2, &["--measured requires --profile"]);
 }
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use pointmill_testkit::las::Las;
+use pointmill_testkit::las::{Las, Point};
 use serde_json::Value;
 
 use crate::support::Dir;
@@ -161,4 +161,16 @@ fn a_dry_run_tells_the_step_and_why() {
     let told = dir.succeed(args).stdout();
     assert!(told.contains("0.02") && told.contains("20 times coarser"), "{told}");
     assert!(fs::metadata(dir.path("out")).is_err());
+}
+
+/// With few steps the cube reaches far beyond the points, and the doubles there are coarser than those of the points.
+#[test]
+fn a_lattice_that_was_chosen_for_the_precision_is_never_refused() {
+    let dir = Dir::new();
+    let points = (0..3000).map(|i| Point::numbered(i, [i as i32 * 16, i as i32 * 7919 % 50_000, i as i32 % 10_000]));
+    dir.write("in.las", &Las { scale: [0.001; 3], ..Las::new(points.collect()) }.bytes());
+    for precision in ["0.1", "0.3", "3", "7"] {
+        dir.succeed(["convert", "in.las", "-o", "out", "--overwrite", "--precision", precision]);
+        dir.validate("out", &["in.las"]);
+    }
 }

@@ -388,10 +388,7 @@ impl fmt::Display for Unsupported {
             }
             Self::Imprecise { kind, axis, error, allowed } => {
                 let axis = ['x', 'y', 'z'][*axis];
-                write!(
-                    f,
-                    "{kind}: {axis} would be off by up to {error:.3e}; the requested precision allows {allowed:.3e}"
-                )
+                write!(f, "{kind}: {axis} would be off by up to {error}; the requested precision allows {allowed}")
             }
             Self::Export { format, what } => write!(f, "{format}: {what}"),
             Self::Format { kind, what } => write!(f, "{kind}: {what}"),

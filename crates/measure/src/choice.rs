@@ -6,12 +6,18 @@ use crate::result::{Profile, Row};
 const NOISE: f64 = 0.03;
 
 /// What is to be small.
-fn objectives(row: &Row) -> Option<[f64; 4]> {
+///
+/// `rounding`: errors of positions below that are those of doubles, and none.
+fn objectives(row: &Row, rounding: f64) -> Option<[f64; 4]> {
+    if row.failed.is_some() {
+        return None;
+    }
+    let position = row.position_error()?;
     Some([
         row.seconds_per_million()?,
         row.bytes_per_point()?,
-        row.position_error()?,
-        row.picture_error().or_else(|| row.colour_error()).unwrap_or(0.0),
+        if position > rounding { position } else { 0.0 },
+        row.picture_error()?,
     ])
 }
 
@@ -27,15 +33,15 @@ fn dominates(a: [f64; 4], b: [f64; 4]) -> bool {
 }
 
 /// Marks the rows that no other dominates: in time, bytes, error of positions and error of pictures.
-pub(crate) fn mark_front(rows: &mut [Row]) {
-    let figures: Vec<_> = rows.iter().map(objectives).collect();
+pub(crate) fn mark_front(rows: &mut [Row], rounding: f64) {
+    let figures: Vec<_> = rows.iter().map(|row| objectives(row, rounding)).collect();
     for (row, mine) in rows.iter_mut().zip(&figures) {
         row.is_on_front = mine.is_some_and(|mine| !figures.iter().flatten().any(|other| dominates(*other, mine)));
     }
 }
 
 /// The settings of the profiles, by output.
-pub(crate) fn profiles(rows: &[Row]) -> Vec<Profile> {
+pub(crate) fn profiles(rows: &[Row], rounding: f64) -> Vec<Profile> {
     let mut outputs: Vec<&str> = Vec::new();
     for row in rows {
         if !outputs.contains(&row.output.as_str()) {
@@ -45,7 +51,7 @@ pub(crate) fn profiles(rows: &[Row]) -> Vec<Profile> {
     let mut profiles = Vec::new();
     for output in outputs {
         let of_it = rows.iter().filter(|row| row.output == output);
-        let measured: Vec<(&Row, [f64; 4])> = of_it.filter_map(|row| Some((row, objectives(row)?))).collect();
+        let measured: Vec<(&Row, [f64; 4])> = of_it.filter_map(|row| Some((row, objectives(row, rounding)?))).collect();
         for (name, order) in [("fast", &[0, 1, 3, 2]), ("exact", &[2, 3, 1, 0])] as [(_, &[usize; 4]); 2] {
             profiles.extend(first_by(&measured, order).map(|row| profile(name, row, &measured)));
         }
@@ -82,7 +88,7 @@ fn balanced<'a>(measured: &[(&'a Row, [f64; 4])]) -> Option<&'a Row> {
 
 fn profile(name: &'static str, row: &Row, measured: &[(&Row, [f64; 4])]) -> Profile {
     let least = |figure: usize| measured.iter().map(|(_, f)| f[figure]).fold(f64::INFINITY, f64::min);
-    let mine = objectives(row).unwrap_or_default();
+    let mine = measured.iter().find(|(other, _)| std::ptr::eq(*other, row)).map_or([0.0; 4], |(_, figures)| *figures);
     let times = |figure: usize| mine[figure] / least(figure).max(f64::MIN_POSITIVE);
     let why = format!(
         "{:.3} s of processor time per million points ({:.2} times the least of this output), {:.2} bytes per point \
@@ -127,7 +133,7 @@ mod tests {
         vec![
             row("quick", 1.0, 30.0, 0.0, 9.0),
             row("quick again", 1.01, 30.0, 0.0, 9.0),
-            row("small", 4.0, 10.0, 0.0, 6.0),
+            row("small", 4.0, 10.0, 1e-10, 6.0),
             row("middle", 1.5, 12.0, 0.0, 6.1),
             row("rough", 1.2, 9.0, 0.01, 6.0),
             row("worse", 5.0, 31.0, 0.02, 9.5),
@@ -138,7 +144,7 @@ mod tests {
     #[test]
     fn the_front_has_what_nothing_beats() {
         let mut rows = rows();
-        mark_front(&mut rows);
+        mark_front(&mut rows, 1e-9);
         let front: Vec<&str> = rows.iter().filter(|row| row.is_on_front).map(|row| row.name.as_str()).collect();
         // "quick again" is within the noise of "quick"
         assert_eq!(front, ["quick", "quick again", "small", "middle", "rough"]);
@@ -146,10 +152,10 @@ mod tests {
 
     #[test]
     fn profiles_are_the_ends_and_the_middle() {
-        let profiles = profiles(&rows());
+        let profiles = profiles(&rows(), 1e-9);
         let of = |name: &str| profiles.iter().find(|p| p.name == name).unwrap().setting.clone();
         assert_eq!((of("fast"), of("exact"), of("balanced")), ("quick".into(), "small".into(), "middle".into()));
         assert!(profiles[0].why.contains("1.000 s of processor time"), "{}", profiles[0].why);
-        assert_eq!(super::profiles(&[]).len(), 0);
+        assert_eq!(super::profiles(&[], 0.0).len(), 0);
     }
 }

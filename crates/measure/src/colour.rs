@@ -85,7 +85,7 @@ impl Reference {
         let halvings = ((self.side / spacing).log2() + 0.05).floor().clamp(0.0, f64::from(BITS)) as u32;
         let shift = 3 * (BITS - halvings);
         let is_in = |i: usize| usize::from(drawn.level[i]) <= level;
-        let mut sums = Sums::default();
+        let mut sums = Sums { points: (0..drawn.codes.len()).filter(|i| is_in(*i)).count() as u64, ..Sums::default() };
         let (mut all, mut at) = (Cells { codes: &self.curve.codes, shift, next: 0 }, 0);
         let mut pairs = Vec::new();
         while let Some((cell, range)) = all.next() {
@@ -96,11 +96,10 @@ impl Reference {
             while at < drawn.codes.len() && drawn.codes[at] >> shift == cell {
                 at += 1;
             }
-            let points = (begin..at).filter(|i| is_in(*i)).count() as u64;
+            let has_points = (begin..at).any(is_in);
             sums.cells += 1;
-            sums.covered += u64::from(points > 0);
-            sums.points += points;
-            if points > 0 && !self.curve.rgb.is_empty() && !drawn.rgb.is_empty() {
+            sums.covered += u64::from(has_points);
+            if has_points && !self.curve.rgb.is_empty() && !drawn.rgb.is_empty() {
                 pairs.push((range, begin..at));
             }
         }

@@ -34,12 +34,14 @@ struct Part {
     scratch: BatchScratch,
     cloud: Cloud,
     channels: Vec<[u16; 3]>,
+    /// Some points have colours.
+    is_coloured: bool,
 }
 
 impl Part {
     /// Takes the points that were read last.
     fn take(&mut self, level: u8, has_colours: bool) {
-        let Self { points, cloud, channels, .. } = self;
+        let Self { points, cloud, channels, is_coloured, .. } = self;
         for world in (0..points.len()).filter_map(|i| points.world(i)) {
             for (all, value) in cloud.xyz.iter_mut().zip(world) {
                 all.push(value);
@@ -47,6 +49,7 @@ impl Part {
         }
         cloud.level.resize(cloud.len(), level);
         if has_colours {
+            *is_coloured |= points.names().any(|name| name == "rgb");
             if let Some(deep) = points.column::<u16>("rgb") {
                 channels.extend(deep.chunks_exact(3).map(|c| [c[0], c[1], c[2]]));
             } else if let Some(shallow) = points.column::<u8>("rgb") {
@@ -60,9 +63,10 @@ impl Part {
 /// Puts the parts together.
 fn joined(parts: Vec<Part>, spacings: Vec<f64>) -> Decoded {
     let is_deep = parts.iter().flat_map(|part| &part.channels).flatten().any(|channel| *channel > 255);
+    let is_coloured = parts.iter().any(|part| part.is_coloured);
     let mut cloud = Cloud::default();
     for mut part in parts {
-        if part.cloud.rgb.is_empty() {
+        if part.cloud.rgb.is_empty() && is_coloured {
             part.cloud.rgb = narrowed(&part.channels, is_deep);
         }
         cloud.append(part.cloud);

@@ -19,7 +19,7 @@ pub enum MeasureError {
     #[error(transparent)]
     Render(#[from] pointmill_render::RenderError),
     /// There is nothing to measure.
-    #[error("no point in {0} inputs: there is nothing to measure")]
+    #[error("no point in the inputs ({0} of them): there is nothing to measure")]
     Empty(usize),
     /// More points than memory; a sample of the scene has fewer.
     #[error("{points} points with a sample of {sample} need {needed} of memory, of {available} that there are")]

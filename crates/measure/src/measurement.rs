@@ -17,7 +17,7 @@ use crate::position::Sorted;
 use crate::program::{Program, Run, bytes_of};
 use crate::result::{Cost, Measured, Phase, Row, Scene, ViewError};
 use crate::trades::trades;
-use crate::views::{Drawable, NamedView, draw_cloud, flight, image, views};
+use crate::views::{Drawable, NamedView, depth_range, draw_cloud, flight, image, shade_by_depth, views};
 use crate::{Axes, MeasureError, Setting, choice, sample};
 
 /// Pictures of a flight.
@@ -130,8 +130,9 @@ impl Measurement {
             }
             result.is_complete = result.rows.len() == settings.len();
             result.seconds = start.elapsed().as_secs_f64();
-            choice::mark_front(&mut result.rows);
-            result.profiles = choice::profiles(&result.rows);
+            let rounding = rounding(&result.scene.bounds);
+            choice::mark_front(&mut result.rows, rounding);
+            result.profiles = choice::profiles(&result.rows, rounding);
             result.trades = trades(&result.rows);
             watch.measured(&result, &pictures);
         }
@@ -159,6 +160,11 @@ impl Measurement {
 fn exact_pictures(truth: &Truth) -> Vec<Shown> {
     let of = |(view, picture): &(NamedView, Picture)| shown(view.name, "", picture);
     truth.views.iter().filter_map(of).collect()
+}
+
+/// What a few operations of doubles are off by at the farthest coordinate.
+fn rounding(bounds: &[f64; 6]) -> f64 {
+    16.0 * f64::EPSILON * bounds.iter().fold(0.0, |most: f64, v| most.max(v.abs()))
 }
 
 /// Nothing if the picture is too large for a JPEG.
@@ -211,7 +217,10 @@ impl Work<'_> {
         let scans = cloud::open(&self.inputs)?;
         let declared: u64 = scans.iter().map(|scan| scan.info().points_declared).sum();
         check_memory(declared, scene, self.measurement)?;
-        let cloud = cloud::read(&scans, should_stop)?;
+        let mut cloud = cloud::read(&scans, should_stop)?;
+        if cloud.rgb.iter().all(|rgb| *rgb == [0; 3]) {
+            cloud.rgb.clear(); // black is no colour to compare
+        }
         if cloud.len() == 0 {
             return Err(MeasureError::Empty(self.inputs.len()));
         }
@@ -328,8 +337,15 @@ impl Work<'_> {
         let Measurement { size, budget, .. } = self.measurement;
         let drawable = Drawable::open(dataset)?;
         let style = Style::default();
+        let draw = |camera: &pointmill_render::Camera, exact: &Picture| {
+            let mut picture = drawable.draw(camera, *size, &style, *budget)?;
+            if truth.cloud.rgb.is_empty() {
+                shade_by_depth(&mut picture, depth_range(exact));
+            }
+            Ok::<_, pointmill_render::RenderError>(picture)
+        };
         for (view, exact) in &truth.views {
-            let picture = drawable.draw(&view.camera, *size, &style, *budget)?;
+            let picture = draw(&view.camera, exact)?;
             let error = compare(image(&picture), image(exact));
             row.views.push(ViewError { view: view.name, error, points: picture.drawn.points });
             pictures.extend(shown(view.name, &row.name, &picture));
@@ -337,7 +353,7 @@ impl Work<'_> {
         let mut pops = Vec::new();
         let mut before: Option<(Picture, &Picture)> = None;
         for (camera, exact) in &truth.flight {
-            let picture = drawable.draw(camera, *size, &style, *budget)?;
+            let picture = draw(camera, exact)?;
             if let Some((last, last_exact)) = &before {
                 pops.push(popping([image(last), image(last_exact)], [image(&picture), image(exact)], POP));
             }

@@ -37,12 +37,15 @@ pub(crate) fn choose(
 ) -> Result<Sample, MeasureError> {
     let share = wanted as f64 / points.max(1) as f64;
     let side = (COLUMNS / share).sqrt().ceil().clamp(2.0, MOST_PER_SIDE) as usize;
-    let mut grid = Grid { bounds: declared_bounds(scans).unwrap_or(Aabb::EMPTY), side };
-    let mut counts = count(scans, &grid, should_stop)?;
-    // headers that are wrong, or say nothing
-    if counts.iter().sum::<u64>() < points / 2 {
+    let declared = declared_bounds(scans);
+    let is_known = declared.is_some();
+    let bounds = declared.map_or_else(|| measured_bounds(scans, should_stop), Ok)?;
+    let mut grid = Grid { bounds, side };
+    let (mut counts, outside) = count(scans, &grid, should_stop)?;
+    // headers that are wrong
+    if outside > 0 && is_known {
         grid.bounds = measured_bounds(scans, should_stop)?;
-        counts = count(scans, &grid, should_stop)?;
+        counts = count(scans, &grid, should_stop)?.0;
     }
     let chosen = spread(&counts, &grid.along_the_curve(), wanted);
     Ok(Sample {
@@ -73,19 +76,21 @@ fn spread(counts: &[u64], order: &[usize], wanted: u64) -> Vec<usize> {
     chosen
 }
 
-/// Points of each column.
+/// Points of each column, and points in none.
 fn count(
     scans: &[Box<dyn Scan>],
     grid: &Grid,
     should_stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<u64>, MeasureError> {
+) -> Result<(Vec<u64>, u64), MeasureError> {
+    let outside = AtomicU64::new(0);
     let counts: Vec<AtomicU64> = (0..grid.side * grid.side).map(|_| AtomicU64::new(0)).collect();
     visit_batches(scans, should_stop, &|positions| {
-        for column in positions.iter().filter_map(|position| grid.column(*position)) {
-            counts[column].fetch_add(1, Ordering::Relaxed);
+        for position in positions {
+            let counter = grid.column(*position).map_or(&outside, |column| &counts[column]);
+            counter.fetch_add(1, Ordering::Relaxed);
         }
     })?;
-    Ok(counts.into_iter().map(AtomicU64::into_inner).collect())
+    Ok((counts.into_iter().map(AtomicU64::into_inner).collect(), outside.into_inner()))
 }
 
 /// A grid of columns over the ground.
@@ -95,13 +100,17 @@ struct Grid {
 }
 
 impl Grid {
-    fn column(&self, [x, y, _]: [f64; 3]) -> Option<usize> {
+    fn column(&self, place: [f64; 3]) -> Option<usize> {
+        if !self.bounds.contains(place) {
+            return None;
+        }
+        let [x, y, _] = place;
         let along = |value: f64, a: usize| {
             let extent = self.bounds.max[a] - self.bounds.min[a];
             let share = if extent > 0.0 { (value - self.bounds.min[a]) / extent } else { 0.0 };
-            (share >= 0.0 && share <= 1.0).then(|| ((share * self.side as f64) as usize).min(self.side - 1))
+            ((share * self.side as f64) as usize).min(self.side - 1)
         };
-        Some(along(y, 1)? * self.side + along(x, 0)?)
+        Some(along(y, 1) * self.side + along(x, 0))
     }
 
     fn column_box(&self, column: usize) -> Aabb {
@@ -211,6 +220,8 @@ mod tests {
         }
         assert_eq!(grid.column(bounds.max), Some(48));
         assert_eq!(grid.column([0.0; 3]), None);
+        assert_eq!(grid.column([500_500.0, -1.0, 7.1]), None, "above");
+        assert_eq!(Grid { bounds: Aabb::EMPTY, side: 7 }.column([0.0; 3]), None);
         let flat = Grid { bounds: Aabb { min: [1.0; 3], max: [1.0; 3] }, side: 2 };
         assert_eq!(flat.column([1.0; 3]), Some(0));
     }

@@ -9,7 +9,7 @@ pub(crate) fn trades(rows: &[Row]) -> Vec<Trade> {
     let mut outputs: Vec<&str> = rows.iter().map(|row| row.output.as_str()).collect();
     outputs.dedup();
     for output in outputs {
-        let rows: Vec<&Row> = rows.iter().filter(|row| row.output == output && row.cost.is_some()).collect();
+        let rows: Vec<&Row> = rows.iter().filter(|row| row.output == output && row.failed.is_none()).collect();
         for axis in Axis::ALL.into_iter().filter(|axis| *axis != Axis::Output) {
             let mut values: Vec<&String> = rows.iter().filter_map(|row| row.values.get(axis.name())).collect();
             let mut seen = std::collections::HashSet::new();

@@ -99,8 +99,28 @@ pub(crate) fn draw_cloud(cloud: &Cloud, camera: &Camera, size: Size, spacing: f6
             canvas.add(&positions, colours);
         });
         if !canvas.next_pass() {
-            return Ok(canvas.finish());
+            let mut picture = canvas.finish();
+            if cloud.rgb.is_empty() {
+                let range = depth_range(&picture);
+                shade_by_depth(&mut picture, range);
+            }
+            return Ok(picture);
         }
+    }
+}
+
+/// The least and the greatest depth of a picture that shows something.
+pub(crate) fn depth_range(picture: &Picture) -> (f32, f32) {
+    let shown = picture.depth.iter().filter(|depth| depth.is_finite());
+    shown.fold((f32::INFINITY, 0.0), |(least, most), depth| (least.min(*depth), most.max(*depth)))
+}
+
+/// Colours of scenes that have none: from white at the least depth to dark grey at the greatest, whatever a renderer would
+/// take instead (intensity, height), so that pictures of all datasets compare.
+pub(crate) fn shade_by_depth(picture: &mut Picture, (least, most): (f32, f32)) {
+    for (rgb, depth) in picture.rgb.iter_mut().zip(&picture.depth).filter(|(_, depth)| depth.is_finite()) {
+        let share = if most > least { (depth - least) / (most - least) } else { 0.0 };
+        *rgb = [(255.0 - 200.0 * share.clamp(0.0, 1.0)) as u8; 3];
     }
 }
 

@@ -132,9 +132,12 @@ fn rounding(cloud: &Cloud<'_>) -> [f64; 3] {
         let own = cloud.sources.all.iter().filter_map(move |s| s.stored.lattice.map(|l| l.offset[a]));
         own.chain([lattice.offset[a]]).fold(0.0, |most: f64, offset| most.max(offset.abs()))
     };
+    // octrees count from the corner of their cube, which may be far from the points where their steps are few
+    let cube = &cloud.frame.cube;
+    let corner = cube.offset(lattice);
     std::array::from_fn(|a| {
         let world = |q: i64| (q as f64 * lattice.scale[a]).abs() + lattice.offset[a].abs();
-        let largest = world(bounds.min[a]).max(world(bounds.max[a])).max(offsets(a));
+        let largest = world(bounds.min[a]).max(world(bounds.max[a])).max(offsets(a)).max(corner[a].abs() + cube.side);
         ROUNDINGS * f64::EPSILON / 2.0 * largest
     })
 }
