@@ -117,7 +117,7 @@ fn is_measurement(folder: &Path) -> bool {
     let is_file = |file: &&str| folder.join(file).symlink_metadata().map_or(true, |meta| meta.is_file());
     let text = fs::read(folder.join(report::FILES[0])).ok();
     let result: Option<serde_json::Value> = text.and_then(|text| serde_json::from_slice(&text).ok());
-    report::FILES.iter().all(|file| is_file(&file))
+    report::FILES.iter().all(is_file)
         && result.is_some_and(|result| result.get("rows").is_some() && result.get("profiles").is_some())
 }
 

@@ -86,9 +86,9 @@ impl Reference {
         let shift = 3 * (BITS - halvings);
         let is_in = |i: usize| usize::from(drawn.level[i]) <= level;
         let mut sums = Sums { points: (0..drawn.codes.len()).filter(|i| is_in(*i)).count() as u64, ..Sums::default() };
-        let (mut all, mut at) = (Cells { codes: &self.curve.codes, shift, next: 0 }, 0);
+        let mut at = 0;
         let mut pairs = Vec::new();
-        while let Some((cell, range)) = all.next() {
+        for (cell, range) in (Cells { codes: &self.curve.codes, shift, next: 0 }) {
             while at < drawn.codes.len() && drawn.codes[at] >> shift < cell {
                 at += 1;
             }

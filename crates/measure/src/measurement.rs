@@ -313,16 +313,18 @@ impl Work<'_> {
                 self.program.run([OsString::from("validate"), "--json".into(), dataset.as_os_str().to_owned()])?;
             row.sampling = run.json.get("quality").and_then(Value::as_array).cloned().unwrap_or_default();
         }
-        let fail = |row: &mut Row, error: String| row.failed = Some(error);
         match decoded::read(dataset, !truth.cloud.rgb.is_empty()) {
             Ok(Decoded { cloud, spacings }) => {
                 row.position = truth.sorted.errors(&cloud.xyz);
                 row.levels = truth.colours.levels(&cloud, &spacings);
             }
-            Err(error) => return Ok(fail(row, error.to_string())),
+            Err(error) => {
+                row.failed = Some(error.to_string());
+                return Ok(());
+            }
         }
         if let Err(error) = self.draw(row, dataset, truth, pictures) {
-            fail(row, error.to_string());
+            row.failed = Some(error.to_string());
         }
         Ok(())
     }

@@ -127,16 +127,16 @@ pub(crate) fn shade_by_depth(picture: &mut Picture, (least, most): (f32, f32)) {
 /// A dataset that stays open for several pictures.
 pub(crate) enum Drawable {
     Octree(Box<dyn pointmill_format::octree::Octree>),
-    Bintree(Bintree),
-    Batches(Batches<pointmill_format::batches::MappedFile>),
+    Bintree(Box<Bintree>),
+    Batches(Box<Batches<pointmill_format::batches::MappedFile>>),
 }
 
 impl Drawable {
     pub(crate) fn open(path: &Path) -> Result<Self, RenderError> {
         let located = locate(path)?;
         Ok(match located.kind {
-            DatasetKind::Bintree => Self::Bintree(Bintree::open(path)?),
-            DatasetKind::Batches => Self::Batches(Batches::map(located.marker_path())?),
+            DatasetKind::Bintree => Self::Bintree(Box::new(Bintree::open(path)?)),
+            DatasetKind::Batches => Self::Batches(Box::new(Batches::map(located.marker_path())?)),
             _ => Self::Octree(open_octree(path)?),
         })
     }
@@ -147,7 +147,7 @@ impl Drawable {
         match self {
             Self::Octree(octree) => render_octree(&**octree, camera, size, style, budget, threads),
             Self::Bintree(tree) => render_bintree(tree, camera, size, style, budget, threads),
-            Self::Batches(batches) => render_batches(batches, camera, size, style, budget, threads),
+            Self::Batches(batches) => render_batches(&**batches, camera, size, style, budget, threads),
         }
     }
 }
