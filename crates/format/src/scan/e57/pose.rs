@@ -192,7 +192,7 @@ mod tests {
         // docs/design/numerics.md, §2.4; the decimals here are doubles too, off by half a last place
         let u = f64::EPSILON / 2.0;
         for (found, meant) in found.into_iter().zip([5_000_600.000_6, -4_999_199.999_2, 1_000_000.001]) {
-            let bound = 24.0 * u * p.iter().sum::<f64>() + 2.0 * u * meant.abs();
+            let bound = 24.0 * u * p.iter().sum::<f64>() + 2.0 * u * f64::abs(meant);
             assert!((found - meant).abs() <= bound, "{found} {meant} {bound}");
         }
     }
