@@ -172,6 +172,31 @@ mod tests {
         assert_eq!(change.iter().sum::<f64>(), 0.0);
     }
 
+    #[test]
+    fn offsets_count_in_every_way_to_map() {
+        let exact = AxisMap::new(0.5, 10.0, 0.5, 2.0);
+        assert!(matches!(exact, AxisMap::Exact { mul: 1, add: 16, .. }), "{exact:?}");
+        assert_eq!(mapped(&exact, &[-3, 5]).0, [13, 21]);
+        let ratio = AxisMap::new(0.3, 1.2, 0.5, 0.2);
+        assert!(matches!(ratio, AxisMap::Ratio { mul: 3, add: 10, div: 5, .. }), "{ratio:?}");
+        assert_eq!(mapped(&ratio, &[0, 1, 5, -4]).0, [2, 3, 5, 0], "2, 2.6, 5 and -0.4");
+        let rounded = AxisMap::new(1.0 / 3.0, 10.0, 1.0, 0.0);
+        assert!(matches!(rounded, AxisMap::Rounded { .. }), "{rounded:?}");
+        assert_eq!(mapped(&rounded, &[0, 2, -4]).0, [10, 11, 9], "10, 10.67 and 8.67");
+    }
+
+    #[test]
+    fn ratios_are_of_integers_below_2_to_the_30() {
+        let grid = |step: f64| AxisGrid { step, offset: 0.0 };
+        let most = 2f64.powi(30);
+        assert!(
+            AxisMap::ratio(grid(most - 1.0), grid(2.0)).is_some() && AxisMap::ratio(grid(most), grid(3.0)).is_none()
+        );
+        assert!(
+            AxisMap::ratio(grid(2.0), grid(most - 1.0)).is_some() && AxisMap::ratio(grid(3.0), grid(most)).is_none()
+        );
+    }
+
     trait InSteps {
         fn map_in_steps(&self, step: f64) -> Vec<i64>;
     }
