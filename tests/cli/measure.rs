@@ -52,7 +52,7 @@ fn every_setting_has_a_row_with_its_figures_and_each_profile_converts() {
         assert_eq!(row(name)["is_shaded_by_depth"], is_by_depth, "{name}");
     }
     let by_depth = row("bintree")["views"].as_array().unwrap();
-    // of colours against heights it would be 10 dB; null is no difference
+    // null is no difference
     assert!(by_depth.iter().all(|v| v["error"]["psnr"].as_f64().is_none_or(|psnr| psnr > 15.0)), "{by_depth:?}");
     let deltas = row("potree2")["levels"].as_array().unwrap();
     assert_eq!(deltas.last().unwrap()["delta_e"], 0.0, "all points of all levels are the cloud");
