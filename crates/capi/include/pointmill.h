@@ -25,12 +25,6 @@
 #include <stdint.h>
 
 /*
- The interface that this header describes: 1000 · major + minor. Another major number is another interface; a greater
- minor one has more functions and the same structures. pm_open() refuses what does not fit.
- */
-#define PM_API_VERSION 1000
-
-/*
  No node: the parent of a root.
  */
 #define PM_NO_NODE UINT32_MAX
@@ -54,6 +48,12 @@
  Most vertices of a mesh whose indices have 16 bits, as engines count: what a window of pm_points_positions() may have.
  */
 #define PM_MESH_VERTICES 65000
+
+/*
+ The interface that this header describes: 1000 · major + minor. Another major number is another interface; a greater
+ minor one has more functions and the same structures. pm_open() refuses what does not fit.
+ */
+#define PM_API_VERSION 1000
 
 /*
  How a call ended. 0 is success; pm_last_error() then says nothing. Values 1 to 6 are the exit codes of the program.

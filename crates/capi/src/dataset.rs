@@ -10,12 +10,11 @@ use pointmill_format::bintree::{Bintree, Picker};
 use pointmill_format::octree::Octree as _;
 use pointmill_format::{DatasetKind, ReadError, copc, locate, potree1, potree2};
 
-use crate::PM_API_VERSION;
 use crate::about::{About, Colours};
 use crate::axes::PmAxes;
 use crate::border::text;
 use crate::octree::Tree;
-use crate::status::{Fault, Outcome, PmStatus, guard};
+use crate::status::{Fault, Outcome, PM_API_VERSION, PmStatus, guard};
 
 /// A dataset that is open. Calls may use it from several threads at once; pm_close() must be the last one.
 pub struct PmDataset {

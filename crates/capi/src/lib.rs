@@ -45,8 +45,4 @@ pub use points::{
 };
 pub use sections::{PmBatchRecord, PmSection, pm_batch_section, pm_section};
 pub use select::{PmDraw, PmMaterial, PmOrder, PmSelection, pm_material, pm_select, pm_switch_distance};
-pub use status::{PmStatus, pm_last_error};
-
-/// The interface that this header describes: 1000 · major + minor. Another major number is another interface; a greater
-/// minor one has more functions and the same structures. pm_open() refuses what does not fit.
-pub const PM_API_VERSION: u32 = 1000;
+pub use status::{PM_API_VERSION, PmStatus, pm_last_error};

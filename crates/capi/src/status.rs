@@ -1,4 +1,4 @@
-//! How calls end: a status, and a line of text for each thread.
+//! Which interface this is, and how its calls end: a status, and a line of text for each thread.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -6,6 +6,10 @@ use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use pointmill_format::{Advice, ErrorKind, ReadError};
+
+/// The interface that this header describes: 1000 · major + minor. Another major number is another interface; a greater
+/// minor one has more functions and the same structures. pm_open() refuses what does not fit.
+pub const PM_API_VERSION: u32 = 1000;
 
 /// How a call ended. 0 is success; pm_last_error() then says nothing. Values 1 to 6 are the exit codes of the program.
 #[repr(u32)]

@@ -1,7 +1,8 @@
-//! Programs in C that are compiled against the committed header and linked with the built library: what they read is what
-//! the Rust crates say, mistakes end in errors, and valgrind finds neither errors nor leaks.
+//! Programs in C and C# that call the built library: what they read is what the Rust crates say, mistakes end in errors, and
+//! valgrind finds neither errors nor leaks. C is compiled against the committed header.
 
 mod compiler;
+mod csharp;
 mod dataset;
 mod expected;
 
@@ -42,14 +43,13 @@ fn is_same(found: &str, expected: &str) -> bool {
     found.clone().count() == expected.clone().count() && found.zip(expected).all(same)
 }
 
-#[test]
-fn a_c_program_reads_what_the_rust_crates_read() {
-    let Some(walk) = compile("walk", Linked::Dynamically) else { return };
+/// Runs a program that walks a dataset, PATH and AXES behind its arguments, on all of them: it prints what is expected.
+fn compare(program: impl Fn() -> Command) {
     for (i, name) in DATASETS.iter().enumerate() {
         // one form of axes each, all of two
         for axes in (0..3u32).filter(|axes| i % 6 == 0 || *axes as usize == i % 3) {
             let path = fixture(name);
-            let found = text(&Command::new(&walk).arg(&path).arg(axes.to_string()).output().unwrap());
+            let found = text(&program().arg(&path).arg(axes.to_string()).output().unwrap());
             let expected = expected(&path, axes);
             let found: Vec<&str> = found.lines().collect();
             for (found, expected) in found.iter().zip(&expected) {
@@ -58,6 +58,12 @@ fn a_c_program_reads_what_the_rust_crates_read() {
             assert_eq!(found.len(), expected.len(), "{name}, axes {axes}");
         }
     }
+}
+
+#[test]
+fn a_c_program_reads_what_the_rust_crates_read() {
+    let Some(walk) = compile("walk", Linked::Dynamically) else { return };
+    compare(|| Command::new(&walk));
 }
 
 #[test]
