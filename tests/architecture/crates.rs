@@ -16,6 +16,7 @@ const ALLOWED: [(&str, &[&str]); 9] = [
             "pointmill-measure",
             "pointmill-render",
             "pointmill-validate",
+            "pointmill-view",
             "pointmill-testkit",
         ],
     ),
@@ -25,6 +26,7 @@ const ALLOWED: [(&str, &[&str]); 9] = [
     ("pointmill-measure", &["pointmill-format", "pointmill-render", "pointmill-testkit"]),
     ("pointmill-render", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-validate", &["pointmill-format", "pointmill-testkit"]),
+    ("pointmill-view", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-format", &["pointmill-testkit"]),
     ("pointmill-testkit", &["pointmill-format"]),
 ];

@@ -95,6 +95,7 @@ const LAYERS: [(&str, Layers<'static>); 8] = [
             &["copc", "potree1", "potree2", "bintree", "batches"],
         ],
     ),
+    ("pointmill-view", &[&["error", "page", "refusal", "values"], &["encode"], &["dataset"], &["http"]]),
     (
         "pointmill-converter",
         &[
