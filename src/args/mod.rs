@@ -8,6 +8,7 @@ pub(crate) mod mistake;
 mod placing;
 mod preview;
 mod values;
+mod view;
 
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -25,6 +26,7 @@ pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use preview::PreviewArgs;
 pub(crate) use values::Attributes;
 use values::parse_bytes;
+pub(crate) use view::ViewArgs;
 
 /// Converts laser scans to datasets that renderers stream, without losing a point.
 #[derive(Debug, Parser)]
@@ -54,6 +56,8 @@ pub(crate) enum Command {
     Info(InfoArgs),
     /// Draws a picture of a dataset or of scans
     Preview(Box<PreviewArgs>),
+    /// Shows datasets or scans in the browser, served from this machine
+    View(Box<ViewArgs>),
 }
 
 #[derive(Debug, ClapArgs)]

@@ -6,7 +6,7 @@ use std::process::Command;
 use serde_json::Value;
 
 /// What each crate of the workspace may depend on, for whatever purpose, among the crates of the workspace.
-const ALLOWED: [(&str, &[&str]); 9] = [
+const ALLOWED: [(&str, &[&str]); 10] = [
     (
         "pointmill",
         &[
@@ -20,6 +20,7 @@ const ALLOWED: [(&str, &[&str]); 9] = [
             "pointmill-testkit",
         ],
     ),
+    ("pointmill-capi", &["pointmill-format", "pointmill-validate", "pointmill-testkit"]),
     ("pointmill-crs", &["pointmill-format"]),
     ("pointmill-converter", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-measure", &["pointmill-format", "pointmill-render", "pointmill-testkit"]),

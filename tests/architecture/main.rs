@@ -17,7 +17,7 @@ use layers::Layers;
 
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
-const LAYERS: [(&str, Layers<'static>); 8] = [
+const LAYERS: [(&str, Layers<'static>); 9] = [
     (
         "pointmill",
         &[
@@ -27,6 +27,20 @@ const LAYERS: [(&str, Layers<'static>); 8] = [
             &["human", "scan_choice", "text_choice"],
             &["inputs"],
             &["commands"],
+        ],
+    ),
+    (
+        "pointmill-capi",
+        &[
+            &["status"],
+            &["border", "axes"],
+            &["about", "octree"],
+            &["dataset", "camera", "check"],
+            &["info"],
+            &["nodes"],
+            &["decode", "sections", "select"],
+            &["colours", "pick"],
+            &["points"],
         ],
     ),
     ("pointmill-crs", &[&["units", "system"], &["heights", "projection"], &["operation"], &["placing"]]),
@@ -108,7 +122,7 @@ fn roots() -> Vec<(String, PathBuf)> {
         let name = package["name"].as_str().unwrap();
         for target in package["targets"].as_array().unwrap() {
             let kinds = target["kind"].as_array().unwrap();
-            if kinds.iter().any(|kind| kind == "lib" || kind == "bin") {
+            if kinds.iter().any(|kind| kind == "lib" || kind == "rlib" || kind == "bin") {
                 roots.push((name.to_owned(), PathBuf::from(target["src_path"].as_str().unwrap())));
             }
         }

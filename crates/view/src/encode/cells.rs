@@ -67,8 +67,8 @@ impl Cells {
 
     /// The integers of point `index`, which exists.
     #[inline]
-    pub(super) fn of(&self, points: &NodePoints, index: usize) -> [u32; 3] {
-        match (points.positions(), self.rule) {
+    pub(super) fn of(&self, positions: &Positions, index: usize) -> [u32; 3] {
+        match (positions, self.rule) {
             (Positions::Quantized(axes), Rule::Exact { least }) => {
                 std::array::from_fn(|a| axes[a].get(index).map_or(0, |q| q.abs_diff(least[a])))
             }
@@ -83,5 +83,69 @@ impl Cells {
             }),
             _ => [0; 3],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LATTICE: Lattice = Lattice { scale: [0.01; 3], offset: [500_000.0, 0.0, 0.0] };
+
+    fn of(extent: i32, may_round: bool) -> Cells {
+        let axis = vec![i32::MIN, i32::MIN + extent];
+        Cells::of_lattice(&[axis.clone(), axis.clone(), axis], &LATTICE, 1, may_round)
+    }
+
+    #[test]
+    fn what_fits_16_bits_is_exact_and_what_does_not_is_wide_or_rounded() {
+        for may_round in [false, true] {
+            let exact = of(65_535, may_round);
+            assert_eq!((exact.is_wide, exact.step), (false, LATTICE.scale));
+        }
+        let wide = of(65_536, false);
+        assert_eq!((wide.is_wide, wide.step, wide.origin), (true, LATTICE.scale, LATTICE.world([i32::MIN.into(); 3])));
+        let rounded = of(131_070, true);
+        assert_eq!((rounded.is_wide, rounded.step), (false, [0.02; 3]));
+        let all = Cells::of_lattice(&[vec![i32::MIN, i32::MAX], vec![0, 0], vec![0, 0]], &LATTICE, 1, false);
+        assert!(all.is_wide);
+    }
+
+    /// Half a step, and the rounding of sums and products in double precision.
+    #[test]
+    fn rounded_integers_are_the_nearest() {
+        let spread = |factor: i64| (0..500i64).map(|i| (i * i * factor % 3_000_001 - 1_000_000) as i32).collect();
+        let axes: [Vec<i32>; 3] = [spread(7919), spread(104_729), vec![5; 500]];
+        let world: [Vec<f64>; 3] =
+            std::array::from_fn(|a| axes[a].iter().map(|q| LATTICE.world([i64::from(*q); 3])[a]).collect());
+        let cases = [
+            (Cells::of_lattice(&axes, &LATTICE, 1, true), Positions::Quantized(axes.clone())),
+            (Cells::of_lattice(&axes, &LATTICE, 1, false), Positions::Quantized(axes)),
+            (Cells::of_world(&world, 1, NARROW), Positions::World(world.clone())),
+            (Cells::of_world(&world, 1, WIDE), Positions::World(world.clone())),
+        ];
+        for (cells, positions) in cases {
+            for (i, a) in (0..500).flat_map(|i| (0..3).map(move |a| (i, a))) {
+                let found = cells.origin[a] + f64::from(cells.of(&positions, i)[a]) * cells.step[a];
+                let bound = 0.5 * cells.step[a] * (1.0 + 1e-9) + 4.0 * f64::EPSILON * 600_000.0;
+                assert!((found - world[a][i]).abs() <= bound, "{cells:?}: {found}, not {}", world[a][i]);
+            }
+        }
+    }
+
+    #[test]
+    fn points_that_are_not_taken_do_not_count() {
+        let axis = vec![0, 1_000_000, 10];
+        let cells = Cells::of_lattice(&[axis.clone(), axis.clone(), axis], &LATTICE, 2, false);
+        assert!(!cells.is_wide);
+    }
+
+    #[test]
+    fn world_coordinates_without_extent_or_number_do_no_harm() {
+        let axes = [vec![f64::NAN, f64::INFINITY], vec![7.0, 7.0], vec![-1e308, 1e308]];
+        let cells = Cells::of_world(&axes, 1, WIDE);
+        assert_eq!(cells.origin, [0.0, 7.0, -1e308]);
+        assert_eq!((cells.step[0], cells.step[1]), (0.0, 0.0));
+        assert!(cells.step.iter().all(|s| s.is_finite()));
     }
 }
