@@ -128,15 +128,18 @@ fn probe(
 /// Whether a point of a piece is one of each `step`. Every piece begins elsewhere, so that those shorter than a step count as
 /// much as longer ones.
 fn is_probe(piece: usize, point: u64, step: u64) -> bool {
-    (point + (piece as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) % step) % step == 0
+    (point + (piece as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) % step).is_multiple_of(step)
 }
+
+/// What is done with a run of points of a piece: number of the piece, of the first point, and positions.
+type See<'a> = dyn Fn(usize, u64, &[[f64; 3]]) + Sync + 'a;
 
 /// Calls `with` for the positions of all points that are numbers, on all threads, with the number of the piece and that of the
 /// first point among these points of the piece.
 fn visit_batches(
     scans: &[Box<dyn Scan>],
     should_stop: &(dyn Fn() -> bool + Sync),
-    with: &(dyn Fn(usize, u64, &[[f64; 3]]) + Sync),
+    with: &See<'_>,
 ) -> Result<(), MeasureError> {
     for scan in scans {
         let info = scan.info();

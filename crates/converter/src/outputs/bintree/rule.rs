@@ -33,7 +33,7 @@ pub(super) fn plane(rule: SplitRule, moments: &Moments, points: u64, axis: usize
 
 /// True for the low side: a plane's own points belong to it. Stored integers or those of the run, both of one kind.
 #[inline(always)]
-pub(super) fn is_low<T: Ord>(value: T, plane: T) -> bool {
+pub(super) fn is_low<T: Ord + Copy>(value: T, plane: T) -> bool {
     value <= plane
 }
 
