@@ -103,13 +103,13 @@ mod tests {
     #[test]
     fn planes_between_octants_are_exact_far_from_0() {
         // single precision has whole halves there
-        let root = Aabb { min: [5_400_000.0625; 3], max: [5_400_001.0625; 3] };
+        let root = Aabb { min: [5_400_000.062_5; 3], max: [5_400_001.062_5; 3] };
         let node = root.octant(NodeKey { level: 2, x: 1, y: 2, z: 3 });
         let at = |quarters: [f64; 3]| quarters.map(|q| root.min[0] + q / 4.0);
         assert_eq!((node.min, node.max), (at([1.0, 2.0, 3.0]), at([2.0, 3.0, 4.0])));
         assert_eq!(root.octant(NodeKey::ROOT), root);
-        let oblong = Aabb { min: [5_400_000.0625, -1.0, 2.0], max: [5_400_003.0625, 3.0, 2.0] };
-        assert_eq!((oblong.center(), oblong.extent()), ([5_400_001.5625, 1.0, 2.0], [3.0, 4.0, 0.0]));
+        let oblong = Aabb { min: [5_400_000.062_5, -1.0, 2.0], max: [5_400_003.062_5, 3.0, 2.0] };
+        assert_eq!((oblong.center(), oblong.extent()), ([5_400_001.562_5, 1.0, 2.0], [3.0, 4.0, 0.0]));
     }
 
     #[test]

@@ -253,8 +253,8 @@ mod tests {
         // all factors are sums of powers of two: nothing is rounded, but in single precision
         let linear = [[0.75, -0.5, 0.25], [0.5, 0.75, -0.25], [0.25, -0.25, 1.5]];
         let map = Affine::from_matrix(&matrix(linear, [1e6, -2e6, 0.5])).unwrap();
-        assert_eq!(map.turn([5_000_001.0, 0.25, -0.25]), [3_750_000.5625, 2_500_000.75, 1_249_999.8125]);
-        assert_eq!(map.apply([5_000_001.0, 0.25, -0.25]), [4_750_000.5625, 500_000.75, 1_250_000.3125]);
+        assert_eq!(map.turn([5_000_001.0, 0.25, -0.25]), [3_750_000.562_5, 2_500_000.75, 1_249_999.812_5]);
+        assert_eq!(map.apply([5_000_001.0, 0.25, -0.25]), [4_750_000.562_5, 500_000.75, 1_250_000.312_5]);
     }
 
     #[test]

@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn axes_that_change_places_lose_no_bit() {
         let (third, note) = pose([0.5; 4], [0.0; 3]);
-        assert_eq!(moved(&third, [5_400_000.0625, -0.1, 1e-9]), [1e-9, 5_400_000.0625, -0.1]);
+        assert_eq!(moved(&third, [5_400_000.062_5, -0.1, 1e-9]), [1e-9, 5_400_000.062_5, -0.1]);
         assert_eq!(note, None);
         for (axis, turned) in [[1.0, -2.0, -3.0], [-1.0, 2.0, -3.0], [-1.0, -2.0, 3.0]].into_iter().enumerate() {
             let mut q = [0.0; 4];
