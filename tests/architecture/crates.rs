@@ -6,7 +6,7 @@ use std::process::Command;
 use serde_json::Value;
 
 /// What each crate of the workspace may depend on, for whatever purpose, among the crates of the workspace.
-const ALLOWED: [(&str, &[&str]); 8] = [
+const ALLOWED: [(&str, &[&str]); 9] = [
     (
         "pointmill",
         &[
@@ -16,6 +16,7 @@ const ALLOWED: [(&str, &[&str]); 8] = [
             "pointmill-measure",
             "pointmill-render",
             "pointmill-validate",
+            "pointmill-view",
             "pointmill-testkit",
         ],
     ),
@@ -24,6 +25,7 @@ const ALLOWED: [(&str, &[&str]); 8] = [
     ("pointmill-measure", &["pointmill-format", "pointmill-render", "pointmill-testkit"]),
     ("pointmill-render", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-validate", &["pointmill-format", "pointmill-testkit"]),
+    ("pointmill-view", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-format", &["pointmill-testkit"]),
     ("pointmill-testkit", &["pointmill-format"]),
 ];

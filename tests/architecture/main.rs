@@ -17,7 +17,7 @@ use layers::Layers;
 
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
-const LAYERS: [(&str, Layers<'static>); 7] = [
+const LAYERS: [(&str, Layers<'static>); 8] = [
     (
         "pointmill",
         &[
@@ -81,6 +81,7 @@ const LAYERS: [(&str, Layers<'static>); 7] = [
             &["copc", "potree1", "potree2", "bintree", "batches"],
         ],
     ),
+    ("pointmill-view", &[&["error", "page", "refusal", "values"], &["encode"], &["dataset"], &["http"]]),
     (
         "pointmill-converter",
         &[

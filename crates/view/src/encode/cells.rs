@@ -1,0 +1,87 @@
+//! Positions as small integers within a unit.
+
+use pointmill_format::{Lattice, NodePoints, Positions};
+
+/// The largest integer of 16 and of 32 bits.
+const NARROW: u32 = u16::MAX as u32;
+const WIDE: u32 = u32::MAX;
+
+/// How positions of a unit become integers: `world = origin + integer · step`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cells {
+    pub(super) is_wide: bool,
+    pub(super) origin: [f64; 3],
+    pub(super) step: [f64; 3],
+    rule: Rule,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Rule {
+    /// Lattice integers, less the least.
+    Exact { least: [i32; 3] },
+    /// Lattice integers over the box, rounded: `(q − least) · factor`.
+    Lattice { least: [i32; 3], factor: [f64; 3] },
+    /// World coordinates over the box, rounded: `(p − origin) · factor`.
+    World { factor: [f64; 3], most: u32 },
+}
+
+impl Cells {
+    /// Integers for every `every`th point. `may_round`: an inner node of an octree, of whose points a picture needs no more
+    /// than 16 bits.
+    pub(super) fn new(points: &NodePoints, every: usize, may_round: bool) -> Self {
+        match points.positions() {
+            Positions::Quantized(axes) => Self::of_lattice(axes, points.lattice(), every, may_round),
+            Positions::World(axes) => Self::of_world(axes, every, if may_round { NARROW } else { WIDE }),
+        }
+    }
+
+    fn of_lattice(axes: &[Vec<i32>; 3], lattice: &Lattice, every: usize, may_round: bool) -> Self {
+        let least = axes.each_ref().map(|axis| axis.iter().step_by(every).copied().min().unwrap_or(0));
+        let greatest = axes.each_ref().map(|axis| axis.iter().step_by(every).copied().max().unwrap_or(0));
+        let extent: [u32; 3] = std::array::from_fn(|a| greatest[a].abs_diff(least[a]));
+        let origin = lattice.world(least.map(i64::from));
+        let is_small = extent.iter().all(|e| *e <= NARROW);
+        if is_small || !may_round {
+            return Self { is_wide: !is_small, origin, step: lattice.scale, rule: Rule::Exact { least } };
+        }
+        let cells = f64::from(NARROW);
+        let step = std::array::from_fn(|a| f64::from(extent[a]) * lattice.scale[a] / cells);
+        let factor = extent.map(|e| if e == 0 { 0.0 } else { cells / f64::from(e) });
+        Self { is_wide: false, origin, step, rule: Rule::Lattice { least, factor } }
+    }
+
+    fn of_world(axes: &[Vec<f64>; 3], every: usize, most: u32) -> Self {
+        let finite = |axis: &Vec<f64>| -> (f64, f64) {
+            let values = axis.iter().step_by(every).filter(|v| v.is_finite());
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), v| (least.min(*v), greatest.max(*v)))
+        };
+        let ranges = axes.each_ref().map(finite);
+        let origin = ranges.map(|(least, _)| if least.is_finite() { least } else { 0.0 });
+        let extent =
+            ranges.map(|(least, greatest)| if least < greatest { (greatest - least).min(f64::MAX) } else { 0.0 });
+        let cells = f64::from(most);
+        let factor = extent.map(|e| if e > 0.0 { cells / e } else { 0.0 });
+        let step = extent.map(|e| e / cells);
+        Self { is_wide: most == WIDE, origin, step, rule: Rule::World { factor, most } }
+    }
+
+    /// The integers of point `index`, which exists.
+    #[inline]
+    pub(super) fn of(&self, points: &NodePoints, index: usize) -> [u32; 3] {
+        match (points.positions(), self.rule) {
+            (Positions::Quantized(axes), Rule::Exact { least }) => {
+                std::array::from_fn(|a| axes[a].get(index).map_or(0, |q| q.abs_diff(least[a])))
+            }
+            (Positions::Quantized(axes), Rule::Lattice { least, factor }) => std::array::from_fn(|a| {
+                let above = axes[a].get(index).map_or(0, |q| q.abs_diff(least[a]));
+                ((f64::from(above) * factor[a]).round() as u32).min(NARROW)
+            }),
+            // `as` makes 0 of what is no number
+            (Positions::World(axes), Rule::World { factor, most }) => std::array::from_fn(|a| {
+                let above = axes[a].get(index).map_or(0.0, |p| p - self.origin[a]);
+                ((above * factor[a]).round() as u32).min(most)
+            }),
+            _ => [0; 3],
+        }
+    }
+}
