@@ -190,7 +190,9 @@ export class App {
 
   setColour(wanted) {
     const names = new Set(this.clouds.flatMap((cloud) => cloud.scene.attributes.map((each) => each.name)));
-    const name = ELSEWHERE.includes(wanted) || names.has(wanted) ? wanted : this.#usualColour();
+    const needs = { class: "classification", intensity: "intensity" }[wanted];
+    const isKnown = needs ? names.has(needs) : ELSEWHERE.includes(wanted) || names.has(wanted);
+    const name = isKnown ? wanted : this.#usualColour();
     this.renderer.settings.colour = name;
     const attribute = ELSEWHERE.includes(name) ? undefined : name;
     const found = this.clouds.flatMap((cloud) => {

@@ -13,7 +13,9 @@ export class PointBox {
   }
 
   show(scene, point) {
-    const rows = [["dataset", scene.name], ["x", point.position[0]], ["y", point.position[1]], ["z", point.position[2]]];
+    // 15 digits are what doubles hold of any decimal number
+    const place = point.position.map((v) => String(Number(v.toPrecision(15))));
+    const rows = [["dataset", scene.name], ...["x", "y", "z"].map((axis, a) => [axis, place[a]])];
     for (const { name, values, text } of point.attributes) {
       const shown = text ?? values.join(", ");
       rows.push([name, name === "classification" ? `${shown} ${classTitle(values[0])}` : shown]);
