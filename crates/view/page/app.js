@@ -15,6 +15,7 @@ import { PointBox } from "pm/ui/point.js";
 
 /** Milliseconds that the cursor rests before the point under it is looked up. */
 const HOVER_MS = 120;
+const FEW_POINTS = 10_000;
 
 export class App {
   constructor(messages, config) {
@@ -50,6 +51,8 @@ export class App {
     if (!(this.box.min[0] <= this.box.max[0])) this.box = { min: [0, 0, 0], max: [0, 0, 0] };
     if (clouds.every((cloud) => cloud.scene.points === 0)) this.messages.note("The dataset has no points.");
     this.renderer.heightBase = this.box.min[2];
+    // a few points have to be found first
+    if (clouds.reduce((sum, cloud) => sum + cloud.scene.points, 0) < FEW_POINTS) this.renderer.settings.least = 4;
     for (const cloud of clouds) cloud.hasClasses = cloud.scene.attributes.some(({ name }) => name === "classification");
     this.#controls();
     this.camera.fit(this.box, VIEWS.fit);

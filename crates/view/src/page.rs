@@ -47,6 +47,7 @@ const FILES: &[(&str, &str)] = files![
     "sources/bintree.js",
     "sources/columns.js",
     "sources/files.js",
+    "sources/potree1.js",
     "sources/potree2.js",
     "sources/server.js",
     "sources/static.js",

@@ -5,7 +5,7 @@ const MOST_WHOLE = 64 * 1024 * 1024;
 /** Gaps up to this are read with what is around them. */
 const MOST_GAP = 32 * 1024;
 
-export async function readText(url) {
+async function get(url) {
   let answer;
   try {
     answer = await fetch(url, { cache: "no-cache" });
@@ -17,8 +17,11 @@ export async function readText(url) {
     );
   }
   if (!answer.ok) throw new Error(`${url}: the server answers ${answer.status}`);
-  return answer.text();
+  return answer;
 }
+
+export const readText = async (url) => (await get(url)).text();
+export const readBytes = async (url) => (await get(url)).arrayBuffer();
 
 export class RangedFile {
   constructor(url, messages) {

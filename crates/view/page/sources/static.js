@@ -3,6 +3,7 @@
 export function openStatic(scene, messages) {
   const load = {
     potree2: async () => new (await import("pm/sources/potree2.js")).Potree2Source(scene, messages),
+    potree1: async () => new (await import("pm/sources/potree1.js")).Potree1Source(scene),
     bintree: async () => new (await import("pm/sources/bintree.js")).BintreeSource(scene, messages),
     batches: async () => new (await import("pm/sources/batches.js")).BatchesSource(scene, messages),
   }[scene.kind];
