@@ -21,6 +21,10 @@ features:
 demo:
     eval "$(sed -n '/^cargo run/p' README.md)"
 
+# Datasets in the clients that people use, in a browser
+clients:
+    tests/clients/run
+
 # All of it
 ci:
     .ci/run
