@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use pointmill_converter::ConvertError;
 use pointmill_format::{Advice, ErrorKind, ReadError, system_reason};
 use pointmill_render::RenderError;
+use pointmill_view::ViewError;
 
 use crate::flags;
 use crate::printable::{json_escaped, printable, printable_lines};
@@ -120,6 +121,16 @@ impl From<RenderError> for Failure {
             RenderError::Camera(camera) => Self::Usage(camera.to_string()),
             RenderError::NoAttribute { .. } => Self::Unsupported(error.to_string()),
             other => Self::Internal(other.to_string()),
+        }
+    }
+}
+
+impl From<ViewError> for Failure {
+    fn from(error: ViewError) -> Self {
+        match error {
+            ViewError::Read(read) => read.into(),
+            ViewError::Listen { .. } => Self::Io(format!("{error}; --port chooses another")),
+            other => Self::Io(other.to_string()),
         }
     }
 }

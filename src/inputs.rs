@@ -34,14 +34,24 @@ impl InputArgs {
         self.reading.options()
     }
 
-    /// Finds the scans. `output`: where the run puts its datasets.
-    pub(crate) fn expand(&self, output: &Path) -> Result<Inputs, Failure> {
-        let options = self.options()?;
+    /// What was typed, and what is in the list.
+    pub(crate) fn typed(&self) -> Result<Vec<PathBuf>, Failure> {
         let mut typed = self.inputs.clone();
         if let Some(list) = &self.files_from {
             typed.extend(read_list(list)?);
         }
-        let found = expand(&typed, &options, Some(output))?;
+        Ok(typed)
+    }
+
+    /// Finds the scans. `output`: where the run puts its datasets.
+    pub(crate) fn expand(&self, output: &Path) -> Result<Inputs, Failure> {
+        self.expand_these(&self.typed()?, output)
+    }
+
+    /// Finds the scans of some of the inputs.
+    pub(crate) fn expand_these(&self, typed: &[PathBuf], output: &Path) -> Result<Inputs, Failure> {
+        let options = self.options()?;
+        let found = expand(typed, &options, Some(output))?;
         scan_choice::check(&found.files, &options)?;
         text_choice::check(&found.files, &options)?;
         Ok(found)

@@ -43,6 +43,10 @@ pub(crate) struct ConvertArgs {
     /// Takes the profile from a measurement of this scene: the folder that `measure` made
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub(crate) measured: Option<PathBuf>,
+    /// Writes OUT.html beside OUT: a page that shows the dataset from any web server with ranges; not for copc, nor for what is
+    /// compressed or archived, which `view` shows
+    #[arg(long, help_heading = "Output")]
+    pub(crate) page: bool,
     /// Encoding of node payloads [default: default]
     #[arg(long, value_enum, help_heading = "Output")]
     pub(crate) encoding: Option<EncodingArg>,

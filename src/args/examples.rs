@@ -40,6 +40,12 @@ Examples:
   pointmill preview city -o city.png
   pointmill preview scan.laz -o top.png --view top --size 1920x1080 --colour height";
 
+pub(super) const VIEW: &str = "\
+Examples:
+  pointmill view city                                     opens the browser
+  pointmill view scan.laz hall.e57                        converted first, into a temporary dataset
+  pointmill view city line12 --no-open --port 8080";
+
 pub(super) const COMPLETIONS: &str = "\
 Examples:
   pointmill completions bash > ~/.local/share/bash-completion/completions/pointmill
@@ -60,7 +66,7 @@ mod tests {
 
     #[test]
     fn every_example_is_a_command_line() {
-        let all = [CONVERT, EXPORT, MEASURE, VALIDATE, EXTRACT, INFO, PREVIEW, COMPLETIONS, MAN];
+        let all = [CONVERT, EXPORT, MEASURE, VALIDATE, EXTRACT, INFO, PREVIEW, VIEW, COMPLETIONS, MAN];
         let lines: Vec<&str> = all.iter().flat_map(|text| text.lines().skip(1)).collect();
         assert!(lines.len() > 20);
         for line in lines {

@@ -10,6 +10,7 @@ pub(crate) mod mistake;
 mod placing;
 mod preview;
 mod values;
+mod view;
 
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -28,6 +29,7 @@ pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use preview::PreviewArgs;
 pub(crate) use values::Attributes;
 use values::parse_bytes;
+pub(crate) use view::ViewArgs;
 
 /// Converts laser scans to datasets that renderers stream, without losing a point.
 #[derive(Debug, Parser)]
@@ -64,6 +66,9 @@ pub(crate) enum Command {
     /// Draws a picture of a dataset or of scans
     #[command(after_help = examples::PREVIEW)]
     Preview(Box<PreviewArgs>),
+    /// Shows datasets or scans in the browser, served from this machine
+    #[command(after_help = examples::VIEW)]
+    View(Box<ViewArgs>),
     /// Prints what a shell needs to complete commands, options and values
     #[command(after_help = examples::COMPLETIONS)]
     Completions(CompletionsArgs),

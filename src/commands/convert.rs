@@ -9,6 +9,7 @@ use pointmill_converter::{
 };
 use pointmill_format::bintree::{Layout, SplitRule};
 
+use super::page_file::PageFile;
 use super::report_file::ReportFile;
 use crate::args::{
     Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg,
@@ -32,12 +33,16 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     if !args.talk.quiet {
         inputs.notes.iter().for_each(|note| print_line(note));
     }
+    if args.page {
+        PageFile::check_formats(args)?;
+    }
     let plan = plan(args, inputs)?;
     if args.dry_run {
         let estimate = pointmill_converter::estimate(&plan, &targets)?;
         return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
     }
     protect_inputs(&plan)?;
+    let page_file = PageFile::requested(args)?;
     let report_file = args.report.as_ref().map(|file| {
         let sources = plan.inputs.iter().chain(&args.inputs.files_from);
         ReportFile::new(file, &plan.output, sources)
@@ -49,8 +54,12 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let for_people = progress.end();
     let report = result?;
     tell(args, report_file.as_ref(), &report).map_err(|failure| after_all(failure, &plan.output))?;
+    let page = page_file.map(|file| file.write(&plan.name)).transpose();
+    let page = page.map_err(|failure| after_all(failure, &plan.output))?;
     if for_people {
         conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| print_line(line));
+        page.iter()
+            .for_each(|file| print_line(&format!("{}: the page that shows it, from any web server", file.display())));
     }
     Ok(())
 }
@@ -272,7 +281,7 @@ fn on_fault(arg: FaultArg) -> OnFault {
 }
 
 /// The folder's name if one folder was named, else that of the first scan in order of path, whatever was typed first.
-fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
+pub(super) fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
     let folder = typed.first().filter(|path| typed.len() == 1 && path.is_dir());
     let full = folder.map(|path| path.canonicalize().unwrap_or_else(|_| path.clone()));
     let name = match &full {

@@ -46,4 +46,5 @@ mod support;
 mod text_inputs;
 mod units;
 mod validating;
+mod view;
 mod viewers;

@@ -111,7 +111,11 @@ fn commands_and_options_that_are_none() {
         (
             "",
             2,
-            &["no command", "convert, export, measure, validate, extract, info, preview, completions, man", "see 'pointmill --help'"],
+            &[
+                "no command",
+                "convert, export, measure, validate, extract, info, preview, view, completions, man",
+                "see 'pointmill --help'",
+            ],
         ),
         ("convrt", 2, &["'convrt'", "did you mean convert?"]),
         ("bogus", 2, &["no command 'bogus'", "convert, export, measure, validate"]),

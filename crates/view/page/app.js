@@ -47,12 +47,12 @@ export class App {
     clouds.forEach((cloud) => (cloud.isShown = true));
     if (clouds.length === 0) throw new Error("There is nothing to show.");
     document.title = `${clouds.map((cloud) => cloud.scene.name).join(", ")} – pointmill`;
-    this.box = union(clouds.filter((cloud) => cloud.scene.points > 0).map((cloud) => cloud.box));
+    this.box = union(clouds.filter((cloud) => cloud.scene.points !== 0).map((cloud) => cloud.box));
     if (!(this.box.min[0] <= this.box.max[0])) this.box = { min: [0, 0, 0], max: [0, 0, 0] };
     if (clouds.every((cloud) => cloud.scene.points === 0)) this.messages.note("The dataset has no points.");
     this.renderer.heightBase = this.box.min[2];
     // a few points have to be found first
-    if (clouds.reduce((sum, cloud) => sum + cloud.scene.points, 0) < FEW_POINTS) this.renderer.settings.least = 4;
+    if (clouds.reduce((sum, cloud) => sum + (cloud.scene.points ?? FEW_POINTS), 0) < FEW_POINTS) this.renderer.settings.least = 4;
     for (const cloud of clouds) cloud.hasClasses = cloud.scene.attributes.some(({ name }) => name === "classification");
     this.#controls();
     this.camera.fit(this.box, VIEWS.fit);

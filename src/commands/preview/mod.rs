@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use pointmill_format::{Located, locate};
+use pointmill_format::Located;
 use pointmill_render::{Camera, Flight, Picture, Scene, Style};
 use serde_json::{Value, json};
 
@@ -83,18 +83,7 @@ fn dataset(args: &PreviewArgs) -> Result<Option<Located>, Failure> {
     if args.inputs.files_from.is_some() {
         return Ok(None);
     }
-    match locate(input) {
-        Ok(dataset) => Ok(Some(dataset)),
-        Err(error) if error.is_io() && error.path() != input => Err(error.into()),
-        Err(_) => match &datasets::inside(input)[..] {
-            [] => Ok(None),
-            several => {
-                let names: Vec<String> = several.iter().map(|one| one.path.display().to_string()).collect();
-                let shown = input.display();
-                Err(Failure::Usage(format!("{shown}: several datasets are in it; name one: {}", names.join(", "))))
-            }
-        },
-    }
+    datasets::named(input)
 }
 
 fn read_flight(file: &Path) -> Result<Flight, Failure> {

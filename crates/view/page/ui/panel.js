@@ -125,7 +125,8 @@ export class Panel {
       const { scene } = cloud;
       const box = check("", true, (isShown) => app.show(cloud, isShown));
       box.firstChild.remove();
-      const text = `${scene.name} · ${scene.format} · ${scene.points.toLocaleString("en")} points`;
+      const points = scene.points === null ? "" : ` · ${scene.points.toLocaleString("en")} points`;
+      const text = `${scene.name} · ${scene.format}${points}`;
       box.append(element("span", { textContent: text }), button("fit", "Look at this dataset alone", () => app.fit(cloud.box)));
       return box;
     });

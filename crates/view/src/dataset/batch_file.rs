@@ -1,5 +1,6 @@
 //! The sections of a file of batches, read batch by batch: a file that is cut while it is served is an error, where a map of it
-//! would end the process.
+//! would end the process. Compressed sections are read through a map all the same, after a look at the length of the file; one that
+//! is cut in the moment between the two ends the process.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Quantised batches: words as they are stored, of the levels that are requested.
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use pointmill_format::batches::{
     BatchRecord, BlockScratch, ColourSource, Decoder, Flags, Part, Precision, lod_of, rgb_of,
@@ -20,6 +20,9 @@ use crate::values::{Number, point_json, scaled};
 /// Points whose levels are counted, at most; of larger files some batches stand for those behind them.
 const COUNTED_POINTS: u64 = 64 << 20;
 
+/// Batches whose values are looked at for ranges, evenly spread, where the file gives none.
+const SAMPLED_BATCHES: usize = 8;
+
 /// Planes in the order of their significance.
 const PLANES: [Part; 3] = [Part::Hi10, Part::Mid10, Part::Lo10];
 
@@ -27,7 +30,10 @@ const PLANES: [Part; 3] = [Part::Hi10, Part::Mid10, Part::Lo10];
 #[derive(Debug)]
 pub(super) struct Batches {
     file: BatchFile,
-    attributes: Attributes,
+    /// With the ranges that the file gives.
+    said: Attributes,
+    /// With ranges of a sample where the file gives none; read when they are needed first.
+    attributes: OnceLock<Attributes>,
     /// Of each slot: points of level 0, of at most 1, 2, 3. Counted when they are requested first.
     levels: Mutex<Option<Arc<Vec<[u16; 4]>>>>,
 }
@@ -47,8 +53,27 @@ impl Batches {
             let range = Range::of_raw(attribute, &entry.min, &entry.max);
             (attribute.clone(), range)
         });
-        let attributes = Attributes::new(known);
-        Ok(Self { file, attributes, levels: Mutex::default() })
+        let said = Attributes::new(known);
+        Ok(Self { file, said, attributes: OnceLock::new(), levels: Mutex::default() })
+    }
+
+    fn attributes(&self) -> &Attributes {
+        self.attributes.get_or_init(|| {
+            let (mut attributes, mut scratch) = (self.said.clone(), Scratch::default());
+            let (count, slots) = (self.file.records.len().min(SAMPLED_BATCHES), self.file.header.batches as usize);
+            for (slot, (place, (attribute, _))) in
+                (0..count).flat_map(|i| self.file.attributes.iter().enumerate().map(move |a| (i * slots / count, a)))
+            {
+                let Scratch { blocks, bytes, .. } = &mut scratch;
+                // a batch that cannot be read is an error of the request for its points
+                if self.file.read(Part::Attribute(place), slot as u32, &mut blocks[4], bytes).is_ok() {
+                    let values = bytes.chunks_exact(attribute.ty.size());
+                    let numbers = values.filter_map(|bytes| Number::of_bytes(attribute.ty, bytes));
+                    attributes.sample_values(place, numbers.map(Number::as_f64));
+                }
+            }
+            attributes
+        })
     }
 
     pub(super) fn scene(&self) -> Scene {
@@ -61,7 +86,7 @@ impl Batches {
             points: Some(header.points),
             bounds: if empty { Aabb::EMPTY } else { header.tight },
             projection: self.file.projection.clone(),
-            attributes: self.attributes.clone(),
+            attributes: self.attributes().clone(),
             has_colour: *colour != ColourSource::None,
             own: keys([
                 ("colourSource", colour.name().into()),
@@ -125,7 +150,7 @@ impl Batches {
     /// The most bytes of the answer.
     pub(super) fn cost(&self, request: &BatchesRequest) -> Result<u64, Refusal> {
         if let Some(name) = &request.attribute {
-            self.attributes.find(name)?;
+            self.attributes().find(name)?;
         }
         let point_bytes = 4 * (self.planes(request).len() as u64 + 2) + 2;
         request.units.iter().try_fold(0u64, |sum, slot| {
@@ -158,7 +183,7 @@ impl Batches {
         let [from, to] = request.levels;
         selected
             .extend((0u16..).zip(words(&colours)).filter(|(_, w)| (from..=to).contains(&lod_of(*w))).map(|(i, _)| i));
-        let attribute = request.attribute.as_deref().map(|name| self.attributes.find(name)).transpose()?;
+        let attribute = request.attribute.as_deref().map(|name| self.attributes().find(name)).transpose()?;
         let planes = self.planes(request);
         let header = UnitHeader {
             count: selected.len() as u32,

@@ -30,17 +30,18 @@ impl Range {
         Some(range)
     }
 
-    fn of_column(attribute: &Attribute, points: &NodePoints, place: usize) -> Option<Self> {
-        let column = points.columns().get(place)?;
+    /// Of raw values, those of a point side by side; `None` without one that is finite, for any element.
+    fn of_values(attribute: &Attribute, values: impl Iterator<Item = f64>) -> Option<Self> {
         let elements = attribute.elements;
         let mut range =
             Self { min: vec![f64::INFINITY; elements], max: vec![f64::NEG_INFINITY; elements], is_sampled: true };
-        for index in 0..column.len() {
+        for (index, raw) in values.enumerate() {
             let element = index % elements.max(1);
-            let value = scaled(attribute, element, Number::of_column(column, index)?.as_f64());
-            if value.is_finite() {
-                range.min[element] = range.min[element].min(value);
-                range.max[element] = range.max[element].max(value);
+            let value = scaled(attribute, element, raw);
+            if let (true, Some(min), Some(max)) =
+                (value.is_finite(), range.min.get_mut(element), range.max.get_mut(element))
+            {
+                (*min, *max) = (min.min(value), max.max(value));
             }
         }
         range.min.iter().zip(&range.max).all(|(min, max)| min <= max).then_some(range)
@@ -70,12 +71,19 @@ impl Attributes {
 
     /// Widens ranges that the dataset does not give by the values of some points.
     pub(super) fn sample(&mut self, points: &NodePoints) {
-        for (place, (attribute, range)) in self.all.iter().zip(&mut self.ranges).enumerate() {
-            match range {
-                Some(range) if !range.is_sampled => {}
-                Some(range) => Range::of_column(attribute, points, place).iter().for_each(|more| range.merge(more)),
-                None => *range = Range::of_column(attribute, points, place),
-            }
+        for (place, column) in points.columns().iter().enumerate() {
+            let values = (0..column.len()).filter_map(|index| Number::of_column(column, index));
+            self.sample_values(place, values.map(Number::as_f64));
+        }
+    }
+
+    /// Widens the range of one attribute, unless the dataset gives it, by raw values.
+    pub(super) fn sample_values(&mut self, place: usize, values: impl Iterator<Item = f64>) {
+        let (Some(attribute), Some(range)) = (self.all.get(place), self.ranges.get_mut(place)) else { return };
+        match range {
+            Some(range) if !range.is_sampled => {}
+            Some(range) => Range::of_values(attribute, values).iter().for_each(|more| range.merge(more)),
+            None => *range = Range::of_values(attribute, values),
         }
     }
 
@@ -131,5 +139,48 @@ impl Attributes {
             object
         };
         self.all.iter().zip(&self.ranges).map(one).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pointmill_format::AttributeType;
+
+    use super::*;
+
+    #[test]
+    fn ranges_are_of_meant_values_and_those_of_the_dataset_stay() {
+        let mut turned = Attribute::new("a", AttributeType::Int16, 1);
+        (turned.scale, turned.offset) = (vec![-0.5], vec![10.0]);
+        let known = Range::of_raw(&turned, &[0.0], &[4.0]);
+        assert_eq!(known, Some(Range { min: vec![8.0], max: vec![10.0], is_sampled: false }));
+        let mut attributes = Attributes::new([(turned.clone(), known.clone()), (turned, None)]);
+        for place in [0, 1] {
+            attributes.sample_values(place, [2.0, f64::NAN].into_iter());
+            attributes.sample_values(place, [-2.0].into_iter());
+            attributes.sample_values(place, [f64::INFINITY].into_iter());
+        }
+        let sampled = Range { min: vec![9.0], max: vec![11.0], is_sampled: true };
+        assert_eq!(attributes.ranges, [known, Some(sampled)]);
+        assert_eq!(attributes.find("a"), Ok((0, 8.0)));
+    }
+
+    #[test]
+    fn what_a_dataset_gives_in_part_or_as_no_number_is_no_range() {
+        let rgb = Attribute::new("rgb", AttributeType::UInt16, 3);
+        for (min, max) in [(&[][..], &[][..]), (&[0.0; 3], &[1.0; 2]), (&[f64::NAN; 3], &[1.0; 3])] {
+            assert_eq!(Range::of_raw(&rgb, min, max), None);
+        }
+    }
+
+    #[test]
+    fn colours_have_8_bits_if_none_is_above_255() {
+        let rgb = |max: f64| {
+            let rgb = Attribute::new("rgb", AttributeType::UInt16, 3);
+            let range = Range::of_raw(&rgb, &[0.0; 3], &[0.0, max, 0.0]);
+            Attributes::new([(rgb, range)]).is_16_bit()
+        };
+        assert_eq!([255.0, 256.0].map(rgb), [false, true]);
+        assert!(Attributes::default().is_16_bit() && !Attributes::default().has_colour());
     }
 }

@@ -85,3 +85,45 @@ impl Cells {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LATTICE: Lattice = Lattice { scale: [0.01; 3], offset: [500_000.0, 0.0, 0.0] };
+
+    fn of(extent: i32, may_round: bool) -> Cells {
+        let axis = vec![i32::MIN, i32::MIN + extent];
+        Cells::of_lattice(&[axis.clone(), axis.clone(), axis], &LATTICE, 1, may_round)
+    }
+
+    #[test]
+    fn what_fits_16_bits_is_exact_and_what_does_not_is_wide_or_rounded() {
+        for may_round in [false, true] {
+            let exact = of(65_535, may_round);
+            assert_eq!((exact.is_wide, exact.step), (false, LATTICE.scale));
+        }
+        let wide = of(65_536, false);
+        assert_eq!((wide.is_wide, wide.step, wide.origin), (true, LATTICE.scale, LATTICE.world([i32::MIN.into(); 3])));
+        let rounded = of(131_070, true);
+        assert_eq!((rounded.is_wide, rounded.step), (false, [0.02; 3]));
+        let all = Cells::of_lattice(&[vec![i32::MIN, i32::MAX], vec![0, 0], vec![0, 0]], &LATTICE, 1, false);
+        assert!(all.is_wide);
+    }
+
+    #[test]
+    fn points_that_are_not_taken_do_not_count() {
+        let axis = vec![0, 1_000_000, 10];
+        let cells = Cells::of_lattice(&[axis.clone(), axis.clone(), axis], &LATTICE, 2, false);
+        assert!(!cells.is_wide);
+    }
+
+    #[test]
+    fn world_coordinates_without_extent_or_number_do_no_harm() {
+        let axes = [vec![f64::NAN, f64::INFINITY], vec![7.0, 7.0], vec![-1e308, 1e308]];
+        let cells = Cells::of_world(&axes, 1, WIDE);
+        assert_eq!(cells.origin, [0.0, 7.0, -1e308]);
+        assert_eq!((cells.step[0], cells.step[1]), (0.0, 0.0));
+        assert!(cells.step.iter().all(|s| s.is_finite()));
+    }
+}
