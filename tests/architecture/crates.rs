@@ -20,6 +20,7 @@ const ALLOWED: [(&str, &[&str]); 9] = [
             "pointmill-testkit",
         ],
     ),
+    ("pointmill-capi", &["pointmill-format", "pointmill-validate", "pointmill-testkit"]),
     ("pointmill-crs", &["pointmill-format"]),
     ("pointmill-converter", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-measure", &["pointmill-format", "pointmill-render", "pointmill-testkit"]),

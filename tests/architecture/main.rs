@@ -29,6 +29,20 @@ const LAYERS: [(&str, Layers<'static>); 8] = [
             &["commands"],
         ],
     ),
+    (
+        "pointmill-capi",
+        &[
+            &["status"],
+            &["border", "axes"],
+            &["about", "octree"],
+            &["dataset", "camera", "check"],
+            &["info"],
+            &["nodes"],
+            &["decode", "sections", "select"],
+            &["colours", "pick"],
+            &["points"],
+        ],
+    ),
     ("pointmill-crs", &[&["units", "system"], &["heights", "projection"], &["operation"], &["placing"]]),
     (
         "pointmill-format",
@@ -108,7 +122,7 @@ fn roots() -> Vec<(String, PathBuf)> {
         let name = package["name"].as_str().unwrap();
         for target in package["targets"].as_array().unwrap() {
             let kinds = target["kind"].as_array().unwrap();
-            if kinds.iter().any(|kind| kind == "lib" || kind == "bin") {
+            if kinds.iter().any(|kind| kind == "lib" || kind == "rlib" || kind == "bin") {
                 roots.push((name.to_owned(), PathBuf::from(target["src_path"].as_str().unwrap())));
             }
         }

@@ -80,7 +80,7 @@ pub mod scan;
 
 pub use dataset_kind::{DatasetKind, Located, locate};
 pub use error::{Advice, ErrorKind, Fault, ReadError, system_reason};
-pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Lattice, NodeKey};
+pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Frustum, Lattice, NodeKey, Ray};
 pub use names::UnknownName;
 pub use open_octree::open_octree;
 pub use open_scan::open_scan;

@@ -52,6 +52,7 @@ pub use canvas::Canvas;
 pub use error::{CameraError, RenderError};
 pub use flight::{Flight, FlightError};
 pub use picture::{Drawn, Picture};
+pub use pointmill_format::octree::Order;
 pub use render::{render_batches, render_bintree, render_octree};
 pub use scene::{Scene, render_dataset};
-pub use style::{Bits, Colour, Order, PointSize, Shape, Style};
+pub use style::{Bits, Colour, PointSize, Shape, Style};

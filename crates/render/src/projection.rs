@@ -1,9 +1,10 @@
 //! A camera and the size of a picture: where places of the world are in it.
 
 use pointmill_format::Aabb;
-use pointmill_format::bintree::Frustum;
+use pointmill_format::Frustum;
+use pointmill_format::octree::Viewpoint;
 
-use crate::vector::{dot, length, minus};
+use crate::vector::{dot, minus};
 use crate::{Camera, CameraError, Size};
 
 /// From the world to the picture.
@@ -69,17 +70,9 @@ impl Projection {
         self.frustum.may_see(bounds)
     }
 
-    /// Of the sphere around a box: its radius in the picture, in pixels, infinite from inside; and the angle between its
-    /// centre and the direction of view, radians.
-    pub(crate) fn sphere(&self, bounds: &Aabb) -> [f64; 2] {
-        let to = minus(bounds.center(), self.eye);
-        let (radius, distance) = (length(bounds.extent()) / 2.0, length(to));
-        // written so that what is not a number counts as inside
-        if !(distance >= radius && distance > 0.0) {
-            return [f64::INFINITY, 0.0];
-        }
-        let angle = (dot(to, self.axes[2]) / distance).clamp(-1.0, 1.0).acos();
-        [radius * self.focal / distance, angle]
+    /// What a walk through an octree must know.
+    pub(crate) fn viewpoint(&self) -> Viewpoint {
+        Viewpoint::new(self.eye, self.axes[2], self.focal, self.frustum)
     }
 }
 
@@ -125,10 +118,10 @@ mod tests {
     fn spheres_shrink_with_the_distance() {
         let projection = projection([0.0; 3]);
         let around = |y: f64| Aabb { min: [-1.0, y - 1.0, -1.0], max: [1.0, y + 1.0, 1.0] };
-        let [pixels, angle] = projection.sphere(&around(10.0));
+        let [pixels, angle] = projection.viewpoint().sphere(&around(10.0));
         assert!((pixels - 3f64.sqrt() * 6.0).abs() < 1e-12 && angle == 0.0, "{pixels} {angle}");
-        assert_eq!(projection.sphere(&around(1.0))[0], f64::INFINITY, "from inside");
-        assert!((projection.sphere(&around(-10.0))[1] - std::f64::consts::PI).abs() < 1e-12);
+        assert_eq!(projection.viewpoint().sphere(&around(1.0))[0], f64::INFINITY, "from inside");
+        assert!((projection.viewpoint().sphere(&around(-10.0))[1] - std::f64::consts::PI).abs() < 1e-12);
         assert!(projection.may_see(&around(10.0)) && !projection.may_see(&around(-10.0)));
     }
 }

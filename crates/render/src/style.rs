@@ -1,5 +1,7 @@
 //! How points look.
 
+use pointmill_format::octree::Order;
+
 /// What the colour of a point says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Colour {
@@ -81,16 +83,6 @@ pub enum PointSize {
     World(f32),
     /// The distance between points at that place, times this factor: in an octree that of the deepest node drawn there.
     Adaptive(f32),
-}
-
-/// Which octree nodes come first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
-    /// By the radius of the node's sphere in the picture (Potree 1.8).
-    Radius,
-    /// By that radius, divided by one plus the angle to the direction of view in radians (Fraiss, "Rendering Large Point
-    /// Clouds in Unity", 2017).
-    RadiusAndAngle,
 }
 
 /// How many bits of a quantised position are decoded.

@@ -42,13 +42,14 @@ mod record_layout;
 mod tree;
 mod write_index;
 
-pub use camera::{Frustum, Material, distance_range, switch_distance};
+pub use crate::geometry::{Frustum, Ray};
+pub use camera::{Material, distance_range, switch_distance};
 pub use encode::{LeafEncoder, class_value, leaf_center};
 pub use header::{Header, Layout, SplitRule};
 #[cfg(feature = "rstar")]
 pub use nearest::{LeafBox, NearestPoints, Neighbour};
 pub use node::{INDEX_FILE, MAX_DEPTH, Node, NodeKind, NodePath, PACKED_FILE, leaf_file_name};
-pub use pick::{Hit, Picker, Ray};
+pub use pick::{Hit, Picker};
 pub use record_layout::{CORE_BYTES, PlacedAttribute, RecordLayout};
 pub use tree::Bintree;
 pub use write_index::IndexWriter;

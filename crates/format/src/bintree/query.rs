@@ -1,9 +1,9 @@
 //! Which leaves a renderer or a tool wants. All of it relies on boxes being what the format promises: unions of those
 //! below.
 
-use crate::{Aabb, NodePoints, ReadError};
+use crate::{Aabb, Frustum, NodePoints, ReadError};
 
-use super::camera::{Frustum, Material, distance_range};
+use super::camera::{Material, distance_range};
 use super::{Bintree, Node};
 
 impl Bintree {

@@ -1,7 +1,7 @@
 //! Octrees of points, whatever format they are in: what a renderer asks, so that it walks all of them in the same way.
 //!
-//! [`Octree`] is what a dataset answers, [`OctreeNodes`] the part of the tree that is known.
-//! [`open_octree`](crate::open_octree) opens any kind.
+//! [`Octree`] is what a dataset answers, [`OctreeNodes`] the part of the tree that is known, [`visible_nodes`] what a picture
+//! shows. [`open_octree`](crate::open_octree) opens any kind.
 //!
 //! ```
 //! use pointmill_format::octree::OctreeNodes;
@@ -32,6 +32,7 @@ mod chunk_cut;
 mod linked_tree;
 mod nodes;
 mod ranges;
+mod visible;
 
 use std::path::PathBuf;
 
@@ -41,6 +42,7 @@ pub(crate) use chunk_cut::chunk_roots;
 pub(crate) use linked_tree::{Keyed, LinkedTree};
 pub use nodes::OctreeNodes;
 pub(crate) use ranges::ChunkRanges;
+pub use visible::{Order, Selection, Viewpoint, VisibleNode, visible_nodes};
 
 /// What an octree says of itself.
 #[derive(Debug, Clone, PartialEq)]

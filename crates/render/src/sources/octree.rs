@@ -1,13 +1,10 @@
 //! What is drawn of an octree: the nodes in sight that are large in the picture, as many as the budget allows.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
-use pointmill_format::octree::{Octree, OctreeNode, OctreeNodes};
-use pointmill_format::{Attribute, NodeKey, ReadError};
+use pointmill_format::octree::{Octree, OctreeNode, OctreeNodes, Selection, VisibleNode, visible_nodes};
+use pointmill_format::{Attribute, ReadError};
 
 use crate::projection::Projection;
-use crate::{Order, PointSize, Style};
+use crate::{PointSize, Style};
 
 use super::{Buffers, Points, Source, Take, Unit, UnitSize};
 
@@ -34,37 +31,8 @@ pub(crate) struct OctreeSource<'a> {
     size: PointSize,
 }
 
-/// A node that may be drawn, in a heap: the most urgent first.
-struct Candidate {
-    weight: f64,
-    key: NodeKey,
-    parent: u32,
-}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // of two that weigh the same, as from inside of both, the coarser one, then the one of the lesser address
-        self.weight.total_cmp(&other.weight).then_with(|| other.key.cmp(&self.key))
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
-
 impl<'a> OctreeSource<'a> {
-    /// Walks the tree as viewers do, until a node does not fit the budget any more. The root is drawn whatever the budget
-    /// is.
+    /// The nodes that viewers draw ([`visible_nodes`]).
     ///
     /// # Errors
     /// Those of reading the index.
@@ -76,43 +44,23 @@ impl<'a> OctreeSource<'a> {
     ) -> Result<Self, ReadError> {
         let mut source = Self { octree, nodes: Vec::new(), size: style.size };
         let mut known = OctreeNodes::new(octree)?;
-        let mut heap = BinaryHeap::from([Candidate { weight: f64::INFINITY, key: NodeKey::ROOT, parent: NONE }]);
-        let mut total = 0u64;
-        while let Some(Candidate { key, parent, .. }) = heap.pop() {
-            let bounds = octree.info().node_box(key);
-            if !projection.may_see(&bounds) {
-                continue;
-            }
+        let wanted = Selection { budget, order: style.order, min_node_pixels: style.min_node_pixels };
+        let shown = visible_nodes(octree, &projection.viewpoint(), &wanted, |key| {
             known.load(octree, key)?;
-            let Some(node) = known.get(key).copied() else { continue };
-            let points = octree.count(&node)?;
-            total = total.saturating_add(points);
-            if total > budget && key != NodeKey::ROOT {
-                break;
-            }
-            let index = source.add(node, points, parent);
-            for child in known.children(key) {
-                let [radius, angle] = projection.sphere(&octree.info().node_box(child.key));
-                let weight = match style.order {
-                    Order::Radius => radius,
-                    Order::RadiusAndAngle => radius / (1.0 + angle),
-                };
-                if radius >= style.min_node_pixels {
-                    heap.push(Candidate { weight, key: child.key, parent: index });
-                }
-            }
-        }
+            Ok(known.get(key).copied())
+        })?;
+        shown.iter().for_each(|node| source.add(node));
         Ok(source)
     }
 
-    fn add(&mut self, node: OctreeNode, points: u64, parent: u32) -> u32 {
+    /// Nodes come in the order of the list.
+    fn add(&mut self, shown: &VisibleNode) {
         let index = self.nodes.len() as u32;
-        if let Some(parent) = self.nodes.get_mut(parent as usize) {
-            parent.children[usize::from(node.key.child_index())] = index;
+        if let Some(parent) = shown.parent.and_then(|parent| self.nodes.get_mut(parent)) {
+            parent.children[usize::from(shown.node.key.child_index())] = index;
         }
-        let spacing = self.spacing(&node, points);
-        self.nodes.push(Drawn { node, points, spacing, children: [NONE; 8] });
-        index
+        let (node, points) = (shown.node, shown.points);
+        self.nodes.push(Drawn { node, points, spacing: self.spacing(&node, points), children: [NONE; 8] });
     }
 
     /// Between points of a node and its ancestors: of an inner node what the level says; a leaf has whatever remained, in the
@@ -197,10 +145,10 @@ mod tests {
     use std::path::PathBuf;
 
     use pointmill_format::octree::OctreeInfo;
-    use pointmill_format::{Aabb, NodePoints};
+    use pointmill_format::{Aabb, NodeKey, NodePoints};
 
     use super::*;
-    use crate::{Camera, Size};
+    use crate::{Camera, Order, Size};
 
     /// All nodes of three levels, 10 points in each, in a cube of 8 units; the index says it at once.
     struct Full(OctreeInfo);

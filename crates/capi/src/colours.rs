@@ -1,0 +1,66 @@
+//! Colours of points as red, green, blue and alpha.
+
+use pointmill_format::batches::{eight_bit, rgb_of};
+use pointmill_format::{Column, NodePoints};
+
+use crate::about::{Colours, Depth};
+use crate::dataset::{Content, PmDataset};
+use crate::decode::Decoder;
+use crate::status::Outcome;
+
+/// Nodes that are looked at, evenly spread, where a dataset does not say how many bits its colours have.
+const SAMPLED: u32 = 16;
+
+impl PmDataset {
+    /// Where colours are and how deep; looks at points the first time, if the dataset does not say it.
+    pub(crate) fn known_colours(&self) -> Outcome<Option<Colours>> {
+        if let Some(known) = self.colours.get() {
+            return Ok(*known);
+        }
+        let mut colours = self.about.colours();
+        if let Some(colours) = &mut colours
+            && colours.depth == Depth::Unknown
+        {
+            colours.depth = if self.is_deep(colours.column)? { Depth::Sixteen } else { Depth::Eight };
+        }
+        Ok(*self.colours.get_or_init(|| colours))
+    }
+
+    /// True if one of the values of some nodes takes more than 8 bits.
+    fn is_deep(&self, column: usize) -> Outcome<bool> {
+        let units: Vec<u32> = match &self.content {
+            Content::Bintree(leaves) => leaves.tree.leaves().collect(),
+            _ => (0..self.node_count()).collect(),
+        };
+        let taken = SAMPLED.min(units.len() as u32) as usize;
+        let mut decoder = Decoder::default();
+        for id in (0..taken).filter_map(|i| units.get(i * units.len() / taken)) {
+            decoder.decode(self, *id, 0)?;
+            let values = decoder.points.columns().get(column).and_then(Column::values::<u16>);
+            if values.unwrap_or(&[]).iter().any(|v| *v > 255) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// The colour of point `i`, opaque; `None` if the column is not one of colours.
+pub(crate) fn colour(points: &NodePoints, colours: Colours, elements: usize, i: usize) -> Option<[u8; 4]> {
+    let opaque = |[r, g, b]: [u8; 3]| [r, g, b, 255];
+    match points.columns().get(colours.column)? {
+        Column::UInt32(words) => Some(opaque(rgb_of(*words.get(i)?))),
+        Column::UInt8(values) => {
+            let rgb = values.get(i * elements..)?.first_chunk::<3>()?;
+            Some(opaque(*rgb))
+        }
+        Column::UInt16(values) => {
+            let rgb = values.get(i * elements..)?.first_chunk::<3>()?;
+            Some(opaque(match colours.depth {
+                Depth::Sixteen => rgb.map(eight_bit),
+                _ => rgb.map(|v| v.min(255) as u8),
+            }))
+        }
+        _ => None,
+    }
+}
