@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, SystemTime};
 
 use pointmill_testkit::files::fixture;
@@ -16,6 +16,8 @@ use crate::support::Dir;
 /// The program while it serves; killed if it was not stopped.
 struct Serving {
     child: Child,
+    /// What follows the first line.
+    out: BufReader<ChildStdout>,
     /// `http://127.0.0.1:1234/`
     url: String,
 }
@@ -25,14 +27,13 @@ impl Serving {
         let args = ["view", "--no-open"].iter().chain(args);
         let mut command = dir.command(args);
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        // byte by byte: what follows is left to the test
-        let first: Vec<u8> =
-            child.stdout.as_mut().unwrap().bytes().map_while(Result::ok).take_while(|b| *b != b'\n').collect();
-        let url = String::from_utf8(first).unwrap();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        let mut url = String::new();
+        out.read_line(&mut url).unwrap();
         if url.is_empty() {
             panic!("{}", String::from_utf8_lossy(&child.wait_with_output().unwrap().stderr));
         }
-        Self { child, url: url.trim_end().to_owned() }
+        Self { child, out, url: url.trim_end().to_owned() }
     }
 
     /// The body of a successful answer.
@@ -194,7 +195,7 @@ fn the_address_is_printed_as_json_too() {
     let mut serving = Serving::start(&dir, &[dataset.to_str().unwrap(), "--json", "-q"]);
     assert_eq!(serving.url, "{", "one object");
     let mut text = "{".to_owned();
-    let mut lines = BufReader::new(serving.child.stdout.as_mut().unwrap()).lines().map(Result::unwrap);
+    let mut lines = serving.out.by_ref().lines().map(Result::unwrap);
     while serde_json::from_str::<Value>(&text).is_err() {
         text += &lines.next().unwrap_or_else(|| panic!("{text}"));
     }
