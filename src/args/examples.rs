@@ -72,7 +72,7 @@ mod tests {
         for line in lines {
             // what is meant by it stands behind three blanks or more, what a shell does with it behind > or |
             let line = line.trim().split("   ").next().unwrap_or_default();
-            let command = line.split([ '>', '|' ]).next().unwrap_or_default().replace('\'', "");
+            let command = line.split(['>', '|']).next().unwrap_or_default().replace('\'', "");
             let words: Vec<&str> = command.split_whitespace().collect();
             assert_eq!(words.first(), Some(&"pointmill"), "{line}");
             if let Err(error) = Args::try_parse_from(&words) {

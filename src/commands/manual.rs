@@ -35,7 +35,7 @@ pub(crate) fn man(args: &ManArgs) -> Result<(), Failure> {
 
 fn page(command: Command, name: &str) -> Result<Vec<u8>, Failure> {
     let mut page = Vec::new();
-    let command = command.version(env!("CARGO_PKG_VERSION")).name(name.to_owned());
+    let command = command.version(env!("CARGO_PKG_VERSION"));
     let rendered = clap_mangen::Man::new(command).title(name.to_uppercase()).render(&mut page);
     rendered.map(|()| page).map_err(|e| Failure::Internal(format!("the manual page of {name}: {e}")))
 }

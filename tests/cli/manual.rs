@@ -24,7 +24,8 @@ fn there_is_a_manual_page_for_each_command() {
     assert!(main.contains(".TH POINTMILL 1") && main.contains("pointmill\\-convert(1)"), "{main}");
     dir.succeed(["man", "-o", "pages"]);
     let help = dir.succeed(["--help"]).stdout();
-    let commands: Vec<&str> = help.split("Commands:").nth(1).unwrap().lines().skip(1).take_while(|l| !l.is_empty()).collect();
+    let commands: Vec<&str> =
+        help.split("Commands:").nth(1).unwrap().lines().skip(1).take_while(|l| !l.is_empty()).collect();
     let mut names: Vec<&str> = commands
         .iter()
         .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
