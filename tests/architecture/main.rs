@@ -17,7 +17,7 @@ use layers::Layers;
 
 /// The modules of each crate, from the lowest to the highest layer. Modules of one layer may need each other, as long as
 /// there is no circle of files.
-const LAYERS: [(&str, Layers<'static>); 8] = [
+const LAYERS: [(&str, Layers<'static>); 9] = [
     (
         "pointmill",
         &[
