@@ -38,7 +38,8 @@ const OTHER_OPTIONS: &[&str] = &[
 fn tree(folder: &Path) -> BTreeSet<String> {
     let visible = |entry: &walkdir::DirEntry| {
         let name = entry.file_name().to_string_lossy();
-        entry.depth() == 0 || name == ".ci" || !(name.starts_with('.') || name == "target" || name == "corpus")
+        let foreign = ["target", "corpus", "node_modules"].contains(&name.as_ref());
+        entry.depth() == 0 || name == ".ci" || !(name.starts_with('.') || foreign)
     };
     let entries = walkdir::WalkDir::new(folder).into_iter().filter_entry(visible).filter_map(Result::ok);
     entries.map(|e| e.path().strip_prefix(folder).unwrap().to_string_lossy().replace('\\', "/")).collect()

@@ -1,4 +1,4 @@
-// What the pages of potree-core and three-loader have in common: both are made from Potree, and their nodes look alike.
+// What the pages of Potree, potree-core and three-loader have in common: these are made from that, and their nodes look alike.
 
 import { Lattice } from "./lattice.js";
 import { Sums } from "./sums.js";
@@ -36,7 +36,7 @@ export async function loadAll(cloud, { columns, lattice, slack }) {
     chunks = Math.max(chunks, chunksAbove(node));
     sums.add(node.numPoints, pointColumns(node, corner, columns, steps));
   };
-  for (let level = [geometry.root]; level.length > 0; level = level.flatMap((node) => node.children).filter(Boolean).map(plain)) {
+  for (let level = [geometry.root]; level.length > 0; level = level.flatMap((node) => Object.values(node.children)).filter(Boolean).map(plain)) {
     const queue = [...level];
     const take = async () => {
       while (queue.length > 0) await visit(queue.pop());
@@ -101,7 +101,7 @@ const scalar = (attribute) => attribute.potree?.preciseBuffer ?? attribute.array
 /** What the client knows of the cloud without its nodes, in world coordinates. */
 function description({ offset, boundingBox, tightBoundingBox, pointAttributes }) {
   const world = ({ min, max }) => [min, max].map((corner) => corner.toArray().map((value, axis) => value + offset.toArray()[axis]));
-  const ranges = (pointAttributes.attributes ?? []).filter(({ numElements, range }) => numElements === 1 && range);
+  const ranges = (pointAttributes.attributes ?? []).filter(({ numElements, range }) => numElements === 1 && range?.every(Number.isFinite));
   return {
     cube: world(boundingBox),
     box: world(tightBoundingBox),

@@ -11,11 +11,17 @@ import { chromium } from "playwright-core";
 const here = dirname(fileURLToPath(import.meta.url));
 const require = createRequire(import.meta.url);
 
+/** A folder with a built Potree, which is not published as a package: one of its releases, unpacked. */
+export const POTREE = process.env.POTREE;
+
 /** Which three.js each client gets: three-loader asks for ~0.160, the others take the newest. */
-export const CLIENTS = { "potree-core": "three-current", "three-loader": "three", copc: "three-current" };
+const CLIENTS = { "potree-core": "three-current", "three-loader": "three", copc: "three-current", ...(POTREE && { potree: "three-current" }) };
+
+/** Scripts that a page needs beside its own, from the folder of Potree. */
+const BEFORE = { potree: ["libs/jquery/jquery-3.1.1.min.js", "libs/proj4/proj4.js", "build/potree/potree.js"] };
 
 const PAGE = (script) => `<!doctype html><meta charset="utf-8"><link rel="icon" href="data:,"><title>${script}</title>
-<style>body { margin: 0 }</style><canvas width="640" height="480"></canvas><script type="module" src="/${script}.js"></script>`;
+<style>body { margin: 0 }</style><canvas width="640" height="480"></canvas>${(BEFORE[script] ?? []).map((path) => `<script src="/${script}/${path}"></script>`).join("")}<script type="module" src="/${script}.js"></script>`;
 
 /** Makes one script and one page of each client in `folder`, as a bundler does for those who use it. */
 export async function bundle(folder) {
@@ -56,7 +62,7 @@ export async function startBrowser() {
   });
   const close = async () => {
     await context.close();
-    rmSync(profile, { recursive: true, force: true });
+    rmSync(profile, { recursive: true, force: true, maxRetries: 5 }); // processes may still write
   };
   return { context, close };
 }
@@ -88,7 +94,7 @@ export async function runPage(context, url, job, { seconds, screenshot }) {
     return { ...result, complaints };
   } catch (error) {
     // what the console said is more often the cause than what was thrown at last
-    error.message = [error.message.split("\n")[0].replace(/^page\.\w+: Error: /, ""), ...complaints].join("; ");
+    error.message = [error.message.split("\n")[0].replace(/^page\.\w+: (Error: )?/, ""), ...complaints].join("; ");
     throw error;
   } finally {
     clearTimeout(timer);

@@ -1,7 +1,10 @@
 // Which scene becomes which dataset, and which clients read it.
 
-const BOTH = ["potree-core", "three-loader"];
-const CORE = ["potree-core"]; // three-loader has no Brotli
+import { POTREE } from "./browser.js";
+
+const itself = POTREE ? ["potree"] : [];
+const BOTH = ["potree-core", "three-loader", ...itself];
+const CORE = ["potree-core", ...itself]; // three-loader has no Brotli
 const COPC = ["copc"];
 
 /** Options of `convert` for each kind of dataset. */
