@@ -4,7 +4,8 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use pointmill_render::{Camera, Colour, Size, Style, View};
+use pointmill_format::batches::Precision;
+use pointmill_render::{Bits, Camera, Colour, Shape, Size, Style, View};
 
 use super::common::InputArgs;
 use super::values::{parse_size, parse_threads, whole};
@@ -51,6 +52,18 @@ pub(crate) struct PreviewArgs {
     /// How points become a picture
     #[arg(long, value_enum, value_name = "WAY", default_value = "filled", help_heading = "Style")]
     pub(crate) shading: ShadingArg,
+    /// What a point covers, instead of what --shading has: one pixel, or a square or a paraboloid as large as the gaps between
+    /// points
+    #[arg(long, value_enum, value_name = "SHAPE", help_heading = "Style")]
+    pub(crate) shape: Option<ShapeArg>,
+    /// Quantised batches: continuous levels of detail by this factor, instead of --budget; 1 is fine, more is fewer points
+    #[arg(long, value_name = "X", value_parser = parse_clod, conflicts_with = "budget", allow_negative_numbers = true,
+          help_heading = "Style")]
+    pub(crate) clod: Option<f32>,
+    /// Quantised batches: bits of a coordinate that are decoded. auto: as many as keep the error within half a pixel
+    /// [default: auto]
+    #[arg(long, value_name = "N", value_parser = parse_bits, allow_negative_numbers = true, help_heading = "Style")]
+    pub(crate) bits: Option<Bits>,
     /// Draws the boxes of the nodes, leaves or batches that are drawn
     #[arg(long, help_heading = "Style")]
     pub(crate) boxes: bool,
@@ -85,6 +98,39 @@ pub(crate) enum ShadingArg {
     Edl,
 }
 
+/// What a point covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ShapeArg {
+    Pixel,
+    Square,
+    Paraboloid,
+}
+
+impl From<ShapeArg> for Shape {
+    fn from(shape: ShapeArg) -> Self {
+        match shape {
+            ShapeArg::Pixel => Self::Pixel,
+            ShapeArg::Square => Self::Square,
+            ShapeArg::Paraboloid => Self::Paraboloid,
+        }
+    }
+}
+
+impl PreviewArgs {
+    /// All options of the style together.
+    pub(crate) fn style(&self) -> Style {
+        let way = self.shading.style();
+        Style {
+            colour: self.colour,
+            has_boxes: self.boxes,
+            shape: self.shape.map_or(way.shape, Into::into),
+            clod: self.clod,
+            bits: self.bits.unwrap_or(way.bits),
+            ..way
+        }
+    }
+}
+
 impl ShadingArg {
     pub(crate) fn style(self) -> Style {
         match self {
@@ -102,6 +148,17 @@ fn parse_view(text: &str) -> Result<View, String> {
 
 fn parse_colour(text: &str) -> Result<Colour, String> {
     Colour::named(text).ok_or_else(|| format!("expected one of {}", Colour::ALL.map(Colour::name).join(", ")))
+}
+
+fn parse_clod(text: &str) -> Result<f32, String> {
+    let factor = text.parse().ok().filter(|factor: &f32| factor.is_finite() && *factor > 0.0);
+    factor.ok_or_else(|| "expected a number above 0; 1 is fine, more is fewer points".to_owned())
+}
+
+fn parse_bits(text: &str) -> Result<Bits, String> {
+    let always = || text.parse().ok().and_then(Precision::from_bits).map(Bits::Always);
+    let bits = if text == "auto" { Some(Bits::HalfPixel) } else { always() };
+    bits.ok_or_else(|| "expected auto, 10, 20 or 30".to_owned())
 }
 
 /// Six, nine or ten numbers, checked as a camera.

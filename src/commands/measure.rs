@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use pointmill_converter::resolve_path;
+use pointmill_converter::{WorkFolder, resolve_path};
 use pointmill_measure::{MeasureError, Measured, Measurement, Shown, Watch, report};
 
 use crate::args::{BUDGET, InputArgs, MeasureArgs, SAMPLE};
@@ -21,7 +21,8 @@ pub(crate) fn run(args: &MeasureArgs) -> Result<(), Failure> {
     if !args.talk.quiet {
         inputs.notes.iter().for_each(|note| print_line(note));
     }
-    let folder = prepare(args, &inputs.files)?;
+    let made = prepare(args, &inputs.files)?;
+    let folder = made.path.clone();
     let temporary = temporary(args.temp_dir.as_deref().unwrap_or(&folder))?;
     let progress = Progress::new(&args.talk, Some(stop_flag()));
     works_in(temporary.path());
@@ -33,7 +34,7 @@ pub(crate) fn run(args: &MeasureArgs) -> Result<(), Failure> {
         threads: args.threads.map_or_else(all_cores, |threads| usize::from(threads.get())),
         budget: args.budget.unwrap_or(BUDGET),
         size: args.size,
-        temporary: temporary.path().to_owned(),
+        temporary: temporary.files(),
         memory: args.memory,
     };
     let watcher = Watcher { folder: &folder, progress: &progress, failed: std::sync::Mutex::new(None) };
@@ -86,8 +87,23 @@ fn all_cores() -> usize {
     std::thread::available_parallelism().map_or(1, Into::into)
 }
 
+/// The folder of the results. What was made of it and above it goes again if nothing is put into it.
+struct ResultFolder {
+    path: PathBuf,
+    /// The lowest first.
+    made: Vec<PathBuf>,
+}
+
+impl Drop for ResultFolder {
+    fn drop(&mut self) {
+        for folder in &self.made {
+            let _ = fs::remove_dir(folder); // with something in it, it stays
+        }
+    }
+}
+
 /// Makes the folder; what stands in it is left alone, but for the files of an earlier measurement if these may be replaced.
-fn prepare(args: &MeasureArgs, inputs: &[PathBuf]) -> Result<PathBuf, Failure> {
+fn prepare(args: &MeasureArgs, inputs: &[PathBuf]) -> Result<ResultFolder, Failure> {
     let shown = args.output.display();
     let folder = resolve_path(&args.output).map_err(|error| Failure::Usage(format!("{shown}: {error}")))?;
     let is_in = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| folder.starts_with(input));
@@ -108,7 +124,9 @@ fn prepare(args: &MeasureArgs, inputs: &[PathBuf]) -> Result<PathBuf, Failure> {
             return Err(Failure::Usage(format!("{shown}: {file} is of no measurement; choose another folder")));
         }
     }
-    fs::create_dir_all(&folder).map_err(|error| Failure::io(&args.output, "making the folder", &error))?;
+    let missing = folder.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
+    let folder = ResultFolder { path: folder, made: missing };
+    fs::create_dir_all(&folder.path).map_err(|error| Failure::io(&args.output, "making the folder", &error))?;
     Ok(folder)
 }
 
@@ -121,9 +139,9 @@ fn is_measurement(folder: &Path) -> bool {
         && result.is_some_and(|result| result.get("rows").is_some() && result.get("profiles").is_some())
 }
 
-fn temporary(parent: &Path) -> Result<tempfile::TempDir, Failure> {
-    let made = tempfile::Builder::new().prefix(".measure-").tempdir_in(parent);
-    made.map_err(|error| Failure::io(parent, "making a folder for temporary files", &error))
+fn temporary(parent: &Path) -> Result<WorkFolder, Failure> {
+    WorkFolder::make(parent, ".measure-")
+        .map_err(|error| Failure::io(parent, "making a folder for temporary files", &error))
 }
 
 fn kept_line(folder: &Path, result: &Measured) -> String {

@@ -47,6 +47,13 @@ fn every_setting_has_a_row_with_its_figures_and_each_profile_converts() {
     assert_eq!(row("potree2, compressed")["same_points_as"], "potree2");
     // the cloud itself has no holes in the picture of all its points
     assert!(row("bintree")["views"][0]["error"]["holes"].as_f64().unwrap() < 0.05);
+    // without colours of their own, trees are held against the cloud by depth
+    for (name, is_by_depth) in [("potree2", false), ("bintree", true), ("batches, 10 bits", false)] {
+        assert_eq!(row(name)["is_shaded_by_depth"], is_by_depth, "{name}");
+    }
+    let by_depth = row("bintree")["views"].as_array().unwrap();
+    // of colours against heights it would be 10 dB; null is no difference
+    assert!(by_depth.iter().all(|v| v["error"]["psnr"].as_f64().is_none_or(|psnr| psnr > 15.0)), "{by_depth:?}");
     let deltas = row("potree2")["levels"].as_array().unwrap();
     assert_eq!(deltas.last().unwrap()["delta_e"], 0.0, "all points of all levels are the cloud");
     assert!(deltas[0]["delta_e"].as_f64().unwrap() > 0.0);
@@ -55,6 +62,7 @@ fn every_setting_has_a_row_with_its_figures_and_each_profile_converts() {
     assert_eq!(table.lines().count(), 1 + rows.len());
     let page = fs::read_to_string(dir.path("out/report.html")).unwrap();
     assert!(page.contains("<svg") && page.matches("data:image/jpeg").count() == 4 * (1 + 4));
+    assert!(page.contains("bintree (by depth): ") && page.contains("geometry alone"));
     assert_eq!(fs::read_dir(dir.path("out")).unwrap().count(), 3, "temporary files are removed");
     for (name, output) in [("fast", "potree2"), ("balanced", "batches"), ("exact", "bintree")] {
         let scan = scan.to_str().unwrap();
@@ -76,6 +84,17 @@ fn of_a_large_scene_whole_columns_are_measured() {
     assert!((8_000..=12_000).contains(&points), "{scene}");
     assert!(scene["chunks"][0].as_u64().unwrap() < scene["chunks"][1].as_u64().unwrap());
     assert_eq!(result["rows"].as_array().unwrap().len(), 4);
+}
+
+#[test]
+fn a_point_far_away_makes_the_sample_no_larger() {
+    let dir = Dir::new();
+    let points = (0..40_000).map(|i| Point::numbered(i, [i as i32 % 200, i as i32 / 200, i as i32 % 7]));
+    let points = points.chain([Point::numbered(40_000, [2_000_000_000, -2_000_000_000, 0])]);
+    dir.write("in.las", &Las::new(points.collect()).bytes());
+    let result = measured(&dir, "in.las", &["--axes", "output=bintree", "--sample", "10k"]);
+    let points = result["scene"]["points"].as_u64().unwrap();
+    assert!((8_000..=12_000).contains(&points), "{}", result["scene"]);
 }
 
 #[test]
@@ -101,7 +120,8 @@ fn scenes_of_one_point_are_measured_and_of_none_are_not() {
     let result = measured(&dir, "one.las", &["--axes", "output"]);
     assert!(result["rows"].as_array().unwrap().iter().all(|row| row["failed"].is_null()), "{result}");
     dir.write("none.las", &Las::new(Vec::new()).bytes());
-    dir.run(["measure", "none.las", "-o", "none"]).failed_with(3, &["no point"]);
+    dir.run(["measure", "none.las", "-o", "none/deep"]).failed_with(3, &["no point"]);
+    assert!(!dir.path("none").exists(), "nothing was measured");
 }
 
 #[test]
@@ -135,6 +155,7 @@ fn mistakes_are_one_line_before_anything_is_measured() {
     assert_eq!(fs::read(dir.path("taken/measure.json")).unwrap(), b"{}");
     dir.run(["measure", "in.las", "-o", "failed", "--axes", "attributes=rainbow"]).failed_with(2, &["rainbow"]);
     dir.run(["convert", "in.las", "-o", "x", "--measured", "out"]).failed_with(2, &["--measured requires --profile"]);
+    assert!(!dir.path("out").exists(), "a mistake makes no folder");
 }
 
 #[cfg(unix)]
@@ -162,4 +183,26 @@ fn an_interrupted_measurement_keeps_what_it_has() {
     assert!(!result["rows"].as_array().unwrap().is_empty());
     assert!(fs::read_to_string(dir.path("out/report.html")).unwrap().contains("interrupted"));
     assert_eq!(fs::read_dir(dir.path("out")).unwrap().count(), 3, "temporary files are removed");
+}
+
+#[cfg(unix)]
+#[test]
+fn what_a_killed_measurement_leaves_the_next_one_removes() {
+    let dir = Dir::new();
+    let points = (0..60_000).map(|i| Point::numbered(i, [i as i32 % 300, i as i32 / 300, i as i32 % 11]));
+    dir.write("in.las", &Las::new(points.collect()).bytes());
+    let measure = ["measure", "in.las", "-o", "out", "--axes", "output=bintree", "--overwrite"];
+    let mut child = dir.command(measure.iter().chain(&SMALL)).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let names =
+        || fs::read_dir(dir.path("out")).into_iter().flatten().flatten().map(|e| e.file_name()).collect::<Vec<_>>();
+    let has_begun = || names().iter().any(|name| name.to_string_lossy().starts_with(".measure-"));
+    while !has_begun() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(has_begun(), "{:?}", names());
+    dir.succeed(measure.iter().chain(&SMALL));
+    assert_eq!(names().len(), 3, "{:?}", names());
 }

@@ -100,6 +100,14 @@ fn a_flight_is_numbered_and_begins_and_ends_at_its_keyframes() {
     dir.write("bad.json", br#"{"keyframes": [{"eye": [0, 0, 0]}]}"#);
     let bad = ["preview", "a.las", "-o", "y.png", "--path", "bad.json", "--frames", "2"];
     dir.run(bad).failed_with(3, &["bad.json", "keyframe 1 has no \"target\""]);
+    // the eye meets the target half way: known before the first picture
+    dir.write(
+        "meet.json",
+        br#"{"keyframes": [{"eye": [0, 0, 0], "target": [2, 0, 0]}, {"eye": [2, 0, 0], "target": [0, 0, 0]}]}"#,
+    );
+    let meet = ["preview", "a.las", "-o", "y.png", "--path", "meet.json", "--frames", "3"];
+    dir.run(meet).failed_with(3, &["meet.json: picture 2 of 3", "stands at its own target"]);
+    assert!(!dir.names().iter().any(|name| name.starts_with('y')), "{:?}", dir.names());
 }
 
 #[test]
@@ -122,7 +130,7 @@ fn what_cannot_be_drawn_is_refused_before_anything_is_written() {
     let scan = fixture(AERIAL);
     let scan = scan.to_str().unwrap();
     dir.write("old.png", b"not a picture");
-    let table: [(&[&str], i32, &str); 14] = [
+    let table: [(&[&str], i32, &str); 20] = [
         (&["-o", "x.png", "--size", "0x5"], 2, "each side must have 1 to 16384"),
         (&["-o", "x.png", "--size", "1000000x1000000"], 2, "each side must have 1 to 16384"),
         (&["-o", "x.png", "--camera", "nan,0,0,1,1,1"], 2, "not finite"),
@@ -137,12 +145,39 @@ fn what_cannot_be_drawn_is_refused_before_anything_is_written() {
         (&["-o", "old.png", "--overwrite"], 2, "is no picture and is not replaced"),
         (&["-o", "x.png", "--path", "missing.json", "--frames", "2"], 2, "missing.json: no such file"),
         (&["-o", "x.png", "--budget", "0"], 2, "expected a whole number from 1"),
+        (&["-o", "x.png", "--clod", "-1"], 2, "expected a number above 0"),
+        (&["-o", "x.png", "--clod", "inf"], 2, "expected a number above 0"),
+        (&["-o", "x.png", "--clod", "1"], 2, "--clod is for quantised batches"),
+        (&["-o", "x.png", "--bits", "16"], 2, "expected auto, 10, 20 or 30"),
+        (&["-o", "x.png", "--bits", "10"], 2, "--bits is for quantised batches"),
+        (&["-o", "x.png", "--shape", "cube"], 2, "--shape"),
     ];
     for (args, code, words) in table {
         dir.run(["preview", scan].iter().chain(args)).failed_with(code, &[words]);
     }
     dir.run(["preview", "missing.las", "-o", "x.png"]).failed_with(2, &["missing.las"]);
     assert_eq!(dir.names(), ["old.png"]);
+}
+
+#[test]
+fn shapes_levels_and_bits_are_those_that_are_asked_for() {
+    let dir = Dir::new();
+    let scan = fixture(AERIAL);
+    dir.succeed(["convert", scan.to_str().unwrap(), "-o", "batches", "--to", "batches"]);
+    let drawn = |options: &[&str]| {
+        let all = ["batches", "-o", "x.png", "--overwrite", "--size", "160x120"];
+        let points = json(&dir, &[&all[..], options].concat())["points"].as_u64().unwrap();
+        (points, pixels(&dir.path("x.png")).2)
+    };
+    let (all, usual) = drawn(&[]);
+    assert_eq!(drawn(&["--shape", "paraboloid", "--bits", "auto"]).1, usual);
+    let coarse = drawn(&["--clod", "8"]).0;
+    assert!(coarse < drawn(&["--clod", "1"]).0 && coarse < all, "{coarse} of {all}");
+    assert!(differing(&drawn(&["--shape", "pixel"]).1, &drawn(&["--shape", "square"]).1) > 100);
+    let plain = ["--shading", "plain"];
+    assert_eq!(drawn(&[&plain[..], &["--shape", "pixel"]].concat()).1, drawn(&plain).1);
+    let of_bits = |bits| drawn(&["--bits", bits, "--colour", "bits", "--shading", "plain"]).1;
+    assert!(differing(&of_bits("10"), &of_bits("30")) > 100);
 }
 
 #[test]

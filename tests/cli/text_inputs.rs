@@ -34,6 +34,21 @@ fn a_comma_that_may_be_both_is_refused_until_it_is_told() {
 }
 
 #[test]
+fn titles_between_commas_say_that_commas_separate() {
+    let dir = Dir::new();
+    for (name, text) in [
+        ("four.csv", "x,y,z,intensity\n345678,5432109,87,120\n345679,5432110,88,121\n"),
+        ("six.csv", "x,y,z,r,g,b\n345678,123,87,10,20,30\n345679,124,88,11,21,31\n"),
+    ] {
+        dir.write(name, text.as_bytes());
+        let object = dir.succeed(["info", name, "--deep", "--json"]).stdout();
+        let object: serde_json::Value = serde_json::from_str(&object).unwrap();
+        assert_eq!(object[0]["measured"]["bounds"]["min"][2], json!(87.0), "{name}: {object}");
+        assert_eq!(object[0]["measured"]["bounds"]["min"][0], json!(345_678.0), "{name}");
+    }
+}
+
+#[test]
 fn a_row_that_contradicts_the_sample_is_an_error() {
     let dir = Dir::new();
     dir.write("a.xyz", (("1 2 3\n").repeat(50_000) + "1,5 2,5 3,5\n").as_bytes());

@@ -60,7 +60,7 @@ pub use outputs::bintree::BintreeSettings;
 pub use outputs::copc::CopcSettings;
 pub use outputs::potree1::{Potree1Settings, Potree1Version};
 pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
-pub use outputs::{StagedFiles, Target, resolve_path};
+pub use outputs::{StagedFiles, Target, WorkFolder, resolve_path};
 pub use plan::{
     AttributeChoice, Duplicates, ExportFormat, Filter, LengthUnit, OnFault, OriginPoints, Outliers, Plan, PlanError,
     PlanFault, PositionPrecision, RgbDepth, ScaleChoice, Setting,

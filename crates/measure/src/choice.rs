@@ -32,15 +32,20 @@ fn dominates(a: [f64; 4], b: [f64; 4]) -> bool {
     is_better && !is_worse
 }
 
-/// Marks the rows that no other dominates: in time, bytes, error of positions and error of pictures.
+/// Marks the rows that no other dominates: in time, bytes, error of positions and error of pictures. Rows whose pictures are
+/// shaded by depth are compared among themselves.
 pub(crate) fn mark_front(rows: &mut [Row], rounding: f64) {
-    let figures: Vec<_> = rows.iter().map(|row| objectives(row, rounding)).collect();
+    let figures: Vec<_> = rows.iter().map(|row| Some((row.is_shaded_by_depth, objectives(row, rounding)?))).collect();
     for (row, mine) in rows.iter_mut().zip(&figures) {
-        row.is_on_front = mine.is_some_and(|mine| !figures.iter().flatten().any(|other| dominates(*other, mine)));
+        // errors of colours and of depths do not compare
+        let is_beaten = |(kind, mine): (bool, [f64; 4])| {
+            figures.iter().flatten().any(|(other_kind, other)| *other_kind == kind && dominates(*other, mine))
+        };
+        row.is_on_front = mine.is_some_and(|mine| !is_beaten(mine));
     }
 }
 
-/// The settings of the profiles, by output.
+/// The settings of the profiles, by output. If some of an output keep the colours, those that do not are none of them.
 pub(crate) fn profiles(rows: &[Row], rounding: f64) -> Vec<Profile> {
     let mut outputs: Vec<&str> = Vec::new();
     for row in rows {
@@ -51,7 +56,11 @@ pub(crate) fn profiles(rows: &[Row], rounding: f64) -> Vec<Profile> {
     let mut profiles = Vec::new();
     for output in outputs {
         let of_it = rows.iter().filter(|row| row.output == output);
-        let measured: Vec<(&Row, [f64; 4])> = of_it.filter_map(|row| Some((row, objectives(row, rounding)?))).collect();
+        let mut measured: Vec<(&Row, [f64; 4])> =
+            of_it.filter_map(|row| Some((row, objectives(row, rounding)?))).collect();
+        if measured.iter().any(|(row, _)| !row.is_shaded_by_depth) {
+            measured.retain(|(row, _)| !row.is_shaded_by_depth);
+        }
         for (name, order) in [("fast", &[0, 1, 3, 2]), ("exact", &[2, 3, 1, 0])] as [(_, &[usize; 4]); 2] {
             profiles.extend(first_by(&measured, order).map(|row| profile(name, row, &measured)));
         }
@@ -148,6 +157,19 @@ mod tests {
         let front: Vec<&str> = rows.iter().filter(|row| row.is_on_front).map(|row| row.name.as_str()).collect();
         // "quick again" is within the noise of "quick"
         assert_eq!(front, ["quick", "quick again", "small", "middle", "rough"]);
+    }
+
+    #[test]
+    fn errors_of_depths_do_not_compare_with_those_of_colours() {
+        let mut rows = rows();
+        let without = Row { is_shaded_by_depth: true, ..row("no colours", 0.5, 5.0, 0.0, 1.0) };
+        rows.push(without);
+        mark_front(&mut rows, 1e-9);
+        let front: Vec<&str> = rows.iter().filter(|row| row.is_on_front).map(|row| row.name.as_str()).collect();
+        assert_eq!(front, ["quick", "quick again", "small", "middle", "rough", "no colours"]);
+        assert!(profiles(&rows, 1e-9).iter().all(|p| p.setting != "no colours"));
+        rows.iter_mut().for_each(|row| row.is_shaded_by_depth = true);
+        assert!(profiles(&rows, 1e-9).iter().any(|p| p.setting == "no colours"));
     }
 
     #[test]

@@ -255,6 +255,7 @@ mod tests {
         let mut drawn = row(|_| [9; 3], |i| u8::from(i > 1));
         let covered = |drawn: &Cloud| reference.levels(drawn, &[2.0])[0].covered;
         assert_eq!(covered(&drawn), 0.25);
+        assert_eq!(reference.levels(&drawn, &[2.0])[0].delta_e, Some(0.0), "holes have no colour to compare");
         drawn.rgb.clear();
         assert_eq!(reference.levels(&drawn, &[2.0])[0].delta_e, None);
     }
@@ -275,5 +276,38 @@ mod tests {
         assert_eq!((levels[0].cells, levels[0].covered, levels[0].rms), (1, 1.0, Some(0.0)));
         let nothing = reference.levels(&Cloud::default(), &[1.0]);
         assert_eq!((nothing[0].points, nothing[0].covered), (0, 0.0));
+    }
+
+    fn line(x: &[f64], grey: &[u8]) -> Cloud {
+        let rgb = grey.iter().map(|v| [*v; 3]).collect();
+        Cloud { xyz: [x.to_vec(), vec![-7.0; x.len()], vec![3.0; x.len()]], rgb, level: vec![0; x.len()] }
+    }
+
+    #[test]
+    fn points_where_the_cloud_has_none_are_passed_over() {
+        let cloud = line(&[1000.0, 1007.0, 1008.0], &[9, 9, 9]);
+        let reference = Reference::new(&cloud, &cloud.bounds());
+        let drawn = line(&[1000.0, 1002.5, 1004.5, 1007.0], &[9, 0, 255, 9]);
+        let level = &reference.levels(&drawn, &[2.0])[0];
+        assert_eq!((level.points, level.cells, level.covered, level.delta_e), (4, 2, 1.0, Some(0.0)));
+    }
+
+    #[test]
+    fn a_point_on_a_border_is_in_the_upper_cell() {
+        let cloud = line(&[1000.0, 1004.0, 1008.0], &[0, 100, 100]);
+        let reference = Reference::new(&cloud, &cloud.bounds());
+        let level = &reference.levels(&line(&[1004.0], &[100]), &[4.0])[0];
+        assert_eq!((level.cells, level.covered, level.delta_e), (2, 0.5, Some(0.0)));
+    }
+
+    #[test]
+    fn figures_of_a_level_are_over_its_cells() {
+        let cloud = row(|_| [255; 3], |_| 0);
+        let reference = Reference::new(&cloud, &cloud.bounds());
+        // black in two of four cells, which is 100 of lightness
+        let level = &reference.levels(&row(|i| [if i < 4 { 255 } else { 0 }; 3], |_| 0), &[2.0])[0];
+        let [mean, p99] = [level.delta_e, level.delta_e_p99].map(Option::unwrap);
+        assert!((mean - 50.0).abs() < 0.01 && (p99 - 100.0).abs() < 0.01, "{mean} {p99}");
+        assert_eq!(level.rms, Some((255.0 * 255.0 / 2.0_f64).sqrt()));
     }
 }

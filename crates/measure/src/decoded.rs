@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pointmill_format::batches::{BatchScratch, Batches, Precision, lod_of, rgb_of};
+use pointmill_format::batches::{BatchScratch, Batches, ColourSource, Precision, lod_of, rgb_of};
 use pointmill_format::bintree::Bintree;
 use pointmill_format::octree::{Octree, OctreeNode, OctreeNodes};
 use pointmill_format::{DatasetKind, NodeKey, NodePoints, ReadError, locate, open_octree};
@@ -115,6 +115,8 @@ fn bintree(path: &Path, has_colours: bool) -> Result<Decoded, ReadError> {
 
 fn batches(path: &Path, has_colours: bool) -> Result<Decoded, ReadError> {
     let batches = Batches::map(path)?;
+    // words without colours of the scene are grey or one colour: nothing to compare
+    let has_colours = has_colours && batches.description().colour == ColourSource::Rgb;
     let parts = in_parallel(batches.header().batches as usize, Part::default, |i, part| {
         batches.read_batch(i as u32, Precision::Thirty, &mut part.scratch, &mut part.points)?;
         let words = part.points.column::<u32>("colour").unwrap_or(&[]).to_vec();

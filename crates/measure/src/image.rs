@@ -186,4 +186,31 @@ mod tests {
         let nothing = Image { width: 0, rgb: &[], depth: &[] };
         assert_eq!(compare(nothing, nothing).ssim, 1.0);
     }
+
+    #[test]
+    fn of_twenty_depths_the_nineteenth_is_not_exceeded_by_95_percent() {
+        let rgb = [[0; 3]; 20];
+        let far: Vec<f32> = (1..=20).map(|i| 100.0 + i as f32).collect();
+        let found = compare(image(&rgb, &[100.0; 20]), image(&rgb, &far));
+        assert_eq!((found.depth_p95, found.depth_mean), (19.0, 10.5));
+    }
+
+    #[test]
+    fn every_row_is_compared() {
+        let grey = vec![[90; 3]; 256];
+        let depth = vec![1.0; 256];
+        for row in 0..16 {
+            let mut other = grey.clone();
+            other[16 * row..16 * (row + 1)].fill([200; 3]);
+            assert!(compare(image(&other, &depth), image(&grey, &depth)).ssim < 0.99, "{row}");
+        }
+    }
+
+    #[test]
+    fn an_error_that_stays_is_none_of_the_flight() {
+        let (dark, bright) = (vec![[10; 3]; 256], vec![[60; 3]; 256]);
+        let depth = vec![1.0; 256];
+        let [dark, bright] = [image(&dark, &depth), image(&bright, &depth)];
+        assert_eq!(popping([bright, dark], [bright, dark], 24.0), 0.0);
+    }
 }

@@ -1,5 +1,6 @@
 //! A measurement from its beginning to its end.
 
+use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -112,7 +113,7 @@ impl Measurement {
         if result.scene.points_declared > self.sample {
             let points = result.scene.points_declared;
             let part = sample::choose(&scans, points, self.sample, &should_stop)?;
-            if part.points == 0 {
+            if part.boxes.is_empty() {
                 return Err(MeasureError::Empty(self.inputs.len()));
             }
             drop(scans);
@@ -315,6 +316,7 @@ impl Work<'_> {
         }
         match decoded::read(dataset, !truth.cloud.rgb.is_empty()) {
             Ok(Decoded { cloud, spacings }) => {
+                row.is_shaded_by_depth = cloud.rgb.is_empty();
                 row.position = truth.sorted.errors(&cloud.xyz);
                 row.levels = truth.colours.levels(&cloud, &spacings);
             }
@@ -339,31 +341,42 @@ impl Work<'_> {
         let Measurement { size, budget, .. } = self.measurement;
         let drawable = Drawable::open(dataset)?;
         let style = Style::default();
+        let is_by_depth = row.is_shaded_by_depth;
         let draw = |camera: &pointmill_render::Camera, exact: &Picture| {
             let mut picture = drawable.draw(camera, *size, &style, *budget)?;
-            if truth.cloud.rgb.is_empty() {
+            if is_by_depth {
                 shade_by_depth(&mut picture, depth_range(exact));
             }
             Ok::<_, pointmill_render::RenderError>(picture)
         };
         for (view, exact) in &truth.views {
             let picture = draw(&view.camera, exact)?;
-            let error = compare(image(&picture), image(exact));
+            let error = compare(image(&picture), image(&comparable(exact, is_by_depth)));
             row.views.push(ViewError { view: view.name, error, points: picture.drawn.points });
             pictures.extend(shown(view.name, &row.name, &picture));
         }
         let mut pops = Vec::new();
-        let mut before: Option<(Picture, &Picture)> = None;
+        let mut before: Option<(Picture, Cow<'_, Picture>)> = None;
         for (camera, exact) in &truth.flight {
-            let picture = draw(camera, exact)?;
+            let (picture, exact) = (draw(camera, exact)?, comparable(exact, is_by_depth));
             if let Some((last, last_exact)) = &before {
-                pops.push(popping([image(last), image(last_exact)], [image(&picture), image(exact)], POP));
+                pops.push(popping([image(last), image(last_exact)], [image(&picture), image(&exact)], POP));
             }
             before = Some((picture, exact));
         }
         row.popping = (!pops.is_empty()).then(|| pops.iter().sum::<f64>() / pops.len() as f64);
         Ok(())
     }
+}
+
+/// The picture of the whole cloud as a dataset without colours is compared with it: shaded by depth too.
+fn comparable(exact: &Picture, is_by_depth: bool) -> Cow<'_, Picture> {
+    if !is_by_depth {
+        return Cow::Borrowed(exact);
+    }
+    let mut shaded = exact.clone();
+    shade_by_depth(&mut shaded, depth_range(exact));
+    Cow::Owned(shaded)
 }
 
 fn lossless_key(row: &Row) -> String {
@@ -375,6 +388,7 @@ fn lossless_key(row: &Row) -> String {
 
 fn copy_quality(row: &mut Row, twin: &Row) {
     row.position = twin.position;
+    row.is_shaded_by_depth = twin.is_shaded_by_depth;
     row.levels.clone_from(&twin.levels);
     row.sampling.clone_from(&twin.sampling);
     row.views.clone_from(&twin.views);

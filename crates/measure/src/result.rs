@@ -77,6 +77,9 @@ pub struct Row {
     pub levels: Vec<LevelError>,
     /// What `pointmill validate` measures of each level of an octree.
     pub sampling: Vec<Value>,
+    /// Pictures are shaded by depth, and so are those of the cloud that they are compared with: the dataset or the scene has no
+    /// colours. Their errors are those of geometry alone, and do not compare with errors of colours.
+    pub is_shaded_by_depth: bool,
     /// Errors of the pictures, by view.
     pub views: Vec<ViewError>,
     /// Share of pixels that pop from one picture of a slow flight to the next, mean over the flight.

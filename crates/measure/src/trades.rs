@@ -37,18 +37,23 @@ fn trade(output: &str, axis: Axis, from: &str, to: &str, rows: &[&Row]) -> Optio
         return None;
     }
     let ratio = |figure: fn(&Row) -> Option<f64>| {
-        let logs = pairs.iter().map(|(a, b)| Some((figure(b)? / figure(a)?).ln()));
+        // nothing against nothing is no change
+        let quotient = |a: f64, b: f64| if a == b { 1.0 } else { b / a };
+        let logs = pairs.iter().map(|(a, b)| Some(quotient(figure(a)?, figure(b)?).ln()));
         let logs: Vec<f64> = logs.collect::<Option<_>>()?;
         let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
         mean.is_finite().then_some(mean)
     };
     let largest = |side: fn(&(&Row, &Row)) -> Option<f64>| pairs.iter().filter_map(side).reduce(f64::max);
+    // errors of depths do not compare with those of colours
+    let has_alike = pairs.iter().all(|(a, b)| a.is_shaded_by_depth == b.is_shaded_by_depth);
+    let pictures = if has_alike { ratio(Row::picture_error) } else { None };
     let mut trade = Trade {
         output: output.to_owned(),
         axis: axis.name(),
         from: from.to_owned(),
         to: to.to_owned(),
-        ratios: [ratio(Row::seconds_per_million), ratio(Row::bytes_per_point), ratio(Row::picture_error)],
+        ratios: [ratio(Row::seconds_per_million), ratio(Row::bytes_per_point), pictures],
         position: [largest(|pair| pair.0.position_error()), largest(|pair| pair.1.position_error())],
         sentence: String::new(),
     };
@@ -59,21 +64,41 @@ fn trade(output: &str, axis: Axis, from: &str, to: &str, rows: &[&Row]) -> Optio
 fn sentence(trade: &Trade) -> String {
     let Trade { output, axis, from, to, ratios: [time, bytes, picture], position, .. } = trade;
     let mut changes = Vec::new();
-    changes.extend(change(*time, "processor time"));
-    changes.extend(change(*bytes, "disk and download"));
-    changes.extend(change(*picture, "difference between the pictures and the whole cloud"));
+    let mut unknown = Vec::new();
+    for (ratio, of) in [
+        (*time, "processor time"),
+        (*bytes, "disk and download"),
+        (*picture, "difference between the pictures and the whole cloud"),
+    ] {
+        match ratio {
+            Some(ratio) => changes.extend(change(ratio, of)),
+            None => unknown.push(of),
+        }
+    }
     if let [Some(before), Some(after)] = position
         && (before - after).abs() > 0.03 * before.max(*after)
     {
         changes.push(format!("coordinates are within {} instead of {}", length(*after), length(*before)));
     }
-    let what = if changes.is_empty() { "nothing that can be measured changes".to_owned() } else { changes.join(", ") };
+    if position.contains(&None) {
+        unknown.push("error of coordinates");
+    }
+    if changes.is_empty() {
+        changes.push(match unknown.len() {
+            0 => "nothing that can be measured changes".to_owned(),
+            4 => "no figures that compare".to_owned(),
+            _ => "no change that was measured".to_owned(),
+        });
+    }
+    if !unknown.is_empty() {
+        changes.push(format!("not compared: {}", unknown.join(", ")));
+    }
+    let what = changes.join(", ");
     format!("{output}: with {axis} {to} instead of {from}, {what}.")
 }
 
 /// `12 % less processor time`; nothing if it is within the noise.
-fn change(ratio: Option<f64>, of: &str) -> Option<String> {
-    let ratio = ratio?;
+fn change(ratio: f64, of: &str) -> Option<String> {
     let percent = (ratio - 1.0) * 100.0;
     match ratio {
         r if (0.97..=1.03).contains(&r) => None,
@@ -95,7 +120,8 @@ pub(crate) fn length(units: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::result::Cost;
+    use crate::result::{Cost, ViewError};
+    use crate::{AxisError, ImageError};
 
     fn row(sampling: &str, encoding: &str, seconds: f64, bytes: f64) -> Row {
         let cost = Cost {
@@ -110,8 +136,30 @@ mod tests {
             output: "potree2".to_owned(),
             values: values.map(|(axis, value)| (axis, value.to_owned())).into(),
             cost: Some(cost),
+            position: Some([AxisError::default(); 3]),
+            views: vec![ViewError { view: "whole", error: ImageError::default(), points: 1 }],
             ..Row::default()
         }
+    }
+
+    #[test]
+    fn what_was_not_measured_is_not_said_to_be_unchanged() {
+        let same = || row("grid", "default", 1.0, 30.0);
+        let said = |b: Row| trades(&[row("poisson", "default", 1.0, 30.0), b])[0].sentence.clone();
+        assert_eq!(
+            said(same()),
+            "potree2: with sampling grid instead of poisson, nothing that can be measured changes."
+        );
+        let by_depth = Row { is_shaded_by_depth: true, ..same() };
+        assert_eq!(
+            said(by_depth),
+            "potree2: with sampling grid instead of poisson, no change that was measured, not compared: difference between \
+             the pictures and the whole cloud."
+        );
+        let nothing = Row { cost: None, views: Vec::new(), position: None, ..same() };
+        assert!(said(nothing).contains("no figures that compare, not compared: processor time, disk"), "nothing");
+        let faster = Row { position: None, ..row("grid", "default", 0.5, 30.0) };
+        assert!(said(faster).ends_with("50 % less processor time, not compared: error of coordinates."));
     }
 
     #[test]

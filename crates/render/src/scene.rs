@@ -103,6 +103,11 @@ impl Scene {
         matches!(self.kind, Kind::Scans { .. })
     }
 
+    /// True for quantised batches, which alone have bits and levels to choose of.
+    pub fn is_batches(&self) -> bool {
+        matches!(self.kind, Kind::Batches(_))
+    }
+
     /// Disagreements within scans that did not stop the readers, one line each.
     pub fn warnings(&self) -> Vec<String> {
         let Kind::Scans { files, .. } = &self.kind else { return Vec::new() };

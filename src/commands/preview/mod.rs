@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use pointmill_format::Located;
-use pointmill_render::{Camera, Flight, Picture, Scene, Style};
+use pointmill_render::{Camera, Flight, Picture, Scene};
 use serde_json::{Value, json};
 
 use crate::args::PreviewArgs;
@@ -24,8 +24,12 @@ pub(crate) fn run(args: &PreviewArgs) -> Result<(), Failure> {
     let flight = args.path.as_deref().map(read_flight).transpose()?;
     let frames = flight.as_ref().and(args.frames);
     let output = Output::new(&args.output, frames, args.overwrite)?;
+    if let (Some(flight), Some(path)) = (&flight, &args.path) {
+        check_frames(flight, frames.unwrap_or(1), path)?;
+    }
     let begin = Instant::now();
     let scene = open(args, &output)?;
+    check_style(args, &scene)?;
     if !args.quiet {
         scene.warnings().iter().for_each(|line| print_line(line));
     }
@@ -34,7 +38,7 @@ pub(crate) fn run(args: &PreviewArgs) -> Result<(), Failure> {
         (None, Some(camera)) => vec![*camera],
         (None, None) => vec![scene.view(args.view, args.size)],
     };
-    let style = Style { colour: args.colour, has_boxes: args.boxes, ..args.shading.style() };
+    let style = args.style();
     let opened = begin.elapsed().as_secs_f64();
     let mut objects = Vec::new();
     for (camera, file) in cameras.iter().zip(output.files()) {
@@ -97,6 +101,25 @@ fn read_flight(file: &Path) -> Result<Flight, Failure> {
     }
     let text = fs::read(file).map_err(io)?;
     Flight::from_json(&text).map_err(|e| Failure::Input(format!("{}: {e}", file.display())))
+}
+
+/// Keyframes are cameras; what lies between two of them need not be one. No picture is made of a flight that cannot be flown.
+fn check_frames(flight: &Flight, frames: u32, file: &Path) -> Result<(), Failure> {
+    for (number, camera) in (1..).zip(flight.frames(frames)) {
+        camera.axes().map_err(|e| Failure::Input(format!("{}: picture {number} of {frames}: {e}", file.display())))?;
+    }
+    Ok(())
+}
+
+/// Refuses what the format has not.
+fn check_style(args: &PreviewArgs, scene: &Scene) -> Result<(), Failure> {
+    let idle = [("--clod", args.clod.is_some()), ("--bits", args.bits.is_some())];
+    match idle.into_iter().find(|(_, is_given)| *is_given && !scene.is_batches()) {
+        Some((option, _)) => {
+            Err(Failure::Usage(format!("{option} is for quantised batches; this is {}: leave it out", scene.format())))
+        }
+        None => Ok(()),
+    }
 }
 
 struct Times {

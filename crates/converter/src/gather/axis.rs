@@ -172,6 +172,31 @@ mod tests {
         assert_eq!(change.iter().sum::<f64>(), 0.0);
     }
 
+    #[test]
+    fn offsets_count_in_every_way_to_map() {
+        let exact = AxisMap::new(0.5, 10.0, 0.5, 2.0);
+        assert!(matches!(exact, AxisMap::Exact { mul: 1, add: 16, .. }), "{exact:?}");
+        assert_eq!(mapped(&exact, &[-3, 5]).0, [13, 21]);
+        let ratio = AxisMap::new(0.3, 1.2, 0.5, 0.2);
+        assert!(matches!(ratio, AxisMap::Ratio { mul: 3, add: 10, div: 5, .. }), "{ratio:?}");
+        assert_eq!(mapped(&ratio, &[0, 1, 5, -4]).0, [2, 3, 5, 0], "2, 2.6, 5 and -0.4");
+        let rounded = AxisMap::new(1.0 / 3.0, 10.0, 1.0, 0.0);
+        assert!(matches!(rounded, AxisMap::Rounded { .. }), "{rounded:?}");
+        assert_eq!(mapped(&rounded, &[0, 2, -4]).0, [10, 11, 9], "10, 10.67 and 8.67");
+    }
+
+    #[test]
+    fn ratios_are_of_integers_below_2_to_the_30() {
+        let grid = |step: f64| AxisGrid { step, offset: 0.0 };
+        let most = 2f64.powi(30);
+        assert!(
+            AxisMap::ratio(grid(most - 1.0), grid(2.0)).is_some() && AxisMap::ratio(grid(most), grid(3.0)).is_none()
+        );
+        assert!(
+            AxisMap::ratio(grid(2.0), grid(most - 1.0)).is_some() && AxisMap::ratio(grid(3.0), grid(most)).is_none()
+        );
+    }
+
     trait InSteps {
         fn map_in_steps(&self, step: f64) -> Vec<i64>;
     }
@@ -179,5 +204,29 @@ mod tests {
         fn map_in_steps(&self, step: f64) -> Vec<i64> {
             self.iter().map(|v| (v / step).round() as i64).collect()
         }
+    }
+
+    #[test]
+    fn doubles_round_to_the_nearest_with_ties_to_even_far_from_0() {
+        let map = SourceMap::new(None, &Lattice { scale: [0.5, 2f64.powi(-10), 1.0], offset: [4e6, 4e6, -4e6] });
+        let mapped = |axis: usize, from: f64, plus: &[f64]| {
+            let (mut q, mut change) = (Vec::new(), Vec::new());
+            let worlds: Vec<f64> = plus.iter().map(|v| from + v).collect();
+            assert_eq!(map.axes[axis].map_world(&worlds, &mut q, &mut change), Moved::Each);
+            (q, change)
+        };
+        let (q, change) = mapped(0, 4e6, &[0.25, 0.75, -0.25, 0.375, 1e6 + 0.375, -0.125]);
+        assert_eq!(q, [0, 2, 0, 1, 2_000_001, 0]);
+        assert_eq!(change, [-0.25, 0.25, 0.25, 0.125, 0.125, 0.125]);
+        // finer than what single precision has at the coordinate, and at the integer
+        assert_eq!(mapped(1, 4e6, &[5.0 / 1024.0, 2e6 + 3.0 / 1024.0]).0, [5, 2_048_000_003]);
+        assert_eq!(mapped(2, -4e6, &[-0.5, -0.75, 1.5]).0, [0, -1, 2]);
+    }
+
+    #[test]
+    fn integers_that_share_no_grid_round_as_doubles_do() {
+        let third = AxisMap::new(1.0 / 3.0, 0.0, 1.0, 0.0);
+        assert!(matches!(third, AxisMap::Rounded { .. }), "{third:?}");
+        assert_eq!(mapped(&third, &[-5, -1, 0, 1, 2, 3, 2_000_000_000]).0, [-2, 0, 0, 0, 1, 1, 666_666_667]);
     }
 }

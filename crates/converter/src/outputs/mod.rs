@@ -19,5 +19,5 @@ pub(crate) use attributes::choose as choose_attributes;
 pub use output::Target;
 pub(crate) use output::{DiskSize, check, choices, keep_lattice, named_attributes, wants};
 pub(crate) use staging::{StagedDataset, StagedFile, StagedFolder};
-pub use staging::{StagedFiles, resolve_path};
+pub use staging::{StagedFiles, WorkFolder, resolve_path};
 pub(crate) use together::{groups, write};

@@ -251,4 +251,12 @@ mod tests {
         let total = PositionErrors::rounding([1e-9, 1e-9, 0.0]).after(&first);
         assert!(total.mean[0] <= -0.500_000_001 && total.mean[1] >= 1e-9);
     }
+
+    #[test]
+    fn roots_of_mean_squares_are_doubles() {
+        // 4097² has 25 bits, one more than single precision
+        let e = PositionErrors::measured(&of(&[[4097.0, 0.0, -4097.0], [-4097.0, 0.0, 4097.0]]));
+        assert_eq!((e.rms, e.mean), ([4097.0, 0.0, 4097.0], [0.0; 3]));
+        assert_eq!(e.rms_3d, 33_570_818f64.sqrt());
+    }
 }

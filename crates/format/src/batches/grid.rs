@@ -186,4 +186,25 @@ mod tests {
             assert!(below == above || below.next_up() == above, "{v}: as tight as can be");
         }
     }
+
+    #[test]
+    fn positions_from_the_origin_are_doubles() {
+        let g = grid([5_400_000.0625, -1.5, 0.0], [5_400_001.0, 3.0, 0.25], 0.25);
+        assert_eq!(g.relative([5_400_000.5625, -1.25, 0.25]), [0.5625, 0.75, 0.25]);
+        assert_eq!(g.cells([0.5625, 0.75, 0.25]), [2.25, 3.0, 1.0]);
+    }
+
+    #[test]
+    fn codes_have_the_bits_of_the_grid() {
+        let wide = |exponent, morton_bits| Grid { origin: [0.0; 3], cell: 2.0, exponent, morton_bits };
+        // the first halves along x, y and z are the three lowest bits of the highest digit
+        for (grid, top) in [(wide(2, 21), 60), (wide(20, 32), 93)] {
+            let half = power_of_two(grid.exponent) / 2.0;
+            for (cells, digit) in [([half, 0.0, 0.0], 1), ([0.0, half, 0.0], 2), ([0.0, half, half], 6)] {
+                assert_eq!(grid.morton_code(cells), digit << top, "{cells:?}");
+            }
+            assert!(grid.is_valid());
+        }
+        assert!(!Grid { cell: 0.0, ..wide(2, 21) }.is_valid() && !wide(2, 32).is_valid() && !wide(20, 21).is_valid());
+    }
 }

@@ -122,4 +122,11 @@ mod tests {
             [0.0, 0.0, 5.0, 2.0]
         );
     }
+
+    #[test]
+    fn bits_are_ten_for_each_plane() {
+        assert_eq!([10, 20, 30].map(Precision::from_bits), Precision::ALL.map(Some));
+        assert_eq!([0, 9, 11, 40].map(Precision::from_bits), [None; 4]);
+        assert_eq!(projected_diagonal(0.0, 0.0, 935.0), f64::INFINITY, "the centre is beside the camera");
+    }
 }

@@ -162,6 +162,21 @@ mod tests {
     }
 
     #[test]
+    fn each_precision_takes_its_words_and_each_axis_its_bits() {
+        let bits = [0x2aaa_5533, 0x1555_2acc, 0x0f0f_0f0f];
+        let [hi, mid, lo] = planes(bits);
+        // ten bits an axis, x lowest
+        assert_eq!([hi, mid, lo].map(|word| word & 1023), [20, 10, 0].map(|shift| bits[0] >> shift & 1023));
+        assert_eq!([hi, mid, lo].map(|word| word >> 10 & 1023), [20, 10, 0].map(|shift| bits[1] >> shift & 1023));
+        assert_eq!([hi, mid, lo].map(|word| word >> 20), [20, 10, 0].map(|shift| bits[2] >> shift & 1023));
+        assert_eq!(quantized([hi, mid, lo]), bits);
+        for precision in Precision::ALL {
+            let decoder = BOX.decoder(precision);
+            assert_eq!(decoder.position_of_words(hi, mid, lo), decoder.position(bits), "{precision:?}");
+        }
+    }
+
+    #[test]
     fn corners_of_the_box_err_by_half_a_cell_and_an_axis_without_extent_not_at_all() {
         assert_eq!(BOX.quantize([18.0, 24.0, 6.0]), [(1 << 30) - 1; 3], "the last cell is closed");
         for precision in Precision::ALL {
@@ -174,5 +189,14 @@ mod tests {
         let flat = BatchRecord { max: BOX.min, ..BOX };
         assert_eq!(flat.quantize(flat.corner()), [0; 3]);
         assert_eq!(flat.decode([0; 3], Precision::Ten), flat.corner());
+    }
+
+    #[test]
+    fn a_point_is_in_the_cell_below_it_not_in_the_nearest() {
+        // sides are powers of two, so cells are exact: 5 and 3/4 of a cell, just below and at a border
+        let cells = |n: f64| std::array::from_fn(|a| BOX.corner()[a] + n * BOX.sides()[a] / f64::from(1u32 << 30));
+        for (at, cell) in [(5.75, 5), (5.5, 5), (6.0, 6), (0.0, 0), (0.75, 0)] {
+            assert_eq!(BOX.quantize(cells(at)), [cell; 3], "{at}");
+        }
     }
 }

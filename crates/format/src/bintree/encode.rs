@@ -147,4 +147,16 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn centers_and_differences_are_doubles() {
+        let (min, max) = ([5_400_000.0625, -1.0, 0.0], [5_400_001.0625, 2.0, 0.0]);
+        let center = leaf_center(min, max);
+        assert_eq!(center, [5_400_000.5625, 0.5, 0.0]);
+        let mut bytes = Vec::new();
+        let mut leaf = LeafEncoder::new(&RecordLayout::core(), center, &mut bytes);
+        leaf.push([5_400_000.0625, 2.0, 0.0], 0.0);
+        assert_eq!(leaf.finish().min, [5_400_000.0625, 2.0, 0.0]);
+        assert_eq!(bytes[..8], [(-0.5f32).to_le_bytes(), 1.5f32.to_le_bytes()].concat());
+    }
 }

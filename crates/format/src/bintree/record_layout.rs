@@ -130,4 +130,27 @@ mod tests {
         assert!(placed(&[("a", T::Int8, 0)]).unwrap_err().contains("0 elements"));
         assert!(placed(&[("a", T::Int8, 257)]).is_err());
     }
+
+    #[test]
+    fn places_that_an_index_gives_are_checked() {
+        let at = |places: &[(usize, T)], stride| {
+            let column = |(i, (offset, ty)): (usize, &(usize, T))| PlacedAttribute {
+                attribute: Attribute::new(format!("a{i}"), *ty, 1),
+                offset: *offset,
+            };
+            RecordLayout::from_places(places.iter().enumerate().map(column).collect(), stride)
+        };
+        assert!(at(&[(16, T::UInt8), (20, T::UInt32)], 24).is_ok());
+        for (places, stride) in [
+            (&[(18, T::UInt32)][..], 24),              // not aligned
+            (&[(12, T::UInt32)], 24),                  // in the core
+            (&[(16, T::UInt32), (16, T::UInt32)], 24), // on one another
+            (&[(16, T::UInt32)], 16),                  // behind the record
+            (&[(16, T::UInt32)], 22),                  // records that are not aligned
+        ] {
+            assert!(at(places, stride).is_err(), "{places:?} {stride}");
+        }
+        let offsets: Vec<usize> = at(&[(16, T::UInt8)], 20).unwrap().columns().map(|c| c.offset).collect();
+        assert_eq!(offsets, [0, 4, 8, 12, 16]);
+    }
 }

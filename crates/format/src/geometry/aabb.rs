@@ -99,4 +99,30 @@ mod tests {
         assert_eq!(b, Aabb { min: [-1.0, 2.0, 3.0], max: [1.0, 4.0, 3.0] });
         assert!(b.contains([1.0, 4.0, 3.0]) && !b.contains([1.0, 4.1, 3.0]));
     }
+
+    #[test]
+    fn planes_between_octants_are_exact_far_from_0() {
+        // single precision has whole halves there
+        let root = Aabb { min: [5_400_000.0625; 3], max: [5_400_001.0625; 3] };
+        let node = root.octant(NodeKey { level: 2, x: 1, y: 2, z: 3 });
+        let at = |quarters: [f64; 3]| quarters.map(|q| root.min[0] + q / 4.0);
+        assert_eq!((node.min, node.max), (at([1.0, 2.0, 3.0]), at([2.0, 3.0, 4.0])));
+        assert_eq!(root.octant(NodeKey::ROOT), root);
+        let oblong = Aabb { min: [5_400_000.0625, -1.0, 2.0], max: [5_400_003.0625, 3.0, 2.0] };
+        assert_eq!((oblong.center(), oblong.extent()), ([5_400_001.5625, 1.0, 2.0], [3.0, 4.0, 0.0]));
+    }
+
+    #[test]
+    fn a_union_holds_both_and_any_inverted_side_is_empty() {
+        let (a, b) = (Aabb { min: [0.0; 3], max: [1.0; 3] }, Aabb { min: [-1.0, 0.5, 2.0], max: [0.5, 3.0, 4.0] });
+        let both = Aabb { min: [-1.0, 0.0, 0.0], max: [1.0, 3.0, 4.0] };
+        assert_eq!((a.union(&b), b.union(&a), a.union(&Aabb::EMPTY)), (both, both, a));
+        for axis in 0..3 {
+            let mut inverted = a;
+            inverted.min[axis] = 1.5;
+            assert!(inverted.is_empty() && !a.is_empty());
+            inverted.min[axis] = f64::NAN;
+            assert!(inverted.is_empty());
+        }
+    }
 }

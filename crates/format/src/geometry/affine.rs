@@ -247,4 +247,31 @@ mod tests {
         (m[3], m[12], m[15]) = (1.0, 0.0, 2.0);
         assert_eq!(Affine::from_matrix(&m), Err(AffineFault::LastRow([0.0, 0.0, 0.0, 2.0])));
     }
+
+    #[test]
+    fn images_far_from_0_are_doubles() {
+        // all factors are sums of powers of two: nothing is rounded, but in single precision
+        let linear = [[0.75, -0.5, 0.25], [0.5, 0.75, -0.25], [0.25, -0.25, 1.5]];
+        let map = Affine::from_matrix(&matrix(linear, [1e6, -2e6, 0.5])).unwrap();
+        assert_eq!(map.turn([5_000_001.0, 0.25, -0.25]), [3_750_000.5625, 2_500_000.75, 1_249_999.8125]);
+        assert_eq!(map.apply([5_000_001.0, 0.25, -0.25]), [4_750_000.5625, 500_000.75, 1_250_000.3125]);
+    }
+
+    #[test]
+    fn what_is_written_is_what_is_read() {
+        // 2 · (3·5 − 1·(−1)) − 1 · (0.5·5 − 1·2) + 4 · (0.5·(−1) − 3·2): the product of no row alone
+        let linear = [[2.0, 1.0, 4.0], [0.5, 3.0, 1.0], [2.0, -1.0, 5.0]];
+        let map = Affine::from_matrix(&matrix(linear, [7.0, -8.0, 9.5])).unwrap();
+        assert_eq!((map.linear(), map.translation(), map.determinant()), (&linear, [7.0, -8.0, 9.5], 5.5));
+        assert_eq!(map.to_string(), "2 1 4 7 0.5 3 1 -8 2 -1 5 9.5 0 0 0 1");
+        assert!(AffineFault::Singular.to_string().contains("singular"));
+        // the transposed inverse: its rows times those of the matrix are the unit matrix
+        for (i, normal) in map.of_normals().iter().enumerate() {
+            for (j, row) in linear.iter().enumerate() {
+                let product: f64 = normal.iter().zip(row).map(|(a, b)| a * b).sum();
+                // five operations on numbers below 16 / 5.5, the quotients among them
+                assert!((product - f64::from(u8::from(i == j))).abs() < 5.0 * 16.0 * f64::EPSILON, "{i} {j}");
+            }
+        }
+    }
 }

@@ -133,4 +133,32 @@ mod tests {
         assert!(!fine.holds(&AxisGrid { step: 0.01, offset: 0.000_5 }));
         assert!(!fine.holds(&AxisGrid { step: 0.0015, offset: 0.0 }));
     }
+
+    #[test]
+    fn quotients_just_below_a_whole_number_are_that_number() {
+        assert!(0.3 / 0.1 < 3.0 && 0.7 / 0.1 < 7.0, "as doubles");
+        assert_eq!(common(&[(0.3, 0.0), (0.2, 0.0)]), Some((0.1, 0.0)));
+        assert_eq!(common(&[(0.1, 0.0), (0.1, 0.7)]), Some((0.1, 0.0)));
+        assert_eq!(common(&[(0.2, 0.0), (0.2, 0.3)]), Some((0.1, 0.0)));
+        let tenths = AxisGrid { step: 0.1, offset: 0.0 };
+        assert!(tenths.holds(&AxisGrid { step: 0.3, offset: 0.7 }));
+        assert!(tenths.holds(&AxisGrid { step: 0.3, offset: -0.7 }));
+    }
+
+    #[test]
+    fn steps_that_are_no_decimals_are_common_if_they_are_the_same() {
+        let third = 1.0 / 3.0;
+        assert_eq!(common(&[(third, 0.0), (third, 0.0)]), Some((third, 0.0)));
+        assert_eq!(common(&[(third, 0.7), (third, 2.7)]), Some((third, 0.7)), "two apart are six steps");
+        assert_eq!(common(&[(third, 0.7), (third, 2.6)]), None);
+    }
+
+    #[test]
+    fn what_lies_between_offsets_counts_not_where_they_are() {
+        assert_eq!(common(&[(0.5, 0.1), (1.0, 0.6)]), Some((0.5, 0.1)));
+        let grid = AxisGrid { step: 0.5, offset: 0.1 };
+        assert!(grid.holds(&AxisGrid { step: 1.0, offset: 0.6 }) && !grid.holds(&AxisGrid { step: 1.0, offset: 0.4 }));
+        // so many units that doubles do not count them
+        assert!(!AxisGrid { step: 1e-15, offset: 0.0 }.holds(&AxisGrid { step: 1.0, offset: 0.0 }));
+    }
 }

@@ -86,4 +86,13 @@ mod tests {
             assert!(error != 0 && error.unsigned_abs() <= bound, "{error} of {bound}");
         }
     }
+
+    #[test]
+    fn distances_are_of_all_three_axes() {
+        for (difference, squared) in [([2.0, 0.0, 0.0], 4.0), ([0.0, -2.0, 0.0], 4.0), ([1.0, -2.0, 2.0], 9.0)] {
+            let mut d = Deviations::default();
+            d.add(difference);
+            assert_eq!((d.max_squared_3d, d.max), (squared, difference.map(f64::abs)));
+        }
+    }
 }

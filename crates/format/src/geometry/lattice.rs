@@ -84,4 +84,22 @@ mod tests {
             assert_eq!([0, 1, 2].map(|a| l.quantize(a, w[a])), [q; 3]);
         }
     }
+
+    #[test]
+    fn every_axis_has_to_be_valid() {
+        let valid = Lattice { scale: [0.001; 3], offset: [-1e9, 0.0, 1.0] };
+        assert!(valid.is_valid());
+        for axis in 0..3 {
+            for scale in [0.0, -0.001, f64::INFINITY, f64::NAN] {
+                let mut other = valid;
+                other.scale[axis] = scale;
+                assert!(!other.is_valid(), "{scale}");
+            }
+            for offset in [f64::INFINITY, f64::NAN] {
+                let mut other = valid;
+                other.offset[axis] = offset;
+                assert!(!other.is_valid(), "{offset}");
+            }
+        }
+    }
 }

@@ -142,4 +142,17 @@ mod tests {
         let ranks = names.map(|n| NodeKey::from_name(n).unwrap().breadth_first_rank());
         assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:x?}");
     }
+
+    #[test]
+    fn every_child_knows_its_place() {
+        let parent: NodeKey = "r0427".parse().unwrap();
+        for child in 0..8 {
+            let key = parent.child(child).unwrap();
+            assert_eq!(
+                (key.child_index(), key.parent(), key.to_string()),
+                (child, Some(parent), format!("r0427{child}"))
+            );
+        }
+        assert_eq!([parent.child(8), NodeKey::ROOT.parent()], [None, None]);
+    }
 }

@@ -40,12 +40,12 @@ fn too_close(row: &Row) -> Option<f64> {
 pub(super) fn table(result: &Measured) -> io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let axes = || Axis::ALL.iter().map(|axis| axis.name());
-    let head = ["setting"].into_iter().chain(axes()).chain(["options", "on_front"]);
+    let head = ["setting"].into_iter().chain(axes()).chain(["options", "on_front", "pictures_by_depth"]);
     writer.write_record(head.chain(FIGURES.iter().map(|(name, _)| *name)).chain(["failed"]))?;
     for row in &result.rows {
         let mut cells = vec![row.name.clone()];
         cells.extend(axes().map(|axis| row.values.get(axis).cloned().unwrap_or_default()));
-        cells.extend([row.arguments.join(" "), row.is_on_front.to_string()]);
+        cells.extend([row.arguments.join(" "), row.is_on_front.to_string(), row.is_shaded_by_depth.to_string()]);
         cells.extend(FIGURES.iter().map(|(_, figure)| figure(row).map_or_else(String::new, |v| v.to_string())));
         cells.push(row.failed.clone().unwrap_or_default());
         writer.write_record(cells)?;

@@ -125,6 +125,10 @@ fn side_by_side(result: &Measured, pictures: &[Shown]) -> String {
         "<h2>Pictures</h2>\n<p>First of each view: all points, colours averaged, gaps filled. The others are what a \
                     renderer shows of the dataset.</p>\n"
             .to_owned();
+    if result.scene.has_colours && result.rows.iter().any(|row| row.is_shaded_by_depth) {
+        html += "<p>Datasets without colours are shaded by depth, and compared with the cloud shaded likewise: their errors are \
+                 those of geometry alone, and do not compare with errors of colours.</p>\n";
+    }
     let mut views: Vec<&str> = pictures.iter().filter(|p| p.setting.is_empty()).map(|p| p.view).collect();
     views.dedup();
     for view in views {
@@ -136,8 +140,9 @@ fn side_by_side(result: &Measured, pictures: &[Shown]) -> String {
                 ("", _) => "the whole cloud".to_owned(),
                 (setting, None) => escaped(setting),
                 (setting, Some(error)) => format!(
-                    "{}: {} dB, SSIM {:.3}, {:.2} % holes",
+                    "{}{}: {} dB, SSIM {:.3}, {:.2} % holes",
                     escaped(setting),
+                    if row.is_some_and(|row| row.is_shaded_by_depth) { " (by depth)" } else { "" },
                     error.psnr.map_or("∞".to_owned(), |psnr| format!("{psnr:.1}")),
                     error.ssim,
                     error.holes * 100.0

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use pointmill_format::batches::{lod_of, rgb_of};
+use pointmill_format::batches::{eight_bit, lod_of, rgb_of};
 use pointmill_format::{Attribute, Column, Positions};
 
 use super::{ramps, values};
@@ -132,7 +132,7 @@ impl Paint {
         match column {
             Some(Column::UInt8(values)) => out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(*rgb))),
             Some(Column::UInt16(values)) if self.is_16_bit => {
-                out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(rgb.map(|c| (c >> 8) as u8))));
+                out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(rgb.map(eight_bit))));
             }
             Some(Column::UInt16(values)) => {
                 out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(rgb.map(|c| c.min(255) as u8))));

@@ -67,8 +67,8 @@ impl Cells {
 
     /// The integers of point `index`, which exists.
     #[inline]
-    pub(super) fn of(&self, points: &NodePoints, index: usize) -> [u32; 3] {
-        match (points.positions(), self.rule) {
+    pub(super) fn of(&self, positions: &Positions, index: usize) -> [u32; 3] {
+        match (positions, self.rule) {
             (Positions::Quantized(axes), Rule::Exact { least }) => {
                 std::array::from_fn(|a| axes[a].get(index).map_or(0, |q| q.abs_diff(least[a])))
             }
@@ -109,6 +109,28 @@ mod tests {
         assert_eq!((rounded.is_wide, rounded.step), (false, [0.02; 3]));
         let all = Cells::of_lattice(&[vec![i32::MIN, i32::MAX], vec![0, 0], vec![0, 0]], &LATTICE, 1, false);
         assert!(all.is_wide);
+    }
+
+    /// Half a step, and the rounding of sums and products in double precision.
+    #[test]
+    fn rounded_integers_are_the_nearest() {
+        let spread = |factor: i64| (0..500i64).map(|i| (i * i * factor % 3_000_001 - 1_000_000) as i32).collect();
+        let axes: [Vec<i32>; 3] = [spread(7919), spread(104_729), vec![5; 500]];
+        let world: [Vec<f64>; 3] =
+            std::array::from_fn(|a| axes[a].iter().map(|q| LATTICE.world([i64::from(*q); 3])[a]).collect());
+        let cases = [
+            (Cells::of_lattice(&axes, &LATTICE, 1, true), Positions::Quantized(axes.clone())),
+            (Cells::of_lattice(&axes, &LATTICE, 1, false), Positions::Quantized(axes)),
+            (Cells::of_world(&world, 1, NARROW), Positions::World(world.clone())),
+            (Cells::of_world(&world, 1, WIDE), Positions::World(world.clone())),
+        ];
+        for (cells, positions) in cases {
+            for (i, a) in (0..500).flat_map(|i| (0..3).map(move |a| (i, a))) {
+                let found = cells.origin[a] + f64::from(cells.of(&positions, i)[a]) * cells.step[a];
+                let bound = 0.5 * cells.step[a] * (1.0 + 1e-9) + 4.0 * f64::EPSILON * 600_000.0;
+                assert!((found - world[a][i]).abs() <= bound, "{cells:?}: {found}, not {}", world[a][i]);
+            }
+        }
     }
 
     #[test]

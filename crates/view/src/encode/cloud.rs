@@ -62,7 +62,7 @@ pub(crate) fn encode_unit(unit: Unit<'_>, look: &Look<'_>, out: &mut Vec<u8>) {
     let at = header.begin(out);
     let selected = || (0..points.len()).step_by(every);
     for index in selected() {
-        let [x, y, z] = cells.of(points, index);
+        let [x, y, z] = cells.of(points.positions(), index);
         let row = [x, y, z, intensities.of(index).into()];
         if cells.is_wide {
             row.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));

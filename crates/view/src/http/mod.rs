@@ -3,6 +3,7 @@
 mod answer;
 mod files;
 mod guard;
+mod patience;
 mod query;
 mod routes;
 mod server;

@@ -12,6 +12,7 @@ use hyper_util::server::graceful::GracefulShutdown;
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
+use super::patience::Patient;
 use super::routes;
 use super::state::{Options, State};
 use crate::{Dataset, ViewError};
@@ -21,6 +22,9 @@ const CONNECTIONS: usize = 256;
 
 /// A request's head has this long to arrive, and a connection may rest as long between two.
 const PATIENCE: Duration = Duration::from_secs(15);
+
+/// A client that reads nothing of an answer for so long is given up.
+const WRITE_PATIENCE: Duration = Duration::from_secs(60);
 
 /// How often it is asked whether to stop.
 const TICK: Duration = Duration::from_millis(50);
@@ -120,7 +124,8 @@ async fn accept(listener: &tokio::net::TcpListener, state: &Arc<State>, should_s
             let state = Arc::clone(&state);
             async move { Ok::<_, Infallible>(routes::answer(state, request).await) }
         });
-        let connection = graceful.watch(http.serve_connection(TokioIo::new(stream), service));
+        let connection =
+            graceful.watch(http.serve_connection(TokioIo::new(Patient::new(stream, WRITE_PATIENCE)), service));
         tokio::spawn(async move {
             let _ = connection.await; // a client that goes away is no error
             drop(place);

@@ -220,4 +220,34 @@ mod tests {
         poisson.choose(24, corner, &candidates.map(TreePoint), &mut OverBorder::default(), &mut accepted);
         assert_eq!(accepted, [true, false, true, true]);
     }
+
+    #[test]
+    fn pairs_a_hair_below_the_spacing_conflict_and_pairs_a_hair_above_do_not() {
+        let spacing = Spacing::default();
+        let (side, unit_bits) = (1u64 << 24, 24);
+        let mut random = Random::new(8);
+        for vectors in Vectors::all() {
+            let mut poisson = Poisson::new(spacing, vectors);
+            let mut taken = |a: [u32; 3], b: [u32; 3]| {
+                let mut pair = [a, b];
+                pair.sort_unstable_by(|a, b| crate::cloud::morton::compare(*a, *b));
+                let (mut accepted, mut none) = ([false; 2], OverBorder::default());
+                poisson.begin();
+                poisson.choose(unit_bits, TreePoint([0; 3]), &pair.map(TreePoint), &mut none, &mut accepted);
+                accepted.iter().filter(|a| **a).count()
+            };
+            for _ in 0..3000 {
+                let a: [u32; 3] = std::array::from_fn(|_| (1 << 25) + random.below(1 << 29) as u32);
+                let (x, y) = (random.below(side * 7 / 10), random.below(side * 7 / 10));
+                // the longest third side with which the distance is below the spacing
+                let z = (side * side - 1 - x * x - y * y).isqrt();
+                let b = [a[0] - x as u32, a[1] + y as u32, a[2] - z as u32];
+                assert!(squared(a, b) < side * side);
+                assert_eq!(taken(a, b), 1, "{a:?} {b:?}");
+                // 1.00002 spacings: no candidate is omitted for that
+                let z = ((side * side) as f64 * 1.00002f64.powi(2) - (x * x + y * y) as f64).sqrt() as u64 + 1;
+                assert_eq!(taken(a, [b[0], b[1], a[2] - z as u32]), 2, "{a:?} {b:?}");
+            }
+        }
+    }
 }

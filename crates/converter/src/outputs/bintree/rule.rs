@@ -31,6 +31,12 @@ pub(super) fn plane(rule: SplitRule, moments: &Moments, points: u64, axis: usize
     }
 }
 
+/// True for the low side: a plane's own points belong to it. Stored integers or those of the run, both of one kind.
+#[inline(always)]
+pub(super) fn is_low<T: Ord>(value: T, plane: T) -> bool {
+    value <= plane
+}
+
 /// Rank of the median, from 0.
 pub(super) fn median_rank(points: u64) -> u64 {
     points.saturating_sub(1) / 2
@@ -63,5 +69,13 @@ mod tests {
         assert_eq!(longest_axis(&b([5, 7, 7]), [1.0, 0.1, 1.0]), Some(2));
         assert_eq!(longest_axis(&b([0; 3]), [1.0; 3]), None);
         assert_eq!(longest_axis(&b([0, 1, 0]), [1.0, 0.0, 1.0]), Some(1));
+        // equal in single precision
+        assert_eq!(longest_axis(&b([1 << 25, (1 << 25) + 1, 0]), [1.0; 3]), Some(1));
+        assert_eq!(longest_axis(&b([1 << 25, 1 << 25, (1 << 25) + 1]), [0.001; 3]), Some(2));
+    }
+
+    #[test]
+    fn a_planes_own_points_are_on_its_low_side() {
+        assert_eq!([-3, -2, -1].map(|v| is_low(v, -2)), [true, true, false]);
     }
 }

@@ -209,7 +209,7 @@ impl<'a> Builder<'a> {
             let item = items[i];
             items[low] = item;
             swap[high] = item;
-            let is_low = usize::from(item.q[axis] <= m);
+            let is_low = usize::from(rule::is_low(item.q[axis], m));
             low += is_low;
             high += 1 - is_low;
         }

@@ -139,9 +139,9 @@ impl Cut<'_> {
         let mut records = Vec::new();
         for part in parts {
             let bounds = &part.moments.bounds;
-            if bounds.max[self.axis] <= m {
+            if rule::is_low(bounds.max[self.axis], m) {
                 sides[0].parts.push(part);
-            } else if bounds.min[self.axis] > m {
+            } else if !rule::is_low(bounds.min[self.axis], m) {
                 sides[1].parts.push(part);
             } else {
                 sides.iter_mut().for_each(Side::start_part);
@@ -155,7 +155,7 @@ impl Cut<'_> {
                     }
                     for record in records.chunks_exact(self.stride) {
                         let q = self.job(record);
-                        sides[usize::from(q[self.axis] > m)].add(record, q);
+                        sides[usize::from(!rule::is_low(q[self.axis], m))].add(record, q);
                     }
                     for side in &mut sides {
                         side.end_segment(self.stride);

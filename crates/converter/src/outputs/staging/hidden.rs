@@ -55,6 +55,8 @@ pub(super) enum Found {
 pub(super) enum Side {
     Beside,
     Inside,
+    /// Inside, for files that become no output: how its name begins.
+    Work(&'static str),
 }
 
 impl HiddenFolder {
@@ -81,6 +83,11 @@ impl HiddenFolder {
     /// Makes one in `output`, which is there.
     pub(super) fn inside(output: &Path) -> io::Result<Self> {
         Self::make(output, Side::Inside)
+    }
+
+    /// Makes one on that side of `output`; the folder that is to hold it is there.
+    pub(super) fn in_place(output: &Path, side: Side) -> io::Result<Self> {
+        Self::make(output, side)
     }
 
     fn make(output: &Path, side: Side) -> io::Result<Self> {
@@ -194,6 +201,7 @@ impl Side {
     fn of(self, output: &Path) -> (&Path, String) {
         match self {
             Self::Inside => (output, INSIDE.to_owned()),
+            Self::Work(prefix) => (output, prefix.to_owned()),
             Self::Beside => {
                 let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
                 let room = NAME_BYTES - (".".len() + INSIDE.len() + RANDOM_BYTES);
@@ -208,6 +216,7 @@ impl Side {
     fn key(self, output: &Path) -> &[u8] {
         match self {
             Self::Inside => b".",
+            Self::Work(prefix) => prefix.as_bytes(),
             Self::Beside => output.file_name().unwrap_or_default().as_encoded_bytes(),
         }
     }

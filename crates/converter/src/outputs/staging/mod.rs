@@ -11,6 +11,7 @@ mod ours;
 mod place;
 mod replace;
 mod room;
+mod work;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -32,6 +33,7 @@ use place::parent_of;
 pub use place::resolve_path;
 use replace::Replace;
 use room::Place;
+pub use work::WorkFolder;
 
 /// A folder that becomes the output when all is well, and vanishes when not.
 pub(crate) struct StagedFolder {

@@ -182,4 +182,30 @@ mod tests {
         assert!(near(x[0], 0.0) && near(y[0], 2.0) && near(z[0], 0.0));
         assert!(near(x[1], 0.0) && near(y[1], 0.0) && near(z[1], 2.0));
     }
+
+    #[test]
+    fn turned_and_moved_points_are_doubles() {
+        // cosine 0.6, sine 0.8; nothing of a third of it is a whole number of powers of two
+        let (pose, _) = pose([2.0, 0.0, 0.0, 1.0], [5e6, -5e6, 1e-3]);
+        let p = [1000.001, 0.0, 1e6];
+        let found = moved(&pose, p);
+        // docs/design/numerics.md, §2.4; the decimals here are doubles too, off by half a last place
+        let u = f64::EPSILON / 2.0;
+        for (found, meant) in found.into_iter().zip([5_000_600.000_6, -4_999_199.999_2, 1_000_000.001]) {
+            let bound = 24.0 * u * p.iter().sum::<f64>() + 2.0 * u * f64::abs(meant);
+            assert!((found - meant).abs() <= bound, "{found} {meant} {bound}");
+        }
+    }
+
+    #[test]
+    fn axes_that_change_places_lose_no_bit() {
+        let (third, note) = pose([0.5; 4], [0.0; 3]);
+        assert_eq!(moved(&third, [5_400_000.0625, -0.1, 1e-9]), [1e-9, 5_400_000.0625, -0.1]);
+        assert_eq!(note, None);
+        for (axis, turned) in [[1.0, -2.0, -3.0], [-1.0, 2.0, -3.0], [-1.0, -2.0, 3.0]].into_iter().enumerate() {
+            let mut q = [0.0; 4];
+            q[axis + 1] = 1.0;
+            assert_eq!(moved(&pose(q, [0.0; 3]).0, [1.0, 2.0, 3.0]), turned, "half a turn about axis {axis}");
+        }
+    }
 }

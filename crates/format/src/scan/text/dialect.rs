@@ -142,13 +142,18 @@ impl Fit {
     }
 }
 
-/// The dialect of `rows` (data lines, the first one first), and what was chosen against the usual.
+/// The dialect of `rows` (data lines, the first one first), and what was chosen against the usual. `titled`: how many titles
+/// stand between commas above them.
 ///
 /// `Err` says what cannot be told.
-pub(super) fn detect(rows: &[Vec<u8>], options: &TextOptions) -> Result<(Dialect, Option<ScanWarning>), String> {
+pub(super) fn detect(
+    rows: &[Vec<u8>],
+    titled: Option<usize>,
+    options: &TextOptions,
+) -> Result<(Dialect, Option<ScanWarning>), String> {
     let found = match separator(rows, options) {
         Separators::One(separator) => one(separator, rows, options)?,
-        Separators::Unknown => unknown(rows, options)?,
+        Separators::Unknown => unknown(rows, titled, options)?,
     };
     let warning = match found {
         Dialect { decimal: DecimalMark::Point, strict: true, .. } => None,
@@ -197,7 +202,7 @@ fn one(separator: Option<u8>, rows: &[Vec<u8>], options: &TextOptions) -> Result
     Ok(comma)
 }
 
-fn unknown(rows: &[Vec<u8>], options: &TextOptions) -> Result<Dialect, String> {
+fn unknown(rows: &[Vec<u8>], titled: Option<usize>, options: &TextOptions) -> Result<Dialect, String> {
     let fit = |dialect| Fit::new(dialect, rows);
     let (commas, blanks) = (fit(Dialect::COMMAS), fit(Dialect::BLANKS));
     let (comma, inner) = (fit(Dialect::BLANKS_COMMA), fit(Dialect::COMMAS_COMMA));
@@ -208,6 +213,8 @@ fn unknown(rows: &[Vec<u8>], options: &TextOptions) -> Result<Dialect, String> {
         Decimal::Point => Ok(most([commas, blanks]).dialect),
         Decimal::Comma if inner.is_scan(named) && !comma.is_scan(named) => Ok(inner.dialect),
         Decimal::Comma => Ok(most([comma, inner]).dialect),
+        // as many fields as titles, between the same commas
+        Decimal::Auto if commas.all && titled.is_some() && titled == commas.shape.map(|s| s.0) => Ok(commas.dialect),
         Decimal::Auto if commas.all => {
             let other = inner.is_scan(named) && inner.shape.map(|s| s.0) != commas.shape.map(|s| s.0);
             if other || joins_decimals(&Dialect::COMMAS.split_all(rows)) {
@@ -263,7 +270,7 @@ mod tests {
 
     fn found(rows: &[&str], options: &TextOptions) -> Result<Dialect, String> {
         let rows: Vec<_> = rows.iter().map(|r| r.as_bytes().to_vec()).collect();
-        detect(&rows, options).map(|(dialect, _)| dialect)
+        detect(&rows, None, options).map(|(dialect, _)| dialect)
     }
 
     fn auto(rows: &[&str]) -> Result<Dialect, String> {
@@ -321,6 +328,19 @@ mod tests {
             assert!(auto(rows).is_err(), "{rows:?}: {:?}", auto(rows));
         }
         assert!(auto(&["1,234 5,678 87"]).unwrap_err().contains("the comma in 1,234 may be"));
+    }
+
+    #[test]
+    fn titles_between_commas_decide_if_there_is_one_for_each_field() {
+        let titled = |row: &str, titles| {
+            let rows = [row.as_bytes().to_vec()];
+            detect(&rows, Some(titles), &TextOptions::default()).map(|(dialect, _)| dialect)
+        };
+        for row in ["345678,123,5432109,056,87,250", "1,2,3,4,5,6"] {
+            assert_eq!(titled(row, 6), Ok(Dialect::COMMAS), "{row}");
+        }
+        assert!(titled("345678,123,5432109,056,87,250", 3).is_err());
+        assert_eq!(titled("1,5 2,5 3,5", 3), Ok(Dialect::BLANKS_COMMA));
     }
 
     #[test]

@@ -72,7 +72,9 @@ impl Head {
             let what = format!("no row has the separator {named:?} that was named");
             return Err(ReadError::broken(source.path(), start, Fault::Row(what)).advise(Advice::DetectSeparator));
         }
-        let (dialect, warning) = detect(&sample, options)
+        let has_commas = |line: &&[u8]| line.contains(&b',') && !line.contains(&b';');
+        let titled = titles.filter(has_commas).map(|line| Titles::of_line(line, 0, Some(b',')).len());
+        let (dialect, warning) = detect(&sample, titled, options)
             .map_err(|what| ReadError::broken(source.path(), start, Fault::Row(what)).advise(Advice::DecimalMark))?;
         let numeric = numeric(dialect, &sample);
         let in_first = dialect.kinds(first).into_iter().filter(|k| matches!(k, FieldKind::Number | FieldKind::Empty));

@@ -90,7 +90,7 @@ mod tests {
 
     fn rows(lines: &[&str]) -> (Dialect, Vec<Vec<u8>>) {
         let rows: Vec<_> = lines.iter().map(|l| l.as_bytes().to_vec()).collect();
-        (detect(&rows, &TextOptions::default()).unwrap().0, rows)
+        (detect(&rows, None, &TextOptions::default()).unwrap().0, rows)
     }
 
     #[test]
