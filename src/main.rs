@@ -28,7 +28,7 @@ use std::process::ExitCode;
 use args::{Args, Command, mistake};
 use clap::Parser as _;
 use clap::error::ErrorKind;
-use commands::{convert, export, extract, info, measure, preview, validate, view};
+use commands::{convert, export, extract, info, manual, measure, preview, validate, view};
 use exit::Failure;
 
 fn main() -> ExitCode {
@@ -70,5 +70,7 @@ fn run(args: &Args) -> Result<(), Failure> {
         Command::Info(info) => info::run(info),
         Command::Preview(preview) => preview::run(preview),
         Command::View(view) => view::run(view),
+        Command::Completions(completions) => manual::completions(completions),
+        Command::Man(man) => manual::man(man),
     }
 }

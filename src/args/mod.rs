@@ -2,7 +2,9 @@
 
 mod common;
 mod convert;
+mod examples;
 mod export;
+mod manual;
 mod measure;
 pub(crate) mod mistake;
 mod placing;
@@ -22,6 +24,7 @@ pub(crate) use convert::{
     TargetArg,
 };
 pub(crate) use export::ExportArgs;
+pub(crate) use manual::{CompletionsArgs, ManArgs};
 pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use preview::PreviewArgs;
 pub(crate) use values::Attributes;
@@ -43,21 +46,35 @@ pub(crate) struct Args {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Converts scans to a dataset
+    #[command(after_help = examples::CONVERT)]
     Convert(Box<ConvertArgs>),
     /// Writes the points of scans and datasets to one file: LAS, LAZ, PLY or CSV
+    #[command(after_help = examples::EXPORT)]
     Export(Box<ExportArgs>),
     /// Measures what settings of convert cost and buy on a scene: speed, size, errors of positions, colours and pictures
+    #[command(after_help = examples::MEASURE)]
     Measure(Box<MeasureArgs>),
     /// Checks whether a dataset conforms to its format and matches its scans
+    #[command(after_help = examples::VALIDATE)]
     Validate(ValidateArgs),
     /// Writes the images within an E57 file, and the places of its scans and images as a table
+    #[command(after_help = examples::EXTRACT)]
     Extract(ExtractArgs),
     /// Describes scans and datasets, from their headers unless --deep is given
+    #[command(after_help = examples::INFO)]
     Info(InfoArgs),
     /// Draws a picture of a dataset or of scans
+    #[command(after_help = examples::PREVIEW)]
     Preview(Box<PreviewArgs>),
     /// Shows datasets or scans in the browser, served from this machine
+    #[command(after_help = examples::VIEW)]
     View(Box<ViewArgs>),
+    /// Prints what a shell needs to complete commands, options and values
+    #[command(after_help = examples::COMPLETIONS)]
+    Completions(CompletionsArgs),
+    /// Writes manual pages
+    #[command(after_help = examples::MAN)]
+    Man(ManArgs),
 }
 
 #[derive(Debug, ClapArgs)]

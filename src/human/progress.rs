@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use pointmill_converter::{Events, Phase, Warning};
 use serde_json::json;
 
-use super::quantities::{count, rate, seconds};
+use super::quantities::{bytes, count, rate, seconds};
 use crate::args::{ProgressArg, TalkArgs};
 use crate::exit::print_line;
 use crate::flags;
@@ -174,6 +174,7 @@ impl Progress {
             "done": done,
             "total": (state.total > 0).then_some(state.total),
             "points_per_second": (unit(state.phase) == "points").then(|| per_second.round()),
+            "memory_bytes": pointmill_converter::memory::resident_bytes(),
             "eta_seconds": left.map(|s| (s * 10.0).round() / 10.0),
         }));
     }
@@ -233,7 +234,7 @@ fn style(phase: &str, total: u64) -> ProgressStyle {
     let template = match total {
         0 => "{msg:8} {spinner} {elapsed}",
         _ if unit != "points" => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {left}",
-        _ => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {speed}  {left}",
+        _ => "{msg:8} [{bar:30}] {percent:>3} %  {points}  {speed}  {left}  {memory}",
     };
     let per_second = |state: &ProgressState| state.pos() as f64 / state.elapsed().as_secs_f64().max(1e-3);
     ProgressStyle::with_template(template)
@@ -244,6 +245,11 @@ fn style(phase: &str, total: u64) -> ProgressStyle {
         })
         .with_key("speed", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
             let _ = write!(w, "{}", rate(per_second(state)));
+        })
+        .with_key("memory", move |_: &ProgressState, w: &mut dyn std::fmt::Write| {
+            if let Some(now) = pointmill_converter::memory::resident_bytes() {
+                let _ = write!(w, "{}", bytes(now));
+            }
         })
         .with_key("left", move |state: &ProgressState, w: &mut dyn std::fmt::Write| {
             let left = state.len().unwrap_or(0).saturating_sub(state.pos());

@@ -113,7 +113,7 @@ fn commands_and_options_that_are_none() {
             2,
             &[
                 "no command",
-                "convert, export, measure, validate, extract, info, preview, view",
+                "convert, export, measure, validate, extract, info, preview, view, completions, man",
                 "see 'pointmill --help'",
             ],
         ),

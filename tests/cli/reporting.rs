@@ -35,6 +35,7 @@ fn progress_for_programs_is_one_json_object_a_line() {
         assert_eq!((&last["done"], &last["total"]), (&50_000.into(), &50_000.into()), "{stderr}");
         assert!(last["points_per_second"].as_f64().unwrap() > 0.0);
         assert_eq!(last["eta_seconds"], 0.0);
+        assert_eq!(last["memory_bytes"].is_u64(), cfg!(target_os = "linux"), "{stderr}");
     }
     of_phase("finish");
 }

@@ -17,6 +17,7 @@ import { writeLas } from "./lib/las.js";
 import { BINARY, info, pointmill, validate } from "./lib/pointmill.js";
 import { SCENES } from "./lib/scenes.js";
 import { serve } from "./lib/server.js";
+import { checkView } from "./lib/view.js";
 
 const OUT = fileURLToPath(new URL("./out", import.meta.url));
 const AEROSCAN = fileURLToPath(new URL("../../fixtures/las/autzen_trim.laz", import.meta.url));
@@ -103,6 +104,8 @@ async function main() {
       const made = makeDataset(dataset, scan);
       const url = `/data/${dataset.name}${dataset.format === "copc" ? "/points.copc.laz" : ""}`;
       if (!made.validated.ok) failures += report(`${dataset.name}: validate finds faults`, made.validated.problems.map(String));
+      const { lines, figures: opened } = await checkView(browser.context, made.path, made, join(OUT, "pictures", `${dataset.name}-view.png`));
+      failures += report(`${dataset.name} in pointmill view: ${opened}`, lines);
       for (const client of dataset.clients) {
         const job = jobOf(dataset, made, scan, url);
         const started = performance.now();

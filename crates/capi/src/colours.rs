@@ -30,7 +30,11 @@ impl PmDataset {
     fn is_deep(&self, column: usize) -> Outcome<bool> {
         let units: Vec<u32> = match &self.content {
             Content::Bintree(leaves) => leaves.tree.leaves().collect(),
-            _ => (0..self.node_count()).collect(),
+            // chunks that are not read yet stay unread
+            Content::Octree(tree) => {
+                (0..tree.len()).filter(|id| tree.node(*id).is_some_and(|(node, _)| !node.is_proxy)).collect()
+            }
+            Content::Batches(_) => (0..self.node_count()).collect(),
         };
         let taken = SAMPLED.min(units.len() as u32) as usize;
         let mut decoder = Decoder::default();
@@ -62,5 +66,40 @@ pub(crate) fn colour(points: &NodePoints, colours: Colours, elements: usize, i: 
             }))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axes::PmAxes;
+    use crate::test_help::open;
+
+    /// A tree of which some chunks are not read, in a dataset that does not say the range of its colours.
+    #[test]
+    fn proxies_are_not_looked_at() {
+        let dataset = open("copc/pages.copc.laz", PmAxes::ZUp);
+        let Content::Octree(tree) = &dataset.content else { panic!() };
+        let known = tree.len();
+        assert!((0..known).any(|id| tree.node(id).unwrap().0.is_proxy), "the fixture has pages");
+        let column = dataset.about.columns.iter().position(|c| c.attribute.name == "classification").unwrap(); // never above 255
+        assert!(dataset.is_deep(column).is_ok());
+        assert_eq!(tree.len(), known);
+    }
+
+    #[test]
+    fn sixteen_bits_are_rounded_and_eight_bits_in_sixteen_are_kept() {
+        let of = |depth, name: &str| {
+            let dataset = open(name, PmAxes::ZUp);
+            let colours = Colours { depth, ..dataset.about.colours().unwrap() };
+            let mut decoder = Decoder::default();
+            decoder.decode(&dataset, 0, 0).unwrap();
+            let rgb = decoder.points.columns()[colours.column].values::<u16>().unwrap()[..3].to_vec();
+            (rgb, colour(&decoder.points, colours, 3, 0).unwrap())
+        };
+        let (rgb, found) = of(Depth::Sixteen, "potree2/default");
+        assert_eq!(found[..3], [eight_bit(rgb[0]), eight_bit(rgb[1]), eight_bit(rgb[2])]);
+        let (rgb, found) = of(Depth::Eight, "potree2/default");
+        assert_eq!(found.map(u16::from), [rgb[0].min(255), rgb[1].min(255), rgb[2].min(255), 255]);
     }
 }

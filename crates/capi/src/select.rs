@@ -247,3 +247,70 @@ pub extern "C" fn pm_switch_distance(
 pub extern "C" fn pm_material(d_min: f64, d_max: f64, switch_distance: f64) -> PmMaterial {
     PmMaterial::of(Material::choose([d_min, d_max], switch_distance))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axes::PmAxes;
+    use crate::test_help::open;
+
+    fn camera(eye: [f64; 3], forward: [f64; 3]) -> PmCamera {
+        let up = [0.0, 0.0, 1.0];
+        PmCamera { eye, forward, up, vertical_fov: 1.0, near: 0.0, far: 0.0, width: 800, height: 600 }
+    }
+
+    const ALL: PmSelection =
+        PmSelection { budget: u64::MAX, min_node_pixels: 0.0, point_radius: 0.05, order: 0, load: 0 };
+
+    /// From the south of the middle of the box.
+    fn from_south(dataset: &PmDataset, away: f64) -> PmCamera {
+        let bounds = dataset.about.tight.unwrap();
+        let [x, _, z] = bounds.center();
+        camera([x, bounds.min[1] - away, z], [0.0, 1.0, 0.0])
+    }
+
+    #[test]
+    fn proxies_are_listed_unless_they_may_be_read() {
+        let dataset = open("copc/pages.copc.laz", PmAxes::ZUp);
+        let camera = from_south(&dataset, 50.0);
+        let draw = dataset.select(&camera, &ALL).unwrap();
+        let is_proxy = |draw: &&PmDraw| draw.flags == PM_NODE_PROXY;
+        assert!(draw.iter().any(|draw| is_proxy(&draw) && draw.points == 0));
+        let read = dataset.select(&camera, &PmSelection { load: 1, ..ALL }).unwrap();
+        assert!(!read.iter().any(|draw| is_proxy(&draw)) && read.len() > draw.len());
+        let points = read.iter().map(|draw| draw.points).sum::<u64>();
+        assert_eq!(Some(points), dataset.about.points);
+    }
+
+    #[test]
+    fn leaves_change_their_material_with_the_distance() {
+        let dataset = open("bintree/packed", PmAxes::ZUp);
+        let all = |away, material| {
+            let draw = dataset.select(&from_south(&dataset, away), &ALL).unwrap();
+            !draw.is_empty() && draw.iter().all(|draw| draw.material == material)
+        };
+        // 0.05 m, 1 radian over 600 pixels: they change at 30 m
+        assert!(all(1000.0, PmMaterial::Far));
+        assert!(dataset.select(&from_south(&dataset, 1000.0), &PmSelection { point_radius: 0.0, ..ALL }).is_err());
+        assert!(
+            dataset.select(&from_south(&dataset, 1000.0), &PmSelection { order: 2, ..ALL }).is_ok(),
+            "of octrees only"
+        );
+    }
+
+    #[test]
+    fn a_dataset_without_points_shows_nothing() {
+        let dataset = open("batches/empty.qbatch", PmAxes::ZUp);
+        assert_eq!(dataset.select(&camera([0.0; 3], [0.0, 1.0, 0.0]), &ALL).unwrap(), []);
+        assert_eq!(dataset.node_count(), 0);
+    }
+
+    #[test]
+    fn the_first_is_shown_whatever_the_budget_is() {
+        for name in ["potree2/default", "bintree/packed", "batches/example.qbatch"] {
+            let dataset = open(name, PmAxes::ZUp);
+            let draw = dataset.select(&from_south(&dataset, 50.0), &PmSelection { budget: 0, ..ALL }).unwrap();
+            assert_eq!(draw.len(), 1, "{name}");
+        }
+    }
+}

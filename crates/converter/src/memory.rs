@@ -14,6 +14,11 @@ pub fn peak_resident_bytes() -> Option<u64> {
     status_kib("/proc/self/status", "VmHWM:")
 }
 
+/// Resident set of this process now, bytes (Linux; `None` elsewhere).
+pub fn resident_bytes() -> Option<u64> {
+    status_kib("/proc/self/status", "VmRSS:")
+}
+
 fn available_bytes() -> Option<u64> {
     status_kib("/proc/meminfo", "MemAvailable:")
 }

@@ -1,7 +1,23 @@
-// Shows what the datasets say of themselves.
-const config = JSON.parse(document.getElementById("config").textContent);
-const out = document.getElementById("scene");
-for (const scene of config.mode === "server" ? config.scenes : []) {
-    const answer = await fetch(`${scene}/scene`);
-    out.textContent += JSON.stringify(await answer.json(), null, 2) + "\n";
+// The page: finds out what to show, and shows it or says why it cannot.
+
+import { App } from "pm/app.js";
+import { Messages } from "pm/ui/messages.js";
+import { ServerSource } from "pm/sources/server.js";
+
+performance.setResourceTimingBufferSize(100_000); // browsers remember 250 requests; `App.stats` counts them
+const messages = new Messages(document.getElementById("messages"));
+
+async function sources(config) {
+  if (config.mode === "server") return config.scenes.map((base) => new ServerSource(base));
+  const { openStatic } = await import("pm/sources/static.js");
+  return config.scenes.map((scene) => openStatic(scene, messages));
+}
+
+try {
+  const config = JSON.parse(document.getElementById("config").textContent);
+  const app = new App(messages, config);
+  window.pointmill = app; // for tests, and for those who want to look
+  await app.open(await sources(config));
+} catch (error) {
+  messages.fail(error.message);
 }

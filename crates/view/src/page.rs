@@ -26,7 +26,40 @@ macro_rules! files {
 }
 
 /// Every file of `page/`, by its name below it.
-const FILES: &[(&str, &str)] = files!["index.html", "main.js", "style.css"];
+const FILES: &[(&str, &str)] = files![
+    "app.js",
+    "camera.js",
+    "clouds/batches.js",
+    "clouds/bintree.js",
+    "clouds/block.js",
+    "clouds/loader.js",
+    "clouds/octree.js",
+    "clouds/open.js",
+    "controls.js",
+    "gl/context.js",
+    "gl/palettes.js",
+    "gl/renderer.js",
+    "gl/shaders.js",
+    "index.html",
+    "main.js",
+    "math.js",
+    "sources/batches.js",
+    "sources/bintree.js",
+    "sources/columns.js",
+    "sources/files.js",
+    "sources/potree1.js",
+    "sources/potree2.js",
+    "sources/server.js",
+    "sources/static.js",
+    "sources/units.js",
+    "style.css",
+    "ui/elements.js",
+    "ui/link.js",
+    "ui/measure.js",
+    "ui/messages.js",
+    "ui/panel.js",
+    "ui/point.js",
+];
 
 /// Where the page comes from.
 #[derive(Debug, Clone, Default)]

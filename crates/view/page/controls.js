@@ -1,0 +1,145 @@
+// Orbit, pan and zoom as in Potree: left button turns, right button (or with Shift) moves, the wheel comes nearer to what is under the
+// cursor, a double click goes there. Fly: W A S D, Q and E, the mouse looks. One finger turns, two move and zoom.
+
+import { add, clamp, distance, dot, scale, sub, unit } from "pm/math.js";
+
+/** Angle, radians, below which the eye does not come to the vertical. */
+const UPRIGHT = 0.01;
+
+export class Controls {
+  constructor(canvas, camera, actions) {
+    Object.assign(this, { canvas, camera, actions, isFlying: false, speed: 1, pointers: new Map(), keys: new Set() });
+    const on = (name, act) => canvas.addEventListener(name, act, { passive: false });
+    on("pointerdown", (event) => this.#down(event));
+    on("pointermove", (event) => this.#move(event));
+    on("pointerup", (event) => this.#up(event));
+    on("pointercancel", (event) => this.#up(event));
+    on("wheel", (event) => this.#wheel(event));
+    on("contextmenu", (event) => event.preventDefault());
+    on("dblclick", (event) => actions.goTo(...this.#pixel(event)));
+    on("keydown", (event) => this.#key(event, true));
+    on("keyup", (event) => this.#key(event, false));
+    on("blur", () => this.keys.clear());
+  }
+
+  #pixel(event) {
+    const rect = this.canvas.getBoundingClientRect();
+    const ratio = this.camera.width / rect.width;
+    return [(event.clientX - rect.left) * ratio, (event.clientY - rect.top) * ratio];
+  }
+
+  #down(event) {
+    this.canvas.focus();
+    try {
+      this.canvas.setPointerCapture(event.pointerId);
+    } catch {
+      // a pointer that is gone already
+    }
+    this.pointers.set(event.pointerId, this.#pixel(event));
+    this.travelled = 0;
+  }
+
+  #up(event) {
+    const wasClick = this.pointers.size === 1 && this.travelled < 5 && event.type === "pointerup" && event.button === 0;
+    this.pointers.delete(event.pointerId);
+    if (wasClick) this.actions.click(...this.#pixel(event));
+    this.actions.rest();
+  }
+
+  #move(event) {
+    const now = this.#pixel(event);
+    const before = this.pointers.get(event.pointerId);
+    if (!before) return this.actions.hover(...now);
+    const moved = [now[0] - before[0], now[1] - before[1]];
+    this.travelled += Math.hypot(...moved);
+    if (this.pointers.size === 2) this.#pinch(event.pointerId, before, now);
+    else if (event.buttons & 2 || event.buttons & 4 || event.shiftKey) this.pan(...moved);
+    else this.turn(...moved);
+    this.pointers.set(event.pointerId, now);
+    this.actions.change();
+  }
+
+  #pinch(id, before, now) {
+    const other = [...this.pointers].find(([key]) => key !== id)[1];
+    const span = (a) => Math.max(Math.hypot(a[0] - other[0], a[1] - other[1]), 1);
+    this.pan((now[0] - before[0]) / 2, (now[1] - before[1]) / 2);
+    this.zoom(span(before) / span(now));
+  }
+
+  /** Around the target, or of the view when flying; pixels. */
+  turn(dx, dy) {
+    const { camera } = this;
+    const k = this.isFlying ? -1 : 1;
+    const angle = (Math.PI / camera.height) * k;
+    const away = sub(camera.eye, camera.target);
+    const reach = distance(camera.eye, camera.target);
+    const flat = Math.atan2(away[1], away[0]);
+    const tilt = Math.asin(clamp(away[2] / reach, -1, 1));
+    // straight down there is no direction: it is that of the picture's lower edge
+    const around = Math.hypot(away[0], away[1]) < 1e-9 * reach ? Math.atan2(-camera.up[1], -camera.up[0]) : flat;
+    const [yaw, pitch] = [around - dx * angle, clamp(tilt + dy * angle, UPRIGHT - Math.PI / 2, Math.PI / 2 - UPRIGHT)];
+    const arm = scale([Math.cos(yaw) * Math.cos(pitch), Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch)], reach);
+    if (this.isFlying) camera.target = sub(camera.eye, arm);
+    else camera.eye = add(camera.target, arm);
+    camera.update();
+  }
+
+  pan(dx, dy) {
+    const { camera } = this;
+    const perPixel = distance(camera.eye, camera.target) / camera.focal;
+    const by = add(scale(camera.right, -dx * perPixel), scale(camera.up, dy * perPixel));
+    camera.eye = add(camera.eye, by);
+    camera.target = add(camera.target, by);
+    camera.update();
+  }
+
+  /** Towards a place, which keeps its pixel; a factor below 1 comes nearer. */
+  zoom(factor, place = this.camera.target) {
+    const { camera } = this;
+    const reach = distance(camera.eye, camera.target) * factor;
+    if (!(reach > this.actions.least() && reach < this.actions.most())) return;
+    camera.eye = add(place, scale(sub(camera.eye, place), factor));
+    camera.target = sub(camera.eye, scale(camera.back, reach));
+    camera.update();
+  }
+
+  #wheel(event) {
+    event.preventDefault();
+    const notches = clamp(event.deltaY / (event.deltaMode === 1 ? 3 : 100), -3, 3);
+    if (this.isFlying) this.speed *= 1.2 ** -notches;
+    else this.zoom(1.15 ** notches, this.actions.under(...this.#pixel(event)));
+    this.actions.change();
+    this.actions.rest();
+  }
+
+  #key(event, isDown) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const key = event.key.toLowerCase();
+    if (this.isFlying && "wasdqe".includes(key) && key.length === 1) {
+      if (isDown) this.keys.add(key);
+      else this.keys.delete(key);
+      this.actions.change();
+      event.preventDefault();
+    } else if (isDown) this.actions.key(key);
+  }
+
+  /** Moves on while keys of flying are held; true if the picture changed. */
+  fly(seconds) {
+    if (!this.isFlying || this.keys.size === 0) return false;
+    const { camera } = this;
+    const along = { w: scale(camera.back, -1), s: camera.back, d: camera.right, a: scale(camera.right, -1), e: [0, 0, 1], q: [0, 0, -1] };
+    const step = [...this.keys].reduce((sum, key) => add(sum, along[key]), [0, 0, 0]);
+    const by = scale(unit(step, [0, 0, 0]), this.actions.pace() * this.speed * seconds);
+    camera.eye = add(camera.eye, by);
+    camera.target = add(camera.target, by);
+    camera.update();
+    return true;
+  }
+}
+
+/** Where a ray meets the plane through `place` that faces the camera. */
+export function onPlane(camera, direction, place) {
+  const depth = -dot(sub(place, camera.eye), camera.back);
+  const slope = -dot(direction, camera.back);
+  return slope > 1e-9 ? add(camera.eye, scale(direction, depth / slope)) : place;
+}
