@@ -17,12 +17,14 @@ import { writeLas } from "./lib/las.js";
 import { BINARY, info, pointmill, validate } from "./lib/pointmill.js";
 import { SCENES } from "./lib/scenes.js";
 import { serve } from "./lib/server.js";
+import { checkPage } from "./lib/page.js";
 import { checkView } from "./lib/view.js";
 
 const OUT = fileURLToPath(new URL("./out", import.meta.url));
 const AEROSCAN = fileURLToPath(new URL("../../fixtures/las/autzen_trim.laz", import.meta.url));
 
 const wanted = process.argv.slice(2);
+const isPageWanted = wanted.length === 0 || wanted.includes("page");
 const datasets = DATASETS.filter(({ name }) => wanted.length === 0 || wanted.some((text) => name.includes(text)));
 
 /** Writes the scans of all scenes that are needed, and returns them by name, with their paths. */
@@ -90,7 +92,7 @@ async function check(browser, server, { dataset, client, made, job, screenshot }
 
 async function main() {
   if (!existsSync(BINARY)) throw new Error(`${BINARY} is not there: build it with cargo, or name another one in POINTMILL`);
-  if (datasets.length === 0) throw new Error(`no dataset is called ${wanted.join(" or ")}`);
+  if (datasets.length === 0 && !isPageWanted) throw new Error(`no dataset is called ${wanted.join(" or ")}`);
   rmSync(OUT, { recursive: true, force: true });
   for (const folder of ["scans", "data", "pages", "pictures"]) mkdirSync(join(OUT, folder), { recursive: true });
   await bundle(join(OUT, "pages"));
@@ -115,6 +117,7 @@ async function main() {
         failures += await plantAll(browser, server, { dataset, client, made, job, drawn: Boolean(result.found.picture) });
       }
     }
+    if (isPageWanted) failures += await checkPage(browser.context, AEROSCAN, OUT, report);
   } finally {
     await browser.close();
     await server.close();

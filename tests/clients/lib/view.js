@@ -7,9 +7,9 @@ import { BINARY } from "./pointmill.js";
 const INTERRUPTED = 130; // the exit code after Ctrl-C
 const PATIENCE = 20_000; // milliseconds until the server listens, and until the page is quiet
 
-/** Starts the server of a dataset. `stop()` ends it as Ctrl-C does and returns what is wrong with its end. */
-async function start(path) {
-  const child = spawn(BINARY, ["view", path, "--no-open", "--json", "--quiet"]);
+/** Starts the server of datasets. `stop()` ends it as Ctrl-C does and returns what is wrong with its end. */
+export async function start(...paths) {
+  const child = spawn(BINARY, ["view", ...paths, "--no-open", "--json", "--quiet"]);
   let said = "";
   child.stderr.on("data", (part) => (said += part));
   const ended = once(child, "exit");

@@ -12,7 +12,9 @@ export class Potree2Source {
     this.url = url;
     this.hierarchy = new RangedFile(`${url}hierarchy.bin`, messages);
     this.octree = new RangedFile(`${url}octree.bin`, messages);
+    /** Places of points, and of chunks of the index, by the name of their node. */
     this.nodes = new Map();
+    this.chunks = new Map();
   }
 
   async scene() {
@@ -31,7 +33,7 @@ export class Potree2Source {
     this.attributes = this.columns.filter(({ name }) => name !== "position");
     const position = this.columns.find(({ name }) => name === "position");
     const cube = meta.boundingBox;
-    this.nodes.set("r", { offset: 0, size: meta.hierarchy.firstChunkSize, isProxy: true });
+    this.chunks.set("r", { offset: 0, size: meta.hierarchy.firstChunkSize });
     return {
       kind: "octree", format: "Potree 2.0", name: meta.name || this.name, points: meta.points, projection: meta.projection, cube, spacing: meta.spacing,
       bounds: position?.min?.length === 3 ? { min: position.min, max: position.max } : cube,
@@ -41,7 +43,7 @@ export class Potree2Source {
   }
 
   async chunk(root) {
-    const { offset, size } = this.nodes.get(root);
+    const { offset, size } = this.chunks.get(root);
     const bytes = await this.hierarchy.read(offset, offset + size);
     const view = new DataView(bytes);
     const found = [{ name: root }];
@@ -51,8 +53,8 @@ export class Potree2Source {
       const at = i * RECORD;
       const [type, mask] = [view.getUint8(at), view.getUint8(at + 1)];
       Object.assign(node, { points: view.getUint32(at + 2, true), isProxy: type === PROXY });
-      const place = { offset: Number(view.getBigUint64(at + 6, true)), size: Number(view.getBigUint64(at + 14, true)), isProxy: node.isProxy, points: node.points };
-      this.nodes.set(node.name, place);
+      const place = { offset: Number(view.getBigUint64(at + 6, true)), size: Number(view.getBigUint64(at + 14, true)), points: node.points };
+      (node.isProxy ? this.chunks : this.nodes).set(node.name, place);
       for (let child = 0; child < 8 && !node.isProxy; child++) if ((mask >> child) & 1) found.push({ name: node.name + child });
     }
     if (found.length * RECORD !== size) throw new Error(`the index below ${root} is no tree`);
@@ -61,7 +63,7 @@ export class Potree2Source {
 
   async points(units, { attribute }) {
     // of a proxy the place of its points stands in its own chunk
-    for (const name of units) if (this.nodes.get(name)?.isProxy) await this.chunk(name);
+    for (const name of units) if (!this.nodes.has(name)) await this.chunk(name);
     const places = units.map((name) => this.nodes.get(name));
     const parts = await this.octree.readAll(places.map(({ offset, size }) => [offset, offset + size]));
     return Promise.all(parts.map((bytes, i) => this.#decode(bytes, places[i].points, attribute)));
