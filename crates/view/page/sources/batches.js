@@ -17,7 +17,7 @@ export class BatchesSource {
   constructor({ name, url }, messages) {
     this.name = name;
     this.kept = new Map();
-    this.file = new RangedFile(url, messages);
+    this.file = new RangedFile(url.endsWith("/") ? `${url}points.qbatch` : url, messages);
   }
 
   async scene() {
