@@ -49,7 +49,8 @@ export function readBatches(bytes) {
       return made;
     };
     const planes = Array.from({ length: flags & 3 }, words);
-    const colours = words();
+    const { buffer, byteOffset, byteLength } = words();
+    const colours = new Uint8Array(buffer, byteOffset, byteLength);
     const indices = new Uint16Array(bytes, at, count);
     at += Math.ceil(count / 2) * 4;
     const extra = flags & HAS.EXTRA ? new Float32Array(bytes, at, count) : null;
