@@ -23,7 +23,7 @@ export function picture({ canvas, renderer, camera, scene }, balls) {
 }
 
 /** Lets the client choose, load and draw what the camera sees, until `points` are in the scene or nothing comes any more. */
-export async function watch(potree, cloud, stage, points) {
+async function watch(potree, cloud, stage, points) {
   stage.scene.add(cloud);
   potree.pointBudget = 10_000_000;
   cloud.minNodePixelSize = 0;
@@ -37,4 +37,16 @@ export async function watch(potree, cloud, stage, points) {
     frames += 1;
   }
   return { frames, shown };
+}
+
+/** Stages, loads and draws a cloud; the last argument are the client's own tables of choices. What the client then sees, and its picture. */
+export async function showCloud(potree, cloud, job, { PointColorType, PointSizeType }) {
+  const view = stage(job.box);
+  const { material } = cloud;
+  material.pointSizeType = PointSizeType.FIXED;
+  material.size = 3;
+  if (job.colourBy) material.pointColorType = PointColorType[job.colourBy];
+  if (job.intensity) material.intensityRange = job.intensity;
+  const watched = await watch(potree, cloud, view, job.points);
+  return { ...watched, picture: picture(view, job.balls) };
 }
