@@ -46,5 +46,6 @@ mod support;
 mod text_inputs;
 mod units;
 mod validating;
+mod verifying;
 mod view;
 mod viewers;
