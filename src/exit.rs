@@ -140,7 +140,7 @@ impl From<ConvertError> for Failure {
         let line = flags::error_line(&error);
         match error {
             ConvertError::Read(read) => read.into(),
-            ConvertError::Plan(_) | ConvertError::Output(_) => Self::Usage(line),
+            ConvertError::Plan(_) | ConvertError::Output(_) | ConvertError::Job(_) => Self::Usage(line),
             ConvertError::Unsupported(_) => Self::Unsupported(line),
             ConvertError::Input(_) => Self::Input(line),
             ConvertError::Io { .. } => Self::Io(line),

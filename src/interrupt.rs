@@ -71,6 +71,11 @@ pub(crate) fn keeps(line: String) {
     *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(line);
 }
 
+/// That line, once.
+pub(crate) fn kept() -> Option<String> {
+    KEPT.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
 /// The command has stopped working: it cleans up, or gives its output the name, and is not disturbed.
 pub(crate) fn settling() {
     if STAGE.compare_exchange(WORKING, SETTLING, Ordering::AcqRel, Ordering::Acquire) == Err(ABANDONED) {
@@ -109,8 +114,7 @@ fn abandon_late_work() {
         let folder = if fs::rename(&folder, &other).is_ok() { PathBuf::from(other) } else { folder };
         let _ = (0..3).find(|_| fs::remove_dir_all(&folder).is_ok());
     }
-    let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner).take();
-    end(kept.unwrap_or_else(|| "interrupted; nothing was written".to_owned()));
+    end(kept().unwrap_or_else(|| "interrupted; nothing was written".to_owned()));
 }
 
 fn end(line: impl Into<String>) {

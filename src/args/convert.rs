@@ -9,8 +9,8 @@ use pointmill_format::Aabb;
 
 use super::common::{InputArgs, TalkArgs};
 use super::values::{
-    Attributes, Planes, Scale, ZSTD_LEVEL, or_auto, parse_attributes, parse_bounds, parse_bytes, parse_class,
-    parse_compress, parse_planes, parse_precision, parse_scale, parse_threads, whole,
+    Attributes, CheckpointArg, Planes, Scale, ZSTD_LEVEL, or_auto, parse_attributes, parse_bounds, parse_bytes,
+    parse_checkpoint, parse_class, parse_compress, parse_planes, parse_precision, parse_scale, parse_threads, whole,
 };
 
 /// The Brotli quality for node payloads; above 9 the time grows a hundred times for up to eight per cent.
@@ -153,6 +153,16 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_enum, value_name = "WITH", num_args = 0..=1, require_equals = true, default_missing_value = "dataset",
           help_heading = "Output")]
     pub(crate) verify: Option<VerifyArg>,
+
+    /// Goes on where a run with the same inputs and options was ended, if it has left OUT.job: what it has read is not read
+    /// again
+    #[arg(long, help_heading = "Resources")]
+    pub(crate) resume: bool,
+    /// Whether a run that is ended leaves OUT.job for --resume: always, never, or auto: if the points are not expected to fit into
+    /// memory. A number of points: always, and what was read is safe each time that so many more are
+    #[arg(long, value_name = "WHEN|POINTS", default_value = "auto", value_parser = parse_checkpoint,
+          allow_negative_numbers = true, help_heading = "Resources")]
+    pub(crate) checkpoint: CheckpointArg,
 
     /// Writes a copy of the run report OUT/report.json to FILE
     #[arg(long, value_name = "FILE", help_heading = "Reporting")]

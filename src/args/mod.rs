@@ -27,8 +27,8 @@ pub(crate) use export::ExportArgs;
 pub(crate) use manual::{CompletionsArgs, ManArgs};
 pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use preview::PreviewArgs;
-pub(crate) use values::Attributes;
 use values::parse_bytes;
+pub(crate) use values::{Attributes, CheckpointArg};
 pub(crate) use view::ViewArgs;
 
 /// Converts laser scans to datasets that renderers stream, without losing a point.

@@ -66,6 +66,27 @@ pub(super) fn parse_planes(text: &str) -> Result<Planes, String> {
     }
 }
 
+/// Whether a run leaves what another one can go on with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CheckpointArg {
+    Auto,
+    Always,
+    Never,
+    /// Always, each time that so many points were read.
+    Every(u64),
+}
+
+pub(super) fn parse_checkpoint(text: &str) -> Result<CheckpointArg, String> {
+    match text {
+        "auto" => Ok(CheckpointArg::Auto),
+        "always" => Ok(CheckpointArg::Always),
+        "never" => Ok(CheckpointArg::Never),
+        _ => whole(1..=u64::MAX)(text)
+            .map(CheckpointArg::Every)
+            .map_err(|_| "expected auto, always, never, or a number of points".to_owned()),
+    }
+}
+
 /// The default level of Zstandard.
 pub(super) const ZSTD_LEVEL: i32 = 3;
 

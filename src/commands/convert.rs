@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use pointmill_converter::{
-    AttributeChoice, BatchesSettings, BintreeSettings, CopcSettings, DarkColours, Duplicates, Encoding, Filter,
-    OnFault, OriginPoints, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, RgbDepth,
+    AttributeChoice, BatchesSettings, BintreeSettings, Checkpoint, CopcSettings, DarkColours, Duplicates, Encoding,
+    Filter, OnFault, OriginPoints, Outliers, Plan, Potree1Settings, Potree1Version, Potree2Settings, Report, RgbDepth,
     Sampling, ScaleChoice, Target, resolve_path,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
@@ -13,15 +13,15 @@ use super::page_file::PageFile;
 use super::report_file::ReportFile;
 use super::verify::verify;
 use crate::args::{
-    Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg,
-    FaultArg, LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg, SplitArg,
-    TargetArg,
+    Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, CheckpointArg, ConvertArgs, DarkColoursArg, DuplicatesArg,
+    EncodingArg, FaultArg, LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg,
+    SplitArg, TargetArg,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::inputs::Inputs;
-use crate::interrupt::{no_more_checks, stop_flag};
+use crate::interrupt::{kept, no_more_checks, stop_flag};
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let targets = targets(args)?;
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     });
     no_more_checks();
     let for_people = progress.end();
-    let report = result?;
+    let report = result.map_err(|error| with_kept(error.into()))?;
     tell(args, report_file.as_ref(), &report).map_err(|failure| after_all(failure, &plan.output))?;
     let page = page_file.map(|file| file.write(&plan.name)).transpose();
     let page = page.map_err(|failure| after_all(failure, &plan.output))?;
@@ -76,6 +76,18 @@ fn tell(args: &ConvertArgs, file: Option<&ReportFile>, report: &Report) -> Resul
     let text = to_json(report)?;
     file.map_or(Ok(()), |file| file.write(&text))?;
     if args.json { emit(&text) } else { Ok(()) }
+}
+
+/// What failed, and what of it is not lost.
+fn with_kept(failure: Failure) -> Failure {
+    match (failure, kept()) {
+        (Failure::Interrupted(_), Some(line)) => Failure::Interrupted(line),
+        (failure, Some(line)) => {
+            print_line(line.trim_start_matches("interrupted; "));
+            failure
+        }
+        (failure, None) => failure,
+    }
 }
 
 /// What fails once the dataset is in place must not read as if there were none.
@@ -253,6 +265,16 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         RgbDepthArg::Sixteen => RgbDepth::Sixteen,
     };
     plan.crs.clone_from(&args.inputs.reading.placing.crs);
+    plan.resume = args.resume;
+    plan.checkpoint = match args.checkpoint {
+        CheckpointArg::Auto => Checkpoint::Auto,
+        CheckpointArg::Always => Checkpoint::Always,
+        CheckpointArg::Never => Checkpoint::Never,
+        CheckpointArg::Every(points) => {
+            plan.checkpoint_points = points;
+            Checkpoint::Always
+        }
+    };
     plan.overwrite = args.overwrite;
     if let Some(bytes) = args.memory {
         plan.memory_bytes = bytes;

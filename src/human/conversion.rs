@@ -24,6 +24,9 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
         n => format!(", temporary files {}", bytes(n)),
     };
     lines.push(format!("{}, {}{memory}{temporary}", seconds(report.seconds), rate(per_second)));
+    if report.recalled_points > 0 {
+        lines.push(format!("{} had been read before", plural(report.recalled_points, "point")));
+    }
     lines.extend(points_lines(report));
     lines.extend(colours_line(report));
     lines.extend(report.outputs.iter().map(|output| accuracy::line(output, report)));

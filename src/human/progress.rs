@@ -203,6 +203,13 @@ impl Events for Progress {
         interrupt::works_in(folder);
     }
 
+    fn checkpoint(&self, folder: &Path) {
+        interrupt::keeps(format!(
+            "interrupted; what was read is safe in {}, and --resume goes on there",
+            folder.display()
+        ));
+    }
+
     fn settling(&self) {
         interrupt::settling();
     }

@@ -104,6 +104,7 @@ const LAYERS: [(&str, Layers<'static>); 9] = [
             &["error", "warning"],
             &["runtime"],
             &["sources"],
+            &["job"],
             &["cloud"],
             &["gather"],
             &["report"],

@@ -85,6 +85,8 @@ pub enum Advice {
     OtherOutput,
     /// Wait until the other run has ended, or choose another output.
     WaitForRun,
+    /// Begin the run anew.
+    StartAnew,
 }
 
 impl fmt::Display for Advice {
@@ -133,6 +135,7 @@ impl fmt::Display for Advice {
             }
             Self::MoveAway => "move it away, or choose another output",
             Self::OtherOutput => "choose another output",
+            Self::StartAnew => "begin anew",
             Self::WaitForRun => "wait until it has ended, or choose another output",
         };
         f.write_str(words)

@@ -7,6 +7,7 @@ use std::time::Instant;
 use crate::cloud::{Cloud, Intake};
 use crate::error::ConvertError;
 use crate::gather::{Demand, gather, is_coarse};
+use crate::job::Job;
 use crate::memory::peak_resident_bytes;
 use crate::outputs::{self, StagedDataset, StagedFolder, Target};
 use crate::plan::Plan;
@@ -66,7 +67,8 @@ fn run(
     let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?;
     staged.warnings.iter().for_each(|w| events.warning(w));
     events.works_in(staged.path());
-    let written = write(plan, targets, events, &staged, disk, &mut clock);
+    let mut job = None;
+    let written = write(plan, targets, events, &staged, disk, &mut job, &mut clock);
     let written = written.and_then(|report| verify(&staged.path_of_new()).map(|()| report));
     events.settling();
     match written {
@@ -75,11 +77,18 @@ fn run(
                 events.warning(&left);
                 report.warnings.push(left);
             }
+            if let Some(left) = job.and_then(Job::end) {
+                events.warning(&left);
+                report.warnings.push(left);
+            }
             Ok(report)
         }
         Err(error) => {
             events.phase(Phase::CleanUp, 0); // removing many files takes its time
             drop(staged);
+            if let Some(left) = job.filter(|job| !job.has_units()).and_then(Job::end) {
+                events.warning(&left);
+            }
             Err(error)
         }
     }
@@ -92,6 +101,7 @@ fn write(
     events: &dyn Events,
     staged: &StagedFolder,
     disk: Arc<dyn Disk>,
+    job: &mut Option<Job>,
     clock: &mut Clock<'_>,
 ) -> Result<Report, ConvertError> {
     let peak_before = peak_resident_bytes();
@@ -104,12 +114,22 @@ fn write(
     let budget = Budget::new(plan, intake.schema.stride, least)?;
     resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
-    let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, disk), events)?;
+    let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, Arc::clone(&disk)), events)?;
+    let expected_bytes = sources.points_declared.saturating_mul(intake.schema.stride as u64);
+    let is_large = expected_bytes > rt.budget.record_bytes(sources.points_declared);
+    let job = match Job::of(plan, is_large, &sources, settings(plan, targets), staged.output(), &disk)? {
+        Some(begun) => Some(&*job.insert(begun)),
+        None => None,
+    };
+    if let Some(warning) = (plan.resume && job.is_some_and(Job::is_new)).then_some(Warning::BeginsAnew) {
+        events.warning(&warning);
+        warnings.push(warning);
+    }
 
     let groups = outputs::groups(targets);
     let demand = Demand { moments: wants.moments, uses: groups.len() as u32 };
     let reading = rt.budget.reading(&rt.memory)?;
-    let cloud = gather(plan, &sources, &intake, demand, warnings, &rt, clock)?;
+    let cloud = gather(plan, &sources, &intake, demand, warnings, job, &rt, clock)?;
     drop(reading);
     report::check_lattice(&cloud)?;
 
@@ -130,6 +150,7 @@ fn write(
         other_files: OtherFilesReport::new(&plan.other_files),
         outputs,
         temp_bytes: rt.temp.written_bytes(),
+        recalled_points: job.map_or(0, Job::recalled),
         phases: clock.finish(),
         seconds: clock.seconds(),
     };

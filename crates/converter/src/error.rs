@@ -45,6 +45,8 @@ pub enum ConvertError {
         /// What needs them.
         why: MemoryNeed,
     },
+    /// A job cannot be gone on with, or begun.
+    Job(JobFault),
     /// What was made was looked at before it got its name, and refused.
     Refused {
         /// The output.
@@ -195,6 +197,91 @@ pub enum InputFault {
     },
 }
 
+/// Why a run cannot go on where another one ended, or cannot leave anything for another one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum JobFault {
+    /// Another run works with it.
+    InUse {
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// The folder holds other things than a job.
+    NoJob {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// It was begun by another version of the program.
+    Version {
+        /// That version.
+        was: String,
+    },
+    /// It was begun with another setting.
+    Setting {
+        /// The setting, as reports name it.
+        name: String,
+        /// Its value then.
+        was: String,
+        /// Its value now.
+        now: String,
+    },
+    /// An input is not as it was.
+    ChangedInput {
+        /// The input.
+        path: PathBuf,
+    },
+    /// An input was, or is, not among the others.
+    OtherInputs {
+        /// The first such.
+        path: PathBuf,
+    },
+    /// A file of the job is not as it was written.
+    Damaged {
+        /// The file.
+        file: PathBuf,
+        /// From this byte on.
+        byte: u64,
+    },
+}
+
+impl JobFault {
+    fn advice(&self) -> Option<Advice> {
+        match self {
+            Self::InUse { .. } => Some(Advice::WaitForRun),
+            Self::NoJob { .. } => Some(Advice::MoveAway),
+            _ => Some(Advice::StartAnew),
+        }
+    }
+}
+
+impl fmt::Display for JobFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::InUse { folder } => write!(f, "{}: another run works with it", folder.display()),
+            Self::NoJob { folder } => {
+                write!(f, "{}: the folder for an unfinished run holds other files", folder.display())
+            }
+            Self::Version { was } => write!(f, "the unfinished run is of version {was}, this is another one"),
+            Self::Setting { name, was, now } => {
+                write!(f, "the unfinished run had another {name}: {was}, now {now}")
+            }
+            Self::ChangedInput { path } => write!(f, "{}: changed since the unfinished run read it", path.display()),
+            Self::OtherInputs { path } => {
+                write!(f, "{}: not an input of both this and the unfinished run", path.display())
+            }
+            Self::Damaged { file, byte } => {
+                write!(f, "{}: not as it was written, from byte {byte} on", file.display())
+            }
+        }
+    }
+}
+
+impl From<JobFault> for ConvertError {
+    fn from(fault: JobFault) -> Self {
+        Self::Job(fault)
+    }
+}
+
 /// An existing output that may not be replaced.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -258,6 +345,7 @@ impl ConvertError {
             Self::Unsupported(e) => e.to_string(),
             Self::Input(e) => e.to_string(),
             Self::Output(e) => e.to_string(),
+            Self::Job(e) => e.to_string(),
             Self::Io { path, doing, error, .. } => format!("{}: {doing}: {}", path.display(), system_reason(error)),
             Self::Memory { ceiling, why, .. } => {
                 format!("the memory ceiling of {} is too small: {why}", amount(*ceiling))
@@ -287,6 +375,7 @@ impl ConvertError {
                 _ => None,
             },
             Self::Memory { needed, .. } => Some(Advice::RaiseMemory { mib: (needed >> 20) + 1 }),
+            Self::Job(e) => e.advice(),
             Self::Read(_) | Self::Plan(_) | Self::Refused { .. } | Self::Interrupted | Self::Internal(_) => None,
         }
     }

@@ -39,6 +39,7 @@ mod error;
 mod estimate;
 mod export;
 mod gather;
+mod job;
 pub mod memory;
 mod octree;
 mod outputs;
@@ -51,7 +52,7 @@ mod warning;
 
 pub use advice::Advice;
 pub use convert::{Verify, convert, convert_on, convert_verified};
-pub use error::{ConvertError, InputFault, MemoryNeed, OutputFault, Unsupported};
+pub use error::{ConvertError, InputFault, JobFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
 pub use export::{ExportReport, ExportedAttribute, ExportedPoints, PositionChange, export, export_on};
 pub use octree::Sampling;
@@ -62,8 +63,8 @@ pub use outputs::potree1::{Potree1Settings, Potree1Version};
 pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
 pub use outputs::{StagedFiles, Target, WorkFolder, resolve_path};
 pub use plan::{
-    AttributeChoice, Duplicates, ExportFormat, Filter, LengthUnit, OnFault, OriginPoints, Outliers, Plan, PlanError,
-    PlanFault, PositionPrecision, RgbDepth, ScaleChoice, Setting,
+    AttributeChoice, Checkpoint, Duplicates, ExportFormat, Filter, LengthUnit, OnFault, OriginPoints, Outliers, Plan,
+    PlanError, PlanFault, PositionPrecision, RgbDepth, ScaleChoice, Setting,
 };
 pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{

@@ -1,11 +1,12 @@
 //! The range of the colours of one input, small: there may be very many inputs.
 
 use pointmill_format::Column;
+use serde::{Deserialize, Serialize};
 
 use crate::runtime::{Vectors, vectorized};
 
 /// Least and greatest red, green and blue of 16 bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct ColourRange {
     min: [u16; 3],
     max: [u16; 3],

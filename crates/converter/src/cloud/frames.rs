@@ -13,8 +13,10 @@
 
 use std::ops::{Index, IndexMut};
 
+use serde::{Deserialize, Serialize};
+
 /// Integers on the lattice of the run: `world = q · scale + offset`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(transparent)]
 pub(crate) struct JobPoint(pub(crate) [i64; 3]);
 
@@ -72,7 +74,7 @@ impl JobColumns {
 }
 
 /// Bounds on the job lattice, closed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct JobBounds {
     pub(crate) min: JobPoint,
     pub(crate) max: JobPoint,

@@ -44,7 +44,7 @@ pub(crate) use relations::{Relation, Relations};
 pub(crate) use segments::{Segment, Segments};
 pub(crate) use shortfall::Shortfall;
 pub(crate) use stats::{Change, SourceStats, Stats};
-pub(crate) use store::{BLOCK_BYTES, Store};
+pub(crate) use store::{BLOCK_BYTES, SafeBlock, Store};
 pub(crate) use widening::{Group, Widening};
 
 use std::sync::Arc;
@@ -112,7 +112,7 @@ impl<'a> Cloud<'a> {
         mut warnings: Vec<Warning>,
     ) -> Result<Self, ConvertError> {
         let Gathered { lattice, is_lossless, frame, store, cells, census, room, stats, shared_places } = gathered;
-        warnings.extend_from_slice(&stats.warnings);
+        warnings.extend(stats.skipped.iter().cloned().map(Warning::from));
         let facts = Facts::new(plan, sources, intake, &stats, &mut warnings)?;
         Ok(Self {
             plan,

@@ -1,9 +1,11 @@
 //! Exact sums and extremes of positions: what the upper splits of a binary tree need to know of a cell.
 
+use serde::{Deserialize, Serialize};
+
 use super::frames::{JobBounds, JobColumns, JobPoint};
 
 /// Of the points of a cell, on the job lattice.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Moments {
     /// Exact: 2^64 points of 63 bits fit.
     pub(crate) sum: [i128; 3],

@@ -1,11 +1,12 @@
 //! The range of the values of an attribute.
 
 use pointmill_format::{Column, with_column};
+use serde::{Deserialize, Serialize};
 
 use crate::runtime::{Vectors, vectorized};
 
 /// Smallest and largest value of each element; NaN and infinities are not values.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Range {
     pub(crate) min: Vec<f64>,
     pub(crate) max: Vec<f64>,

@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 
 use pointmill_format::{Attribute, AttributeType};
+use serde::{Deserialize, Serialize};
 
 use crate::sources::Schema;
 
@@ -25,7 +26,7 @@ pub(crate) enum Relation {
 }
 
 /// An attribute that can take part, and where its bytes are in a stored record.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Place {
     attribute: usize,
     at: usize,
@@ -48,7 +49,7 @@ impl Place {
 }
 
 /// The values of an attribute so far, numbered as they came.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct Keys {
     numbers: HashMap<u64, usize>,
     /// More than [`MOST_KEYS`].
@@ -78,7 +79,7 @@ impl Keys {
 }
 
 /// The value of an attribute for each number of a key.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Pair {
     key: usize,
     follower: usize,
@@ -86,7 +87,7 @@ struct Pair {
 }
 
 /// Relations that no point has contradicted. Indices are those of `places`.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Relations {
     places: Vec<Place>,
     /// Of the first point; `None`: no point yet.

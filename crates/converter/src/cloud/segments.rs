@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 /// A run of records of one block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Segment {
     pub(crate) block: u32,
     pub(crate) start: u32,
@@ -24,7 +26,8 @@ impl Segment {
 }
 
 /// The records of a cell, a chunk or any other part of the cloud. Copies share their memory until one changes.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Vec<Segment>", into = "Vec<Segment>")]
 pub(crate) struct Segments(Arc<Vec<Segment>>);
 
 impl Segments {
@@ -64,6 +67,11 @@ impl Segments {
         });
     }
 
+    /// The same of blocks that have got numbers greater by `by`.
+    pub(crate) fn shift(&mut self, by: u32) {
+        Arc::make_mut(&mut self.0).iter_mut().for_each(|segment| segment.block = segment.block.wrapping_add(by));
+    }
+
     /// Number of records.
     pub(crate) fn points(&self) -> u64 {
         self.0.iter().map(|s| u64::from(s.count)).sum()
@@ -75,6 +83,18 @@ impl Segments {
 
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+}
+
+impl From<Vec<Segment>> for Segments {
+    fn from(all: Vec<Segment>) -> Self {
+        Self(Arc::new(all))
+    }
+}
+
+impl From<Segments> for Vec<Segment> {
+    fn from(segments: Segments) -> Self {
+        Arc::unwrap_or_clone(segments.0)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What the pass over the points learns: bounds, ranges, counts and the checksum.
 
 use pointmill_format::{Aabb, Changes};
+use serde::{Deserialize, Serialize};
 
 use super::checksum::Checksum;
 use super::colour_range::ColourRange;
@@ -8,10 +9,10 @@ use super::frames::JobBounds;
 use super::range::Range;
 use super::relations::Relations;
 use crate::sources::Schema;
-use crate::warning::Warning;
+use crate::warning::SkippedPoints;
 
 /// Facts about all points of the cloud. Sums and extremes only, so that any order of merging gives the same.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Stats {
     /// Of the points that go in, on the job lattice.
     pub(crate) bounds: JobBounds,
@@ -46,11 +47,12 @@ pub(crate) struct Stats {
     pub(crate) fallen_together: Option<u64>,
     /// Some point moved to the job lattice by more than doubles of its coordinates are rounded.
     pub(crate) moves: bool,
-    pub(crate) warnings: Vec<Warning>,
+    /// Of parts of scans that cannot be decoded.
+    pub(crate) skipped: Vec<SkippedPoints>,
 }
 
 /// Coordinate change by moving to the job lattice (job minus source), world units, over the points that go in.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(crate) struct Change {
     /// Largest magnitude.
     pub(crate) max: [f64; 3],
@@ -110,7 +112,7 @@ impl Change {
 }
 
 /// Facts about one input.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SourceStats {
     /// Decoded, before any filter.
     pub(crate) read: u64,
@@ -199,7 +201,7 @@ impl Stats {
             integers_lost: 0,
             moves: false,
             fallen_together: None,
-            warnings: Vec::new(),
+            skipped: Vec::new(),
         }
     }
 
@@ -232,8 +234,8 @@ impl Stats {
         self.unreadable += other.unreadable;
         self.integers_lost += other.integers_lost;
         self.moves |= other.moves;
-        self.warnings.extend_from_slice(&other.warnings);
-        self.warnings.sort_by_cached_key(Warning::to_string);
+        self.skipped.extend_from_slice(&other.skipped);
+        self.skipped.sort();
     }
 }
 

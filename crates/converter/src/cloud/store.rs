@@ -3,6 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
+use serde::{Deserialize, Serialize};
+
 use super::segments::Segment;
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
@@ -22,12 +24,30 @@ pub(crate) struct Store {
     /// touched once. They count as records in memory.
     spare: Mutex<Vec<Vec<u8>>>,
     temp: TempFiles,
+    /// The file outlives the run, if it is ended.
+    is_kept: bool,
     spill: Mutex<Option<Arc<DiskFile>>>,
     spilled: AtomicU64,
 }
 
+/// A block that outlives the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct SafeBlock {
+    source: u32,
+    /// Where it begins in the file.
+    pub(crate) offset: u64,
+    bytes: u64,
+    /// CRC-32C.
+    sum: u32,
+}
+
 struct Block {
     source: u32,
+    bytes: u64,
+    /// CRC-32C, if the file outlives the run.
+    sum: u32,
+    /// Where else it is while it is in memory.
+    copy: Option<u64>,
     /// Records that were not taken yet, once for each use.
     remaining: u64,
     place: Place,
@@ -47,6 +67,17 @@ impl Store {
     /// An empty store for `uses` outputs that each take every record once. What finds no room in `memory` goes into a
     /// temporary file.
     pub(crate) fn new(temp: TempFiles, stride: usize, uses: u32, memory: &Arc<Pool>) -> Arc<Self> {
+        Self::on(None, temp, stride, uses, memory)
+    }
+
+    /// [`Self::new`] with a file that may outlive the run.
+    pub(crate) fn on(
+        file: Option<DiskFile>,
+        temp: TempFiles,
+        stride: usize,
+        uses: u32,
+        memory: &Arc<Pool>,
+    ) -> Arc<Self> {
         Arc::new(Self {
             stride,
             uses,
@@ -55,9 +86,60 @@ impl Store {
             blocks: Mutex::default(),
             spare: Mutex::default(),
             temp,
-            spill: Mutex::default(),
+            is_kept: file.is_some(),
+            spill: Mutex::new(file.map(Arc::new)),
             spilled: AtomicU64::new(0),
         })
+    }
+
+    /// The number that the next block will have.
+    pub(crate) fn next_block(&self) -> Result<u32, ConvertError> {
+        Ok(self.blocks.lock().map_err(|_| poisoned())?.len() as u32)
+    }
+
+    /// Writes the blocks from `first` on that are in memory alone, and waits until all of them are safe. They stay in memory, too.
+    pub(crate) fn secure(&self, first: u32) -> Result<Vec<SafeBlock>, ConvertError> {
+        let mut safe = Vec::new();
+        for index in first..self.next_block()? {
+            let place = self.blocks.lock().map_err(|_| poisoned())?[index as usize].place.clone();
+            let written = match &place {
+                Place::Memory(records) => Some(self.write(records)?),
+                Place::Disk { .. } | Place::Gone => None,
+            };
+            let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+            let block = &mut blocks[index as usize];
+            block.copy = block.copy.or(written);
+            // it may have left memory meanwhile
+            let offset = match block.place {
+                Place::Disk { offset } => offset,
+                _ => block.copy.unwrap_or(0),
+            };
+            safe.push(SafeBlock { source: block.source, offset, bytes: block.bytes, sum: block.sum });
+        }
+        self.spill_file()?.sync("syncing the records")?;
+        Ok(safe)
+    }
+
+    /// Takes blocks that another run has made safe; returns the number of the first.
+    pub(crate) fn adopt(&self, safe: &[SafeBlock]) -> Result<u32, ConvertError> {
+        let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let first = blocks.len() as u32;
+        for &SafeBlock { source, offset, bytes, sum } in safe {
+            let remaining = bytes / self.stride as u64 * u64::from(self.uses);
+            blocks.push(Block { source, bytes, sum, copy: None, remaining, place: Place::Disk { offset } });
+            self.spilled.fetch_max(offset + bytes, Ordering::Relaxed);
+        }
+        Ok(first)
+    }
+
+    /// True if a block is in the file as it was written.
+    pub(crate) fn is_whole(&self, block: &SafeBlock) -> Result<bool, ConvertError> {
+        let mut records = vec![0; block.bytes as usize];
+        match self.spill_file()?.read_at(&mut records, block.offset, "reading the records") {
+            Ok(()) => Ok(crc32c::crc32c(&records) == block.sum),
+            Err(ConvertError::Io { error, .. }) if error.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
+            Err(other) => Err(other),
+        }
     }
 
     /// Bytes that went to the spill file.
@@ -69,7 +151,7 @@ impl Store {
     /// The index that the next block will have; it must be added with [`Self::fill`].
     pub(crate) fn open(&self, source: u32) -> Result<u32, ConvertError> {
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
-        blocks.push(Block { source, remaining: 0, place: Place::Gone });
+        blocks.push(Block { source, bytes: 0, sum: 0, copy: None, remaining: 0, place: Place::Gone });
         Ok((blocks.len() - 1) as u32)
     }
 
@@ -85,6 +167,7 @@ impl Store {
 
     fn fill_for(&self, block: u32, records: &mut Vec<u8>, uses: u32) -> Result<(), ConvertError> {
         let bytes = records.len() as u64;
+        let sum = if self.is_kept { crc32c::crc32c(records) } else { 0 };
         let keeps_buffer = records.len() * 2 > records.capacity();
         let cost = if keeps_buffer { records.capacity() as u64 } else { bytes };
         let has_room = || self.memory.try_take(Consumer::Records, cost);
@@ -99,7 +182,7 @@ impl Store {
         let remaining = bytes / self.stride as u64 * u64::from(uses);
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let slot = &mut blocks[block as usize];
-        (slot.remaining, slot.place) = (remaining, place);
+        *slot = Block { source: slot.source, bytes, sum, copy: None, remaining, place };
         Ok(())
     }
 
@@ -200,9 +283,13 @@ impl Store {
 
     /// Puts records behind those that are in the spill file.
     fn spill(&self, records: &[u8]) -> Result<Place, ConvertError> {
+        self.write(records).map(|offset| Place::Disk { offset })
+    }
+
+    fn write(&self, records: &[u8]) -> Result<u64, ConvertError> {
         let offset = self.spilled.fetch_add(records.len() as u64, Ordering::Relaxed);
         self.spill_file()?.write_at(records, offset, "writing the spill file")?;
-        Ok(Place::Disk { offset })
+        Ok(offset)
     }
 
     fn give(&self, bytes: u64) {
@@ -235,7 +322,11 @@ impl Evict for Store {
             };
             let Some((index, records)) = found else { break };
             next = index;
-            let place = self.spill(&records)?;
+            let copy = self.blocks.lock().map_err(|_| poisoned())?[index].copy;
+            let place = match copy {
+                Some(offset) => Place::Disk { offset },
+                None => self.spill(&records)?,
+            };
             let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
             let block = &mut blocks[index];
             // another thread may have been faster, or all of it was taken meanwhile

@@ -122,7 +122,7 @@ fn write(
     file.sync("syncing the output")?;
     workers.check_stop()?;
     let points = report::points(&counted.stats, counted.tally.points())?;
-    warnings.extend(counted.stats.warnings.iter().cloned());
+    warnings.extend(counted.stats.skipped.iter().cloned().map(Warning::from));
     let lattice = match target {
         Target::Lattice(lattice) => Some(lattice),
         Target::World => None,

@@ -17,7 +17,7 @@ use crate::error::ConvertError;
 use crate::gather::{Reading, Rows, Visit, select, stored_columns};
 use crate::plan::OnFault;
 use crate::runtime::Workers;
-use crate::warning::{Warning, reason_of};
+use crate::warning::{SkippedPoints, reason_of};
 
 /// What a pass over all points has found.
 pub(super) struct Counted {
@@ -147,10 +147,10 @@ impl<'a> Pass<'a> {
             }
             Err(error) if self.reading.plan.unreadable == OnFault::Skip => {
                 let path = scan.info().path.clone();
-                let warning = Warning::PointsSkipped { points: lost, path, error: reason_of(&error) };
-                self.workers.warn(&warning);
+                let skipped = SkippedPoints { path, error: reason_of(&error), points: lost };
+                self.workers.warn(&skipped.clone().into());
                 worker.stats.unreadable += lost;
-                worker.stats.warnings.push(warning);
+                worker.stats.skipped.push(skipped);
                 Ok(())
             }
             Err(error) if error.advice().is_none() => Err(error.advise(Advice::SkipUnreadable).into()),

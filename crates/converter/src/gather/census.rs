@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::cloud::{CellHash, CensusCell, node};
 
 /// A finer census is not kept: cells of twice the width take its place. A cube has no more cells of level 6.
@@ -9,7 +11,7 @@ const MOST_CELLS: usize = 1 << 18;
 
 /// Points by Morton code of the cell. The width of the cells depends on the points alone: the least at which there are
 /// [`MOST_CELLS`] at most.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Counts {
     counts: HashMap<u64, u64, CellHash>,
     /// Levels by which its cells are wider than those that are counted.

@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 use std::ops::Deref;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::{Deserialize, Serialize};
 
 use super::census::Counts;
 use super::lattice::ulp;
@@ -35,6 +37,8 @@ pub(super) struct Context<'a> {
     pub(super) store: Arc<Store>,
     pub(super) memory: &'a Arc<Pool>,
     pub(super) wants_moments: bool,
+    /// Its number.
+    pub(super) pass: u32,
     /// True once a point could not be stored: from then on only bounds are wanted.
     pub(super) misled: AtomicBool,
 }
@@ -53,6 +57,15 @@ impl Context<'_> {
         (self.plan.attributes == AttributeChoice::Scene).then(|| Relations::new(&self.intake.schema))
     }
 
+    pub(super) fn is_misled(&self) -> bool {
+        self.misled.load(Ordering::Relaxed)
+    }
+
+    /// Notes that a point could not be stored, if so.
+    pub(super) fn note_misled(&self, misled: bool) {
+        self.misled.fetch_or(misled, Ordering::Relaxed);
+    }
+
     /// What the arithmetic of doubles may move world coordinates within `bounds` by.
     pub(super) fn rounding(&self, axis: usize, bounds: &JobBounds) -> f64 {
         let world = |q: i64| (q as f64 * self.lattice.scale[axis] + self.lattice.offset[axis]).abs();
@@ -65,7 +78,7 @@ impl Context<'_> {
 pub(super) type CellParts = HashMap<u64, CellPart, CellHash>;
 
 /// One thread's part of a cell.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct CellPart {
     pub(super) segments: Segments,
     pub(super) moments: Moments,
@@ -80,7 +93,7 @@ impl CellPart {
 }
 
 /// Where the records of a pass are.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Collected {
     pub(super) cells: CellParts,
     /// Records in no order of space, to be grouped once all are in.
@@ -109,6 +122,17 @@ impl Collected {
     pub(super) fn leave(&mut self, segment: Segment, cells: impl Iterator<Item = (u64, u32)>) {
         self.loose.push(segment);
         cells.for_each(|(cell, points)| self.census.add(cell, u64::from(points)));
+    }
+
+    /// The same of blocks that have got numbers greater by `by`.
+    pub(super) fn shift(&mut self, by: u32) {
+        self.cells.values_mut().for_each(|part| part.segments.shift(by));
+        self.loose.shift(by);
+    }
+
+    /// The same of blocks that have got numbers smaller by `by`.
+    pub(super) fn shift_back(&mut self, by: u32) {
+        self.shift(by.wrapping_neg());
     }
 
     /// All records, in order of block.

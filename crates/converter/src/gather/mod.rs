@@ -25,6 +25,7 @@ mod partition;
 mod pass;
 mod places;
 mod ranges;
+mod read_unit;
 mod select;
 mod visit;
 
@@ -42,6 +43,7 @@ pub(crate) use visit::{Reading, Visit};
 
 use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
+use crate::job::Job;
 use crate::plan::{OriginPoints, Outliers, Plan, ScaleChoice};
 use crate::runtime::{Clock, Phase, Runtime};
 use crate::sources::{Fineness, Sources, far_out, intersection};
@@ -52,7 +54,7 @@ use partition::Hint;
 use pass::{Pass, PassEnd};
 
 /// Headers may mislead once about the bounds, and the bounds may then ask for a coarser lattice.
-const MAX_PASSES: usize = 5;
+const MAX_PASSES: u32 = 5;
 
 /// Outliers make the extent at least this many times longer.
 const FAR_OUTSIDE: f64 = 10.0;
@@ -64,13 +66,16 @@ const FEWEST_STEPS: f64 = (1 << 20) as f64;
 /// The same where the sources are known to resolve more.
 const FEWEST_KNOWN_STEPS: f64 = (1 << 22) as f64;
 
-/// Reads every point once; again only if the headers were wrong about the bounds. `warnings`: those so far.
+/// Reads every point once; again only if the headers were wrong about the bounds. `warnings`: those so far. What a job has is not
+/// read again.
+#[allow(clippy::too_many_arguments)]
 pub(crate) fn gather<'a>(
     plan: &'a Plan,
     sources: &'a Sources,
     intake: &'a Intake,
     demand: Demand,
     mut warnings: Vec<Warning>,
+    job: Option<&Job>,
     rt: &Runtime<'_>,
     clock: &mut Clock<'_>,
 ) -> Result<Cloud<'a>, ConvertError> {
@@ -87,17 +92,18 @@ pub(crate) fn gather<'a>(
             rt.warn(&warning);
             warnings.push(warning);
         };
-        let (misled, complete) = match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, rt).run()? {
-            PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
-            PassEnd::Misled(stats) => (Some(stats), None),
-            PassEnd::Complete(mut gathered) => {
-                // a step that was requested may put points together that the sources have apart
-                if gathered.is_lossless || plan.scale == ScaleChoice::Auto {
-                    gathered.shared_places = places::find(&mut gathered, rt)?;
+        let (misled, complete) =
+            match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, pass, job, rt)?.run()? {
+                PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
+                PassEnd::Misled(stats) => (Some(stats), None),
+                PassEnd::Complete(mut gathered) => {
+                    // a step that was requested may put points together that the sources have apart
+                    if gathered.is_lossless || plan.scale == ScaleChoice::Auto {
+                        gathered.shared_places = places::find(&mut gathered, rt)?;
+                    }
+                    (None, Some(gathered))
                 }
-                (None, Some(gathered))
-            }
-        };
+            };
         let Some(stats) = misled.as_deref().or(complete.as_deref().map(|gathered| &gathered.stats)) else { continue };
         let settled = lattice::settled(plan, sources, &lattice, stats);
         let read = Read { lattice: &lattice, stats, complete: complete.as_deref(), settled: settled.as_ref() };
@@ -135,7 +141,7 @@ pub(crate) fn gather<'a>(
                     warn(Warning::CoarserStep { scale, reason });
                 }
                 finishing_warnings(plan, sources, &gathered).into_iter().for_each(&mut warn);
-                let known = warnings.len() + gathered.stats.warnings.len();
+                let known = warnings.len() + gathered.stats.skipped.len();
                 let cloud = Cloud::new(plan, sources, intake, *gathered, far_cut, warnings)?;
                 cloud.warnings[known..].iter().for_each(|w| rt.warn(w));
                 return Ok(cloud);

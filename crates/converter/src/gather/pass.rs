@@ -1,7 +1,7 @@
 //! One pass over the sources, with a lattice and bounds that are believed until they prove wrong.
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 use pointmill_format::{Aabb, Advice, Lattice, NodeKey, Scratch};
@@ -11,15 +11,18 @@ use super::context::{CellPart, Collected, Context, Demand};
 use super::lattice::ulp;
 use super::loose::Grouper;
 use super::partition::{Hint, Partition};
+use super::read_unit::{self, Unit};
 use super::visit::{Reading, Visit};
 use crate::cloud::{
-    Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, Stats, Store, morton, node, xyz,
+    Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, SourceStats, Stats, Store, morton, node,
+    xyz,
 };
 use crate::error::ConvertError;
+use crate::job::Job;
 use crate::plan::{OnFault, Plan};
 use crate::runtime::{Consumer, Evict, Reservation, Runtime};
 use crate::sources::Sources;
-use crate::warning::{Warning, reason_of};
+use crate::warning::{SkippedPoints, reason_of};
 
 /// The level of cells by which records are grouped that came in no order of space: of a volume there are 512 then.
 const LOOSE_LEVEL: u8 = 3;
@@ -41,11 +44,13 @@ pub(super) enum PassEnd {
 pub(super) struct Pass<'a> {
     context: Context<'a>,
     lattice: &'a JobLattice,
+    job: Option<&'a Job>,
     rt: &'a Runtime<'a>,
 }
 
 impl<'a> Pass<'a> {
-    /// `hint`: where the points are thought to be; `far_cut`: the box of all points but outliers, which are dropped.
+    /// `number`: its number, from 1 on; `hint`: where the points are thought to be; `far_cut`: the box of all points but outliers, which
+    /// are dropped.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
         plan: &'a Plan,
@@ -55,9 +60,12 @@ impl<'a> Pass<'a> {
         lattice: &'a JobLattice,
         hint: Option<Hint>,
         far_cut: Option<Aabb>,
+        number: u32,
+        job: Option<&'a Job>,
         rt: &'a Runtime<'a>,
-    ) -> Self {
-        let store = Store::new(rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
+    ) -> Result<Self, ConvertError> {
+        let file = job.map(|job| job.records(number, &rt.temp)).transpose()?;
+        let store = Store::on(file, rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
         let evict: Arc<dyn Evict> = Arc::clone(&store) as _;
         rt.memory.evict_from(Arc::downgrade(&evict));
         let context = Context {
@@ -66,9 +74,10 @@ impl<'a> Pass<'a> {
             store,
             memory: &rt.memory,
             wants_moments: demand.moments,
+            pass: number,
             misled: false.into(),
         };
-        Self { context, lattice, rt }
+        Ok(Self { context, lattice, job, rt })
     }
 
     /// Reads every point.
@@ -78,7 +87,7 @@ impl<'a> Pass<'a> {
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
         }
-        let Self { context: Context { partition, store, misled, reading, wants_moments, .. }, lattice, rt } = self;
+        let Self { context: Context { partition, store, misled, reading, wants_moments, .. }, lattice, rt, .. } = self;
         let intake = reading.intake;
         let cube = match Cube::around(&bounds, &lattice.lattice) {
             Ok(cube) if !misled.into_inner() && partition.holds(&bounds) => cube,
@@ -119,11 +128,47 @@ impl<'a> Pass<'a> {
 
     fn read(&self) -> Result<(Stats, Collected, Reservation), ConvertError> {
         let sources = self.context.sources;
+        let units = match self.job {
+            Some(_) => read_unit::units(sources, self.context.plan.checkpoint_points),
+            None => std::iter::once(0..sources.pairs()).collect(),
+        };
+        let mut stats = Stats::new(&self.context.intake.schema);
+        stats.sources = vec![SourceStats::default(); sources.all.len()];
+        let mut collected = Collected::default();
+        let mut room = Reservation::new(&self.rt.memory, Consumer::Cells);
+        for (number, pairs) in units.into_iter().enumerate() {
+            let unit = self.unit(number as u64, pairs)?;
+            stats.merge(&unit.stats);
+            unit.seen.iter().for_each(|(source, seen)| stats.sources[*source as usize].merge(seen));
+            collected.merge(unit.collected);
+            room.merge(unit.room);
+        }
+        Ok((stats, collected, room))
+    }
+
+    /// A unit: what another run has left of it, or read now.
+    fn unit(&self, number: u64, pairs: Range<usize>) -> Result<Unit, ConvertError> {
+        let Some(job) = self.job else { return self.read_pairs(&pairs) };
+        if let Some(unit) = read_unit::recall(job, &self.context, number, &pairs, self.rt)? {
+            let points = unit.seen.iter().map(|(_, seen)| seen.read).sum();
+            self.rt.advance(points);
+            job.count_recalled(points);
+            return Ok(unit);
+        }
+        let first_block = self.context.store.next_block()?;
+        let mut unit = self.read_pairs(&pairs)?;
+        read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit)?;
+        self.rt.events().checkpoint(job.folder());
+        Ok(unit)
+    }
+
+    fn read_pairs(&self, pairs: &Range<usize>) -> Result<Unit, ConvertError> {
+        let sources = self.context.sources;
         let parts = self.rt.in_parallel(
-            sources.pairs(),
+            pairs.len(),
             || Reader { worker: Worker::new(&self.context), visit: None, scratch: Scratch::default() },
-            |reader, unit| {
-                let (source, pieces) = sources.pair(unit);
+            |reader, i| {
+                let (source, pieces) = sources.pair(pairs.start + i);
                 for piece in pieces.clone() {
                     reader.scratch.next_piece = Some(piece + 1).filter(|next| pieces.contains(next));
                     self.piece(source, piece, reader)?;
@@ -141,8 +186,9 @@ impl<'a> Pass<'a> {
             collected.merge(more);
             room.merge(taken);
         }
-        stats.sources = self.context.take_seen()?;
-        Ok((stats, collected, room))
+        let nothing = SourceStats::default();
+        let seen = (0..).zip(self.context.take_seen()?).filter(|(_, seen)| *seen != nothing).collect();
+        Ok(Unit { stats, collected, room, seen })
     }
 
     /// Decodes one piece; what a broken piece held is counted or is an error, by policy.
@@ -179,10 +225,10 @@ impl<'a> Pass<'a> {
             ))),
             Err(error) if self.context.plan.unreadable == OnFault::Skip => {
                 let path = scan.info().path.clone();
-                let warning = Warning::PointsSkipped { points: lost, path, error: reason_of(&error) };
-                self.rt.warn(&warning);
+                let skipped = SkippedPoints { path, error: reason_of(&error), points: lost };
+                self.rt.warn(&skipped.clone().into());
                 worker.stats.unreadable += lost;
-                worker.stats.warnings.push(warning);
+                worker.stats.skipped.push(skipped);
                 Ok(())
             }
             Err(error) if error.advice().is_none() => Err(error.advise(Advice::SkipUnreadable).into()),

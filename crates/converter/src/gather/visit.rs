@@ -41,7 +41,7 @@ impl<'a> Reading<'a> {
     /// By source, what was seen of it.
     pub(crate) fn take_seen(&self) -> Result<Vec<SourceStats>, ConvertError> {
         let mut seen = self.seen.lock().map_err(|_| ConvertError::Internal("a worker thread failed".into()))?;
-        Ok(std::mem::take(&mut seen))
+        Ok(std::mem::replace(&mut seen, vec![SourceStats::default(); self.sources.all.len()]))
     }
 }
 

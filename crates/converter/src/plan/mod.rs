@@ -12,6 +12,9 @@ pub use error::{PlanError, PlanFault, Setting};
 pub use export::ExportFormat;
 pub use precision::{LengthUnit, PositionPrecision};
 
+/// Points after which what was read is safe, unless the plan says otherwise.
+const CHECKPOINT_POINTS: u64 = 64_000_000;
+
 /// What every output shares: inputs, filter, lattice, policies, resources. [`Plan::new`] gives the defaults of the
 /// command line. The datasets to make are [`crate::Target`]s beside it.
 #[derive(Debug, Clone)]
@@ -59,6 +62,23 @@ pub struct Plan {
     pub crs: Option<String>,
     /// Replace an existing output.
     pub overwrite: bool,
+    /// Whether the run leaves what another one can go on with.
+    pub checkpoint: Checkpoint,
+    /// Points, about, after which what was read is safe. Changes nothing in the output.
+    pub checkpoint_points: u64,
+    /// Go on where a run that was ended has left off.
+    pub resume: bool,
+}
+
+/// Whether a run leaves what another one can go on with if it is ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Checkpoint {
+    /// If its points are not expected to fit into memory.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
 }
 
 /// Which attributes go in.
@@ -210,6 +230,9 @@ impl Plan {
             rgb_depth: RgbDepth::Auto,
             crs: None,
             overwrite: false,
+            checkpoint: Checkpoint::Never,
+            checkpoint_points: CHECKPOINT_POINTS,
+            resume: false,
         }
     }
 }

@@ -46,10 +46,18 @@ pub struct Report {
     pub peak_memory_bytes: Option<u64>,
     /// Bytes written to temporary files.
     pub temp_bytes: u64,
+    /// Points that an earlier run had read already, before it was ended.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub recalled_points: u64,
     /// Bytes of the datasets.
     pub output_bytes: u64,
     /// What the user should know, an object with `kind` and `text` each.
     pub warnings: Vec<Warning>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
+const fn is_zero(points: &u64) -> bool {
+    *points == 0
 }
 
 /// One dataset.

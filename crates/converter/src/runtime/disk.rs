@@ -169,6 +169,19 @@ impl TempFiles {
     }
 }
 
+impl TempFiles {
+    /// A file with a name, made or opened as it is: it outlives the run.
+    pub(crate) fn keep(&self, path: &Path) -> Result<DiskFile, ConvertError> {
+        let open = || {
+            self.disk.permit(DiskOperation::Create)?;
+            File::options().read(true).write(true).create(true).truncate(false).open(path)
+        };
+        let file = open().map_err(|e| ConvertError::io(path, "opening the file for records", e).temporary())?;
+        let written = Some(Arc::clone(&self.written));
+        Ok(DiskFile { file, path: path.to_path_buf(), disk: Arc::clone(&self.disk), written })
+    }
+}
+
 /// A [`DiskFile`] written from front to back.
 pub(crate) struct Sequential<'a> {
     file: &'a DiskFile,

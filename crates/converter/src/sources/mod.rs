@@ -237,6 +237,16 @@ impl Sources {
 
 #[cfg(test)]
 impl Sources {
+    /// Sources whose pieces alone matter.
+    pub(crate) fn with_pairs(mut all: Vec<Source>) -> Self {
+        let mut first_pair = 0;
+        for source in &mut all {
+            source.first_pair = first_pair;
+            first_pair = source.end_of_pairs();
+        }
+        Self::of_headers(all)
+    }
+
     /// Sources whose headers alone matter.
     pub(crate) fn of_headers(all: Vec<Source>) -> Self {
         let open = OpenScans::new(Opener::new(&Plan::new(Vec::new(), "out".into()), 1), 1);

@@ -80,6 +80,11 @@ impl Stored {
 }
 
 impl Source {
+    /// Differs where anything differs that a run relies on.
+    pub(crate) fn mark(&self) -> u64 {
+        self.mark
+    }
+
     /// Number of the pair of pieces that follows its last.
     pub(super) fn end_of_pairs(&self) -> u64 {
         self.first_pair + u64::from(self.pieces).div_ceil(PIECES_TOGETHER)
@@ -88,6 +93,12 @@ impl Source {
 
 #[cfg(test)]
 impl Source {
+    /// A source of which pieces and points alone matter.
+    pub(crate) fn of_pieces(points_declared: u64, pieces: u32) -> Self {
+        let stored = Stored { lattice: None, resolution: Default::default(), fineness: [Fineness::Double; 3] };
+        Self { points_declared, pieces, ..Self::of_header(stored, None, None) }
+    }
+
     /// A source of which the header alone matters. `seen`: where its points are.
     pub(crate) fn of_header(stored: Stored, bounds_declared: Option<Aabb>, seen: Option<Aabb>) -> Self {
         Self {

@@ -18,7 +18,7 @@ use crate::reason::LatticeReason;
 
 pub use colours::ColourNote;
 pub use crs::{CrsNote, Proj4Fault};
-pub(crate) use skipped::reason_of;
+pub(crate) use skipped::{SkippedPoints, reason_of};
 pub use viewers::{NameFault, RenamedAttribute, ViewerNote};
 
 /// What the user should know of a run that goes on.
@@ -67,6 +67,8 @@ pub enum Warning {
         /// Why, with path and byte.
         error: String,
     },
+    /// There is no run to go on with: this one begins anew.
+    BeginsAnew,
     /// The declared bounds, or the coordinate step chosen from them, do not fit the points: they are read again.
     ReadAgain,
     /// The process took more memory than it was allowed.
@@ -215,6 +217,7 @@ impl Warning {
             Self::Leftover { .. } => "leftover",
             Self::InputSkipped { .. } => "input_skipped",
             Self::PointsSkipped { .. } => "points_skipped",
+            Self::BeginsAnew => "begins_anew",
             Self::ReadAgain => "read_again",
             Self::AboveCeiling { .. } => "above_ceiling",
             Self::FinerStep { .. } => "finer_step",

@@ -20,6 +20,7 @@ impl Warning {
             Self::Leftover { path, why } => format!("{}: left over, and not removed: {why}", path.display()),
             Self::InputSkipped { error, .. } => format!("input skipped: {error}"),
             Self::PointsSkipped { points, error, .. } => format!("{points} points skipped: {error}"),
+            Self::BeginsAnew => "there is no unfinished run to go on with; this one begins anew".to_owned(),
             Self::ReadAgain => "the points lie outside the bounds that were declared or sampled, or their extent does \
                                 not fit the chosen step; reading again with the measured bounds"
                 .to_owned(),

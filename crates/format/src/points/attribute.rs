@@ -6,6 +6,7 @@ use std::str::FromStr;
 use crate::UnknownName;
 
 /// The type of one element of an attribute: all that the formats have. All are stored little-endian.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)] // the names say it
 pub enum AttributeType {

@@ -16,6 +16,7 @@ use std::fmt;
 /// let line = "2 values are outside the range and take its nearest end, 1 is not finite and becomes 0 (-3 to 70000)";
 /// assert_eq!(changes.to_string(), line);
 /// ```
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Changes {
     /// Outside the range that is declared or can be held: the nearest end was taken.

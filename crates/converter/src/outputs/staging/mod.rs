@@ -66,6 +66,11 @@ impl StagedFolder {
         parent_of(self.hidden.path()).to_path_buf()
     }
 
+    /// The place of the output, all links followed.
+    pub(crate) fn output(&self) -> &Path {
+        &self.place.path
+    }
+
     /// The hidden folder.
     pub(crate) fn path(&self) -> &Path {
         self.hidden.path()

@@ -1,0 +1,131 @@
+//! Units of reading: consecutive pieces of scans, and what is left of them once they are read. Without a job there is one.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::context::{Collected, Context};
+use crate::cloud::{SafeBlock, SourceStats, Stats};
+use crate::error::ConvertError;
+use crate::job::Job;
+use crate::runtime::{Consumer, Reservation, Runtime};
+use crate::sources::Sources;
+
+/// What the threads have made of a unit.
+pub(super) struct Unit {
+    pub(super) stats: Stats,
+    pub(super) collected: Collected,
+    pub(super) room: Reservation,
+    /// By source, those that were read.
+    pub(super) seen: Vec<(u32, SourceStats)>,
+}
+
+/// A unit as a job keeps it.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    /// Of the pairs of pieces.
+    pairs: Range<usize>,
+    stats: Stats,
+    /// Segments count blocks from the first of the unit.
+    collected: Collected,
+    seen: Vec<(u32, SourceStats)>,
+    blocks: Vec<SafeBlock>,
+    /// The pass has been misled, in this unit or before.
+    misled: bool,
+}
+
+/// The same that is written, which needs nothing of its own.
+#[derive(Serialize)]
+struct Keeping<'a> {
+    pairs: Range<usize>,
+    stats: &'a Stats,
+    collected: &'a Collected,
+    seen: &'a [(u32, SourceStats)],
+    blocks: Vec<SafeBlock>,
+    misled: bool,
+}
+
+/// Pairs of pieces with about so many points, as headers say; those of a unit follow one another.
+pub(super) fn units(sources: &Sources, points: u64) -> Vec<Range<usize>> {
+    let (mut units, mut start, mut sum) = (Vec::new(), 0, 0u64);
+    for pair in 0..sources.pairs() {
+        let (source, pieces) = sources.pair(pair);
+        let source = &sources.all[source];
+        sum += source.points_declared * pieces.len() as u64 / u64::from(source.pieces.max(1));
+        if sum >= points {
+            units.push(start..pair + 1);
+            (start, sum) = (pair + 1, 0);
+        }
+    }
+    units.extend((start < sources.pairs()).then(|| start..sources.pairs()));
+    units
+}
+
+/// Puts a unit into the job, once its records are safe.
+pub(super) fn keep(
+    job: &Job,
+    context: &Context<'_>,
+    number: u64,
+    pairs: Range<usize>,
+    first_block: u32,
+    unit: &mut Unit,
+) -> Result<(), ConvertError> {
+    let blocks = context.store.secure(first_block)?;
+    unit.collected.shift_back(first_block);
+    let kept = Keeping {
+        pairs,
+        stats: &unit.stats,
+        collected: &unit.collected,
+        seen: &unit.seen,
+        blocks,
+        misled: context.is_misled(),
+    };
+    let added = job.add(context.pass, number, &kept);
+    unit.collected.shift(first_block);
+    added
+}
+
+/// What a job has of a unit, its records in the store; `None`: nothing.
+pub(super) fn recall(
+    job: &Job,
+    context: &Context<'_>,
+    number: u64,
+    pairs: &Range<usize>,
+    rt: &Runtime<'_>,
+) -> Result<Option<Unit>, ConvertError> {
+    let Some(kept) = job.unit::<Kept>(context.pass, number)? else { return Ok(None) };
+    if kept.pairs != *pairs {
+        return Err(ConvertError::Internal("the units of a job are not those of the run".into()));
+    }
+    let Kept { stats, mut collected, seen, blocks, misled, .. } = kept;
+    let first = context.store.adopt(&blocks)?;
+    rt.in_parallel(
+        blocks.len(),
+        || (),
+        |(), i| match context.store.is_whole(&blocks[i])? {
+            true => Ok(()),
+            false => Err(job.damaged_records(context.pass, blocks[i].offset)),
+        },
+        |()| (),
+    )?;
+    collected.shift(first);
+    context.note_misled(misled);
+    let mut room = Reservation::new(context.memory, Consumer::Cells);
+    room.resize(collected.bytes())?;
+    Ok(Some(Unit { stats, collected, room, seen }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sources::Source;
+
+    #[test]
+    fn units_follow_one_another_and_hold_every_pair() {
+        let scans = [(1000, 10), (0, 0), (50, 1), (10_000, 4)];
+        let sources = Sources::with_pairs(scans.map(|(points, pieces)| Source::of_pieces(points, pieces)).into());
+        assert_eq!(units(&sources, 400), [0..2, 2..4, 4..7, 7..8]);
+        assert_eq!(units(&sources, u64::MAX), [0..8]);
+        assert_eq!(units(&Sources::with_pairs(Vec::new()), 400), []);
+    }
+}

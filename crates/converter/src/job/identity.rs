@@ -1,0 +1,99 @@
+//! What must be the same for a run to go on where another one ended.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use pointmill_format::bytes;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{ConvertError, JobFault};
+use crate::plan::Plan;
+use crate::sources::Sources;
+
+/// Bytes of the head and of the tail of a file that are looked at.
+const ENDS: u64 = 64 << 10;
+
+/// Settings that change no byte.
+const RESOURCES: [&str; 2] = ["memory", "threads"];
+
+/// What a job was begun for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Identity {
+    version: String,
+    /// Everything that shapes the output, by name.
+    settings: Vec<(String, String)>,
+    inputs: Vec<Fingerprint>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Fingerprint {
+    path: PathBuf,
+    bytes: u64,
+    /// See [`crate::sources::Source::mark`].
+    mark: u64,
+    /// Checksums of the first and the last bytes.
+    ends: [u32; 2],
+}
+
+impl Identity {
+    /// Of a run. `settings`: those of the report, which shape the datasets.
+    pub(super) fn of(
+        plan: &Plan,
+        sources: &Sources,
+        settings: serde_json::Map<String, serde_json::Value>,
+    ) -> Result<Self, ConvertError> {
+        let mut all: Vec<(String, String)> =
+            settings.into_iter().map(|(name, value)| (name, value.to_string())).collect();
+        all.retain(|(name, _)| !RESOURCES.contains(&name.as_str()));
+        all.push(("reading of scans".into(), format!("{:?}", plan.open)));
+        all.push(("filter".into(), format!("{:?}", plan.filter)));
+        all.push(("attributes".into(), format!("{:?}", plan.attributes)));
+        all.push(("step".into(), format!("{:?}", plan.scale)));
+        all.push(("size of a unit".into(), plan.checkpoint_points.to_string()));
+        let inputs = sources.all.iter().map(|source| {
+            let path = source.path.to_path_buf();
+            let ends = ends(&path, source.file_bytes).map_err(|e| ConvertError::io(&path, "reading the scan", e))?;
+            Ok(Fingerprint { path, bytes: source.file_bytes, mark: source.mark(), ends })
+        });
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        Ok(Self { version, settings: all, inputs: inputs.collect::<Result<_, ConvertError>>()? })
+    }
+
+    /// What differs from `was`, if anything does.
+    pub(super) fn differs_from(&self, was: &Self) -> Option<JobFault> {
+        if self.version != was.version {
+            return Some(JobFault::Version { was: was.version.clone() });
+        }
+        let setting = |all: &Self, name: &str| all.settings.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone());
+        for (name, _) in was.settings.iter().chain(&self.settings) {
+            let (was, now) = (setting(was, name), setting(self, name));
+            if was != now {
+                let text = |value: Option<String>| value.unwrap_or_else(|| "not given".into());
+                return Some(JobFault::Setting { name: name.clone(), was: text(was), now: text(now) });
+            }
+        }
+        for (was, now) in was.inputs.iter().zip(&self.inputs) {
+            if was.path != now.path {
+                return Some(JobFault::OtherInputs { path: was.path.clone() });
+            }
+            if was != now {
+                return Some(JobFault::ChangedInput { path: now.path.clone() });
+            }
+        }
+        let more = was.inputs.get(self.inputs.len()).or_else(|| self.inputs.get(was.inputs.len()));
+        more.map(|input| JobFault::OtherInputs { path: input.path.clone() })
+    }
+}
+
+/// Checksums of the first and the last bytes of a file, of which it may have fewer.
+fn ends(path: &Path, length: u64) -> std::io::Result<[u32; 2]> {
+    if !path.is_file() {
+        return Ok([0; 2]); // the folder of a dataset: its mark tells
+    }
+    let file = File::open(path)?;
+    let mut buffer = vec![0; length.min(ENDS) as usize];
+    bytes::read_exact_at(&file, &mut buffer, 0)?;
+    let head = crc32c::crc32c(&buffer);
+    bytes::read_exact_at(&file, &mut buffer, length.saturating_sub(ENDS))?;
+    Ok([head, crc32c::crc32c(&buffer)])
+}

@@ -1,0 +1,250 @@
+//! A job: what a run leaves in a folder, so that another one can go on where it ended.
+//!
+//! The folder holds a journal, which says for what it was made and which units are done, and the records that these have read.
+//! Units are numbered within a pass over the scans. It is removed when the run has made its output.
+
+mod identity;
+mod journal;
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use identity::Identity;
+use journal::{Entry, Journal, sync_name};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{ConvertError, JobFault};
+use crate::plan::{Checkpoint, Plan};
+use crate::runtime::os_files::{FileLock, Locked};
+use crate::runtime::{Disk, DiskFile, TempFiles};
+use crate::sources::Sources;
+use crate::warning::Warning;
+
+const LOCK: &str = "lock";
+const JOURNAL: &str = "journal";
+const RECORDS: &str = "records-";
+
+/// What a run leaves for another one.
+#[derive(Debug)]
+pub(crate) struct Job {
+    folder: PathBuf,
+    /// Until the end of the run.
+    _lock: Option<FileLock>,
+    state: Mutex<State>,
+    /// Nothing was there to go on with.
+    is_new: bool,
+    recalled: AtomicU64,
+}
+
+#[derive(Debug)]
+struct State {
+    journal: Journal,
+    /// By pass and number.
+    units: HashMap<(u32, u64), Entry>,
+}
+
+/// A record of the journal, before what the unit itself left.
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct UnitHead {
+    pass: u32,
+    unit: u64,
+}
+
+/// The folder of the job of an output; `temp_dir`: where temporary files go, if not beside it.
+pub(crate) fn folder_of(output: &Path, temp_dir: Option<&Path>) -> PathBuf {
+    let name = output.file_name().unwrap_or_default().to_string_lossy();
+    match temp_dir {
+        None => output.with_file_name(format!("{name}.job")),
+        Some(dir) => dir.join(format!("{name}-{:08x}.job", crc32c::crc32c(output.as_os_str().as_encoded_bytes()))),
+    }
+}
+
+impl Job {
+    /// The job of a run, as the plan has it; `is_large`: its points are not expected to fit into memory. `output`: its place.
+    ///
+    /// # Errors
+    /// The run that is to go on is not this one, another run works with it, or the disk refuses.
+    pub(crate) fn of(
+        plan: &Plan,
+        is_large: bool,
+        sources: &Sources,
+        settings: serde_json::Map<String, serde_json::Value>,
+        output: &Path,
+        disk: &Arc<dyn Disk>,
+    ) -> Result<Option<Self>, ConvertError> {
+        let is_wanted = match plan.checkpoint {
+            Checkpoint::Always => true,
+            Checkpoint::Auto => is_large,
+            Checkpoint::Never => false,
+        };
+        if !is_wanted && !plan.resume {
+            return Ok(None);
+        }
+        let folder = folder_of(output, plan.temp_dir.as_deref());
+        let identity = Identity::of(plan, sources, settings)?;
+        let resumed = if plan.resume { Self::resume(folder.clone(), &identity, disk)? } else { None };
+        resumed.map_or_else(|| Self::begin(folder, &identity, disk), Ok).map(Some)
+    }
+
+    /// Begins a job, in the place of one that is there, if its run is over.
+    fn begin(folder: PathBuf, identity: &Identity, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+        if folder.exists() {
+            remove(&folder)?;
+        }
+        let make = || fs::create_dir(&folder);
+        make().map_err(|e| ConvertError::io(&folder, "making the job folder", e))?;
+        let lock = lock(&folder, FileLock::create)?;
+        let mut journal = Journal::create(&folder.join(JOURNAL), disk)?;
+        journal.append(&encode(identity)?)?;
+        sync_name(&folder)?;
+        let state = Mutex::new(State { journal, units: HashMap::new() });
+        Ok(Self { folder, _lock: lock, state, is_new: true, recalled: AtomicU64::new(0) })
+    }
+
+    /// Goes on with a job; `None`: there is none, or its run ended before it had one.
+    fn resume(folder: PathBuf, identity: &Identity, disk: &Arc<dyn Disk>) -> Result<Option<Self>, ConvertError> {
+        let path = folder.join(JOURNAL);
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let lock = lock(&folder, FileLock::open)?;
+        let Some((journal, entries)) = Journal::open(&path, disk)? else { return Ok(None) };
+        let damaged = |entry: Entry| JobFault::Damaged { file: path.clone(), byte: entry.offset };
+        let Some((first, others)) = entries.split_first() else { return Ok(None) };
+        let was: Identity = postcard::from_bytes(&journal.read(*first)?).map_err(|_| damaged(*first))?;
+        if let Some(fault) = identity.differs_from(&was) {
+            return Err(fault.into());
+        }
+        let mut units = HashMap::new();
+        for entry in others {
+            let payload = journal.read(*entry)?;
+            let (head, rest) = postcard::take_from_bytes::<UnitHead>(&payload).map_err(|_| damaged(*entry))?;
+            let skipped = (payload.len() - rest.len()) as u32;
+            let body = Entry { offset: entry.offset + u64::from(skipped), bytes: entry.bytes - skipped };
+            units.insert((head.pass, head.unit), body);
+        }
+        let state = Mutex::new(State { journal, units });
+        Ok(Some(Self { folder, _lock: lock, state, is_new: false, recalled: AtomicU64::new(0) }))
+    }
+
+    /// What a unit that is done has left.
+    pub(crate) fn unit<T: for<'d> Deserialize<'d>>(&self, pass: u32, unit: u64) -> Result<Option<T>, ConvertError> {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(entry) = state.units.get(&(pass, unit)) else { return Ok(None) };
+        let payload = state.journal.read(*entry)?;
+        let damaged = |_| JobFault::Damaged { file: self.folder.join(JOURNAL), byte: entry.offset }.into();
+        postcard::from_bytes(&payload).map(Some).map_err(damaged)
+    }
+
+    /// Notes that a unit is done, and waits until that is safe; what it has written elsewhere must be safe already.
+    pub(crate) fn add(&self, pass: u32, unit: u64, left: &impl Serialize) -> Result<(), ConvertError> {
+        let payload = encode(&(UnitHead { pass, unit }, left))?;
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let entry = state.journal.append(&payload)?;
+        state.units.insert((pass, unit), entry); // nobody asks for it again
+        Ok(())
+    }
+
+    /// The file for the records of a pass; those of passes before it are not needed any more.
+    pub(crate) fn records(&self, pass: u32, temp: &TempFiles) -> Result<DiskFile, ConvertError> {
+        for before in 1..pass {
+            match fs::remove_file(self.records_path(before)) {
+                Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(ConvertError::io(&self.folder, "removing records", e));
+                }
+                _ => {}
+            }
+        }
+        let file = temp.keep(&self.records_path(pass))?;
+        sync_name(&self.folder)?;
+        Ok(file)
+    }
+
+    fn records_path(&self, pass: u32) -> PathBuf {
+        self.folder.join(format!("{RECORDS}{pass}"))
+    }
+
+    /// The error for records that are not as they were written.
+    pub(crate) fn damaged_records(&self, pass: u32, byte: u64) -> ConvertError {
+        JobFault::Damaged { file: self.records_path(pass), byte }.into()
+    }
+
+    /// The folder.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Notes points that did not have to be read again.
+    pub(crate) fn count_recalled(&self, points: u64) {
+        self.recalled.fetch_add(points, Ordering::Relaxed);
+    }
+
+    /// Points that did not have to be read again.
+    pub(crate) fn recalled(&self) -> u64 {
+        self.recalled.load(Ordering::Relaxed)
+    }
+
+    /// True if nothing was there to go on with.
+    pub(crate) fn is_new(&self) -> bool {
+        self.is_new
+    }
+
+    /// True if another run could go on.
+    pub(crate) fn has_units(&self) -> bool {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        !state.units.is_empty()
+    }
+
+    /// Removes the folder; what there is to say if that cannot be done.
+    pub(crate) fn end(self) -> Option<Warning> {
+        let why = remove_files(&self.folder).err()?;
+        Some(Warning::Leftover { path: self.folder, why: why.to_string() })
+    }
+}
+
+fn encode(value: &impl Serialize) -> Result<Vec<u8>, ConvertError> {
+    postcard::to_stdvec(value).map_err(|e| ConvertError::Internal(format!("writing the journal: {e}")))
+}
+
+fn lock(folder: &Path, take: impl FnOnce(&Path) -> std::io::Result<Locked>) -> Result<Option<FileLock>, ConvertError> {
+    match take(&folder.join(LOCK)).map_err(|e| ConvertError::io(folder, "locking the job folder", e))? {
+        Locked::Ours(lock) => Ok(Some(lock)),
+        Locked::Taken => Err(JobFault::InUse { folder: folder.to_path_buf() }.into()),
+        Locked::Unknown => Ok(None),
+    }
+}
+
+/// Removes a job whose run is over, and nothing that is none.
+fn remove(folder: &Path) -> Result<(), ConvertError> {
+    let names = || fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
+    if !names().all(|name| is_ours(&name.to_string_lossy())) {
+        return Err(JobFault::NoJob { folder: folder.to_path_buf() }.into());
+    }
+    let held = match folder.join(LOCK).is_file() {
+        true => lock(folder, FileLock::open)?,
+        false => None,
+    };
+    remove_files(folder)?;
+    drop(held);
+    Ok(())
+}
+
+fn is_ours(name: &str) -> bool {
+    name == LOCK || name == JOURNAL || name.starts_with(RECORDS)
+}
+
+/// Removes our files, and the folder if nothing else is in it. The journal goes last but for the lock: without it nothing goes on.
+fn remove_files(folder: &Path) -> Result<(), ConvertError> {
+    let remove = || {
+        let mut names: Vec<String> =
+            fs::read_dir(folder)?.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        names.retain(|name| is_ours(name));
+        names.sort_by_key(|name| (name == LOCK, name == JOURNAL));
+        names.iter().try_for_each(|name| fs::remove_file(folder.join(name)))?;
+        fs::remove_dir(folder)
+    };
+    remove().map_err(|e| ConvertError::io(folder, "removing the job folder", e))
+}
