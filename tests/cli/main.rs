@@ -36,6 +36,7 @@ mod preview;
 mod reporting;
 mod required_precision;
 
+mod resuming;
 mod same_points;
 mod sameness;
 mod scans_within;
