@@ -28,6 +28,7 @@ export class App {
     this.loader = new Loader(
       () => this.touch(),
       (error) => messages.fail(error.message),
+      (error) => messages.withdraw?.(error.message),
     );
     this.pointBox = new PointBox(document.getElementById("point"));
     this.measure = new Measure(this, document.getElementById("overlay"));
@@ -145,7 +146,7 @@ export class App {
   /** The range of another attribute grows with what is loaded, unless the dataset says it. */
   #newExtras(shown) {
     const { colour } = this.renderer.settings;
-    if (ELSEWHERE.includes(colour) || this.isRangeKnown) return;
+    if ((ELSEWHERE.includes(colour) && colour !== "intensity") || this.isRangeKnown) return;
     let [low, high] = [Infinity, -Infinity];
     for (const cloud of shown) {
       for (const { block } of cloud.draws(this.camera)) {
@@ -197,13 +198,11 @@ export class App {
     const isKnown = needs ? names.has(needs) : ELSEWHERE.includes(wanted) || names.has(wanted);
     const name = isKnown ? wanted : this.#usualColour();
     this.renderer.settings.colour = name;
-    const attribute = ELSEWHERE.includes(name) ? undefined : name;
     const found = this.clouds.flatMap((cloud) => {
       const own = cloud.scene.attributes.find((each) => each.name === (name === "class" ? "classification" : name));
-      cloud.extraBase = own?.min?.[0] ?? 0;
-      // batches have neither intensities nor classes beside their colours
-      const isApart = cloud.scene.kind === "batches" && own && (name === "intensity" || name === "class");
-      cloud.setAttribute((attribute && own) || isApart ? own.name : undefined);
+      const needed = this.renderer.needed(cloud.scene);
+      cloud.extraBase = needed?.min?.[0] ?? 0;
+      cloud.setAttribute(needed?.name);
       return own?.min && own?.max ? [[own.min[0], own.max[0]]] : [];
     });
     this.isRangeKnown = found.length > 0 || name === "height";

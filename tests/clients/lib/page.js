@@ -6,6 +6,7 @@ import { readFileSync, truncateSync } from "node:fs";
 import { join } from "node:path";
 import { pointmill } from "./pointmill.js";
 import { serve } from "./server.js";
+import { checkSteady } from "./steady.js";
 import { start } from "./view.js";
 
 const KINDS = {
@@ -166,6 +167,7 @@ export async function checkPage(context, scan, out, report) {
   const { table, url, stop } = await behindTheProgram(context, path, out, report, (n) => (failures += n));
   failures += await alone(context, path, table, out, report);
   failures += await withoutRanges(context, path, report);
+  failures += await checkSteady(context, scan, path, out, report);
   failures += await broken(context, path, url, report);
   failures += report("the page: the program ends", await stop());
   return failures;

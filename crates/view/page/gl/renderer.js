@@ -94,8 +94,7 @@ export class Renderer {
     const mode = this.modeOf(scene);
     gl.uniform1i(at.uColour, MODES[mode] ?? 1);
     if (mode in VALUES) {
-      // batches have intensities apart, as any other attribute
-      gl.uniform1i(at.uValue, scene.kind === "batches" && mode === "intensity" ? VALUES.attribute : VALUES[mode]);
+      gl.uniform1i(at.uValue, this.needed(scene) ? VALUES.attribute : VALUES[mode]);
       const [low, high] = this.#range(mode, cloud);
       gl.uniform2f(at.uRange, low, 1 / Math.max(high - low, 1e-30));
     }
@@ -127,6 +126,16 @@ export class Renderer {
     return has(colour) ? "attribute" : "height";
   }
 
+  /** The attribute whose values the colouring needs beside what all points have, if any. */
+  needed(scene) {
+    const mode = this.modeOf(scene);
+    const name = { intensity: "intensity", class: "classification", attribute: this.settings.colour }[mode];
+    const own = scene.attributes.find((each) => each.name === name);
+    // batches have neither intensities nor classes beside their colours; 16 bits of an intensity are its value only if it is such
+    const isBeside = scene.kind !== "batches" && (mode === "class" || (mode === "intensity" && own?.type === "uint16" && own.max));
+    return isBeside ? undefined : own;
+  }
+
   /** The range that was chosen, or, of a dataset that shows something else, its own. */
   #range(mode, cloud) {
     const { colour } = this.settings;
@@ -137,7 +146,7 @@ export class Renderer {
       [low, high] = mode === "height" ? [min[2], max[2]] : [own?.min?.[0] ?? 0, own?.max?.[0] ?? 65535];
     }
     if (mode === "height") return [low - this.heightBase, high - this.heightBase];
-    if (mode === "intensity" && cloud.scene.kind !== "batches") return [low, high];
+    if (!this.needed(cloud.scene)) return [low, high];
     return [low - cloud.extraBase, high - cloud.extraBase];
   }
 
