@@ -12,7 +12,9 @@ fn files_of_the_debian_package_are_there_or_made() {
     let script = std::fs::read_to_string(Path::new(ROOT).join("packaging/files.sh")).unwrap();
     let files: Vec<&str> = manifest
         .lines()
-        .filter(|line| line.contains("\", \"usr/") || line.starts_with("changelog =") || line.starts_with("license-file"))
+        .filter(|line| {
+            line.contains("\", \"usr/") || line.starts_with("changelog =") || line.starts_with("license-file")
+        })
         .filter_map(|line| line.split('"').nth(1))
         .collect();
     assert!(files.len() > 8, "{files:?}");
