@@ -47,5 +47,6 @@ mod support;
 mod text_inputs;
 mod units;
 mod validating;
+mod verifying;
 mod view;
 mod viewers;
