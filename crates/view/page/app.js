@@ -6,8 +6,8 @@ import { openCloud } from "pm/clouds/open.js";
 import { Controls, onPlane } from "pm/controls.js";
 import { open as openContext } from "pm/gl/context.js";
 import { GRADIENTS } from "pm/gl/palettes.js";
-import { ELSEWHERE, Renderer } from "pm/gl/renderer.js";
-import { distance, union } from "pm/math.js";
+import { ELSEWHERE, Renderer, isApart } from "pm/gl/renderer.js";
+import { distance, dot, sub, union } from "pm/math.js";
 import * as link from "pm/ui/link.js";
 import { Measure } from "pm/ui/measure.js";
 import { Panel } from "pm/ui/panel.js";
@@ -28,7 +28,7 @@ export class App {
     this.loader = new Loader(
       () => this.touch(),
       (error) => messages.fail(error.message),
-      (error) => messages.withdraw?.(error.message),
+      (error) => messages.remove(error.message),
     );
     this.pointBox = new PointBox(document.getElementById("point"));
     this.measure = new Measure(this, document.getElementById("overlay"));
@@ -60,6 +60,10 @@ export class App {
     this.#restore();
     this.panel = new Panel(document.getElementById("panel"), this);
     this.setColour(this.renderer.settings.colour);
+    window.addEventListener("hashchange", () => {
+      this.#restore();
+      this.setColour(this.renderer.settings.colour);
+    });
     requestAnimationFrame((time) => this.#loop(time));
   }
 
@@ -70,7 +74,7 @@ export class App {
       click: (x, y) => this.#click(x, y),
       hover: (x, y) => this.#hover(x, y),
       goTo: (x, y) => this.#goTo(x, y),
-      under: (x, y) => this.#under(x, y),
+      under: (x, y, isFirst) => this.#under(x, y, isFirst),
       least: () => Math.max(distance(this.box.min, this.box.max) * 1e-9, 1e-6),
       most: () => Math.max(distance(this.box.min, this.box.max) * 1e3, 1),
       pace: () => Math.max(distance(this.box.min, this.box.max) / 10, 1e-3),
@@ -118,11 +122,15 @@ export class App {
   #loop(time) {
     if (this.controls.fly(Math.min((time - (this.time ?? time)) / 1000, 0.2))) this.touch();
     this.time = time;
-    if (this.isDirty) {
-      this.isDirty = false;
-      this.frame();
-    }
     requestAnimationFrame((next) => this.#loop(next));
+    if (!this.isDirty) return;
+    this.isDirty = false;
+    try {
+      this.frame();
+    } catch (error) {
+      this.messages.fail(`The picture failed: ${error.message}`);
+      throw error; // for the console
+    }
   }
 
   /** One picture. */
@@ -145,8 +153,7 @@ export class App {
 
   /** The range of another attribute grows with what is loaded, unless the dataset says it. */
   #newExtras(shown) {
-    const { colour } = this.renderer.settings;
-    if ((ELSEWHERE.includes(colour) && colour !== "intensity") || this.isRangeKnown) return;
+    if (this.isRangeKnown) return;
     let [low, high] = [Infinity, -Infinity];
     for (const cloud of shown) {
       for (const { block } of cloud.draws(this.camera)) {
@@ -190,6 +197,7 @@ export class App {
     this.camera.fov = degrees;
     this.camera.update();
     this.touch();
+    this.#rest();
   }
 
   setColour(wanted) {
@@ -198,20 +206,28 @@ export class App {
     const isKnown = needs ? names.has(needs) : ELSEWHERE.includes(wanted) || names.has(wanted);
     const name = isKnown ? wanted : this.#usualColour();
     this.renderer.settings.colour = name;
+    const chosen = ELSEWHERE.includes(name) ? name : "attribute";
     const found = this.clouds.flatMap((cloud) => {
-      const own = cloud.scene.attributes.find((each) => each.name === (name === "class" ? "classification" : name));
-      const needed = this.renderer.needed(cloud.scene);
-      cloud.extraBase = needed?.min?.[0] ?? 0;
-      cloud.setAttribute(needed?.name);
-      return own?.min && own?.max ? [[own.min[0], own.max[0]]] : [];
+      const mode = this.renderer.modeOf(cloud.scene);
+      const shown = { attribute: name, class: "classification", intensity: "intensity" }[mode];
+      const own = cloud.scene.attributes.find((each) => each.name === shown);
+      cloud.extraBase = own?.min?.[0] ?? 0;
+      cloud.setAttribute(own && isApart(cloud.scene, mode) ? own.name : undefined);
+      return mode === chosen && own?.min && own?.max ? [[own.min[0], own.max[0]]] : [];
     });
-    this.isRangeKnown = found.length > 0 || name === "height";
+    this.isRangeKnown = found.length > 0 || !["intensity", "attribute"].includes(chosen);
     if (name === "height") this.#setRange([this.box.min[2], this.box.max[2]]);
     else if (found.length > 0) this.#setRange([Math.min(...found.map((r) => r[0])), Math.max(...found.map((r) => r[1]))]);
     this.panel.colour.set(name);
     this.panel.ramp.hidden = ["rgb", "class", "level", "one"].includes(name);
     this.touch();
     this.#rest();
+  }
+
+  /** What a person says holds, whatever is loaded later. */
+  typeRange(range) {
+    this.isRangeKnown = true;
+    this.change({ range });
   }
 
   #setRange(range) {
@@ -310,15 +326,17 @@ export class App {
 
   async #click(x, y) {
     if (!this.measure.isOn) return;
+    const place = this.measure.begin();
     try {
-      const found = await this.pointAt(x, y);
-      if (found) this.measure.add(found.point.position);
+      place((await this.pointAt(x, y))?.point.position);
     } catch (error) {
+      place(undefined);
       this.messages.fail(error.message);
     }
   }
 
   async #goTo(x, y) {
+    if (this.measure.isOn) return;
     const found = await this.pointAt(x, y).catch(() => null);
     if (!found) return;
     const { camera } = this;
@@ -330,8 +348,23 @@ export class App {
     this.#rest();
   }
 
-  /** The place that the wheel comes nearer to: on the plane through the target, under the cursor. */
-  #under(x, y) {
+  /**
+   * The place that the wheel comes nearer to: on the plane through the target, under the cursor. With a gesture that begins the
+   * target comes to the depth of the point that is there, as soon as it is known.
+   */
+  #under(x, y, isFirst) {
+    const turn = (this.wheelTurn = (this.wheelTurn ?? 0) + (isFirst ? 1 : 0));
+    if (isFirst) {
+      const looked = this.camera.back;
+      const place = async () => {
+        const found = await this.pointAt(x, y).catch(() => null);
+        const { camera } = this;
+        if (!found || turn !== this.wheelTurn || dot(camera.back, looked) < 1 - 1e-9) return;
+        const depth = dot(sub(camera.eye, found.point.position), camera.back);
+        if (depth > 0) camera.target = camera.eye.map((v, a) => v - camera.back[a] * depth);
+      };
+      place();
+    }
     return onPlane(this.camera, this.camera.ray(x, y), this.camera.target);
   }
 
@@ -370,7 +403,8 @@ export class App {
 
   /** For tests: what is on the screen, and what it took. */
   stats() {
-    const entries = performance.getEntriesByType("resource");
+    // until there was a picture
+    const entries = performance.getEntriesByType("resource").filter((entry) => entry.responseEnd <= (this.firstPicture ?? Infinity));
     return {
       points: this.clouds.reduce((sum, cloud) => sum + cloud.shown, 0),
       firstPicture: this.firstPicture,

@@ -5,6 +5,9 @@ import { add, clamp, distance, dot, scale, sub, unit } from "pm/math.js";
 
 /** Angle, radians, below which the eye does not come to the vertical. */
 const UPRIGHT = 0.01;
+/** Notches of the wheel that are this near in time and place are one gesture. */
+const GESTURE_MS = 300;
+const GESTURE_PIXELS = 8;
 
 export class Controls {
   constructor(canvas, camera, actions) {
@@ -97,7 +100,7 @@ export class Controls {
   zoom(factor, place = this.camera.target) {
     const { camera } = this;
     const reach = distance(camera.eye, camera.target) * factor;
-    if (!(reach > this.actions.least() && reach < this.actions.most())) return;
+    if (factor < 1 ? !(reach > this.actions.least()) : !(reach < this.actions.most())) return;
     camera.eye = add(place, scale(sub(camera.eye, place), factor));
     camera.target = sub(camera.eye, scale(camera.back, reach));
     camera.update();
@@ -107,20 +110,26 @@ export class Controls {
     event.preventDefault();
     const notches = clamp(event.deltaY / (event.deltaMode === 1 ? 3 : 100), -3, 3);
     if (this.isFlying) this.speed *= 1.2 ** -notches;
-    else this.zoom(1.15 ** notches, this.actions.under(...this.#pixel(event)));
+    else {
+      const pixel = this.#pixel(event);
+      const { at, time } = this.wheeled ?? { at: [-1e9, 0], time: 0 };
+      const isFirst = event.timeStamp - time > GESTURE_MS || Math.hypot(pixel[0] - at[0], pixel[1] - at[1]) > GESTURE_PIXELS;
+      this.wheeled = { at: pixel, time: event.timeStamp };
+      this.zoom(1.15 ** notches, this.actions.under(...pixel, isFirst));
+    }
     this.actions.change();
     this.actions.rest();
   }
 
   #key(event, isDown) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const key = event.key.toLowerCase();
+    if (!isDown && this.keys.delete(key)) this.actions.rest(); // whatever else is held by now
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (this.isFlying && "wasdqe".includes(key) && key.length === 1) {
       if (isDown) this.keys.add(key);
-      else this.keys.delete(key);
       this.actions.change();
       event.preventDefault();
-    } else if (isDown) this.actions.key(key);
+    } else if (isDown && !event.repeat) this.actions.key(key);
   }
 
   /** Moves on while keys of flying are held; true if the picture changed. */

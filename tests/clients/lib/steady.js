@@ -145,7 +145,7 @@ async function recolour(page) {
   const before = await page.evaluate(state);
   const least = await page.evaluate(async () => {
     const app = window.pointmill;
-    const name = app.clouds[0].scene.attributes.find((each) => !["rgb", "rgba", "intensity", "classification"].includes(each.name)).name;
+    const name = app.clouds[0].scene.attributes.findLast((each) => !["rgb", "rgba", "intensity"].includes(each.name)).name;
     let least = Infinity;
     app.setColour(app.panel.colour.querySelector(`option[value$="${name}"]`)?.value ?? name);
     do {

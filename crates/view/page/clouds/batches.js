@@ -3,8 +3,8 @@
 
 import { Heap, distances, sub } from "pm/math.js";
 import { batchBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
-import { drop, isCurrent, put, renew, told } from "pm/clouds/units.js";
+import { named, together } from "pm/clouds/loader.js";
+import { drop, isCurrent, put, renew } from "pm/clouds/units.js";
 
 const REQUEST_POINTS = 150_000;
 const FIRST_REQUEST_POINTS = 100_000;
@@ -100,7 +100,7 @@ export class BatchesCloud {
       wanted.splice(0, wanted.length, ...rest);
       const attribute = this.attribute;
       const lods = this.hasParts ? [lod, lod] : [0, 255];
-      const request = async (parts) => {
+      const request = async () => {
         const all = await this.source.batches(parts.map((part) => part.slot.unit), { planes: goal, lods, attribute });
         all.forEach((points, i) => {
           put(parts[i], batchBlock(this.gl, points), attribute, this.attribute);
@@ -108,7 +108,7 @@ export class BatchesCloud {
           if (attribute === "classification" && attribute === this.attribute) this.#meet(points.extra);
         });
       };
-      loader.run(parts, (parts) => this.#pending(() => request(parts)));
+      loader.run(parts, () => this.#pending(request));
     }
   }
 
@@ -117,7 +117,7 @@ export class BatchesCloud {
     try {
       await work();
     } catch (error) {
-      throw told(this.scene, error);
+      throw named(this.scene, error);
     } finally {
       this.pending--;
     }

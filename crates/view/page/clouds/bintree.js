@@ -3,8 +3,8 @@
 
 import { Heap, distances } from "pm/math.js";
 import { pointBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
-import { drop, isCurrent, put, renew, told } from "pm/clouds/units.js";
+import { named, together } from "pm/clouds/loader.js";
+import { drop, isCurrent, put, renew } from "pm/clouds/units.js";
 
 /** Every how manyth point: what comes first, what it is refined to. Of large trees even fewer come first. */
 const STEPS = [16, 4, 1];
@@ -94,15 +94,15 @@ export class BintreeCloud {
       const units = together(alike, this.shown === 0 ? FIRST_REQUEST_POINTS : REQUEST_POINTS, this.source.mostUnits);
       for (const leaf of units) wanted.splice(wanted.indexOf(leaf), 1);
       const attribute = this.attribute;
-      const request = async (leaves) => {
-        const all = await this.source.points(leaves.map((leaf) => leaf.unit), { attribute, every: this.steps[to] });
+      const request = async () => {
+        const all = await this.source.points(units.map((leaf) => leaf.unit), { attribute, every: this.steps[to] });
         all.forEach((points, i) => {
-          put(leaves[i], pointBlock(this.gl, points), attribute, this.attribute);
-          leaves[i].block.classes.forEach((number) => this.classes.add(number));
-          leaves[i].at = to;
+          put(units[i], pointBlock(this.gl, points), attribute, this.attribute);
+          units[i].block.classes.forEach((number) => this.classes.add(number));
+          units[i].at = to;
         });
       };
-      loader.run(units, (leaves) => this.#pending(() => request(leaves)));
+      loader.run(units, () => this.#pending(request));
     }
   }
 
@@ -111,7 +111,7 @@ export class BintreeCloud {
     try {
       await work();
     } catch (error) {
-      throw told(this.scene, error);
+      throw named(this.scene, error);
     } finally {
       this.pending--;
     }

@@ -2,92 +2,83 @@
 
 /** At the same time. */
 const MOST_REQUESTS = 3;
-/** Seconds until the next attempt after the connection failed: doubled each time. */
-const FIRST_PAUSE = 1;
-const LONGEST_PAUSE = 30;
+/** Milliseconds until a connection that is gone is tried again: the first and the longest pause. */
+const PAUSES = [1000, 30_000];
+
+/** An error of a dataset. */
+export function named(scene, error) {
+  return Object.assign(new Error(`${scene.name}: ${error.message}`), { isTransient: error.isTransient });
+}
 
 export class Loader {
-  /** `onError(error)`, of a failed connection once; `onBack(error)` when it works again. */
+  /** `onBack` gets the error that `onError` got, once there is an answer again. */
   constructor(onChange, onError, onBack) {
-    Object.assign(this, { onChange, onError, onBack, running: 0, requests: 0, pause: FIRST_PAUSE });
-    // a browser that finds its network again need not wait
-    globalThis.addEventListener?.("online", () => this.#resume());
+    Object.assign(this, { onChange, onError, onBack, running: 0, requests: 0, isPaused: false, pause: 0 });
   }
 
   get isFull() {
-    return this.running >= MOST_REQUESTS || this.timer !== undefined;
+    return this.isPaused || this.running >= MOST_REQUESTS;
   }
 
   /**
-   * Runs `request(units)` if there is room. Its units are "loading" until it ends, then "ready". Those of which the connection
-   * failed are "new" again; those that cannot be read are "failed" and are not requested again: if there are several units, it is
-   * found out which.
+   * Runs a request if there is room. Its units are "loading" until it ends. Of one that fails fewer are requested at once, until the
+   * one is found that is "failed", and is not requested again; if there is no answer at all, they are requested again after a
+   * pause.
    */
   run(units, request) {
     if (this.isFull) return false;
     this.running++;
+    this.requests++;
     for (const unit of units) unit.state = "loading";
-    this.#attempt(units, request).then((failures) => {
-      if (failures.length > 1) failures[0].message += ` (and ${failures.length - 1} more)`;
-      if (failures.length > 0) this.onError(failures[0]);
-      this.running--;
-      this.onChange();
-    });
+    request()
+      .then(
+        () => {
+          units.forEach((unit) => unit.state === "loading" && (unit.state = "ready"));
+          this.#back();
+        },
+        (error) => {
+          const isFinal = !error.isTransient && units.length === 1;
+          for (const unit of units) unit.state = isFinal ? "failed" : "new";
+          if (error.isTransient) this.#wait(error);
+          else if (isFinal) this.onError(error);
+          else for (const unit of units) unit.most = Math.ceil(units.length / 2);
+        },
+      )
+      .finally(() => {
+        this.running--;
+        this.onChange();
+      });
     return true;
   }
 
-  /** Errors of units that cannot be read, after halves of the units were tried alone. */
-  async #attempt(units, request) {
-    this.requests++;
-    try {
-      await request(units);
-      this.#works();
-      for (const unit of units) if (unit.state === "loading") unit.state = "ready";
-      return [];
-    } catch (error) {
-      if (error.isTransient) {
-        for (const unit of units) unit.state = "new";
-        this.#interrupted(error);
-        return [];
-      }
-      if (units.length === 1) {
-        units[0].state = "failed";
-        return [error];
-      }
-    }
-    const half = units.length >> 1;
-    const first = await this.#attempt(units.slice(0, half), request);
-    return first.concat(await this.#attempt(units.slice(half), request));
+  #wait(error) {
+    if (this.isPaused) return;
+    this.gone ??= error;
+    this.onError(this.gone);
+    this.pause = Math.min(Math.max(2 * this.pause, PAUSES[0]), PAUSES[1]);
+    this.isPaused = true;
+    setTimeout(() => {
+      this.isPaused = false;
+      this.onChange();
+    }, this.pause);
   }
 
-  #interrupted(error) {
-    if (this.timer !== undefined) return; // others that were under way
-    if (!this.interrupted) this.onError(error);
-    this.interrupted ??= error;
-    this.timer = setTimeout(() => this.#resume(), 1000 * this.pause);
-    this.pause = Math.min(2 * this.pause, LONGEST_PAUSE);
-  }
-
-  #resume() {
-    clearTimeout(this.timer);
-    this.timer = undefined;
-    this.onChange();
-  }
-
-  #works() {
-    if (!this.interrupted) return;
-    this.onBack(this.interrupted);
-    Object.assign(this, { interrupted: undefined, pause: FIRST_PAUSE });
-    this.#resume();
+  #back() {
+    this.pause = 0;
+    if (!this.gone) return;
+    this.onBack(this.gone);
+    this.gone = undefined;
   }
 }
 
-/** The first units, as many as have `most` points together, and one at least. */
+/** The first units, as many as have `most` points together, and one at least. `most` of a unit: how many may be with it. */
 export function together(units, most, mostUnits) {
   const taken = [];
   let points = 0;
+  let room = mostUnits;
   for (const unit of units) {
-    if (taken.length >= mostUnits || (taken.length > 0 && points + unit.size > most)) break;
+    room = Math.min(room, unit.most ?? mostUnits);
+    if (taken.length >= room || (taken.length > 0 && points + unit.size > most)) break;
     taken.push(unit);
     points += unit.size;
   }

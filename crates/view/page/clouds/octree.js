@@ -2,8 +2,8 @@
 
 import { Heap, scale, sub } from "pm/math.js";
 import { pointBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
-import { drop, put, renew, told } from "pm/clouds/units.js";
+import { named, together } from "pm/clouds/loader.js";
+import { drop, put, renew } from "pm/clouds/units.js";
 
 /** Nodes of smaller radius, in pixels, are not drawn. */
 const LEAST_PIXELS = 40;
@@ -101,14 +101,14 @@ export class OctreeCloud {
       const units = together(this.wanted, most, this.source.mostUnits);
       this.wanted.splice(0, units.length);
       const attribute = this.attribute;
-      const request = async (nodes) => {
-        const all = await this.source.points(nodes.map((node) => node.name), { attribute });
+      const request = async () => {
+        const all = await this.source.points(units.map((node) => node.name), { attribute });
         all.forEach((points, i) => {
-          put(nodes[i], pointBlock(this.gl, points), attribute, this.attribute);
-          nodes[i].block.classes.forEach((number) => this.classes.add(number));
+          put(units[i], pointBlock(this.gl, points), attribute, this.attribute);
+          units[i].block.classes.forEach((number) => this.classes.add(number));
         });
       };
-      loader.run(units, (nodes) => this.#pending(() => request(nodes)));
+      loader.run(units, () => this.#pending(request));
     }
   }
 
@@ -117,7 +117,7 @@ export class OctreeCloud {
     try {
       await work();
     } catch (error) {
-      throw told(this.scene, error);
+      throw named(this.scene, error);
     } finally {
       this.pending--;
     }

@@ -1,12 +1,5 @@
 // What all kinds of clouds do with the units that they load.
 
-/** An error with the name of its dataset. */
-export function told({ name }, error) {
-  const made = new Error(`${name}: ${error.message}`, { cause: error });
-  made.isTransient = error.isTransient;
-  return made;
-}
-
 /** The points of a unit have the values that the colouring needs. */
 export const isCurrent = ({ block }, attribute) => attribute === undefined || block?.attribute === attribute;
 

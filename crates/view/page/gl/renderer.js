@@ -13,6 +13,14 @@ const PICK = 9;
 const VALUES = { intensity: 0, height: 1, attribute: 2 };
 /** Colourings that are no other attribute. */
 export const ELSEWHERE = ["rgb", "class", "intensity", "height", "level", "one"];
+/** True if what a colouring shows comes as another attribute, beside the points' colours and intensities of 16 bits. */
+export function isApart(scene, mode) {
+  if (mode === "class") return scene.kind === "batches";
+  if (mode !== "intensity") return mode === "attribute";
+  const own = scene.attributes.find(({ name }) => name === "intensity");
+  // without a range that is known, it grows with the values
+  return scene.kind === "batches" || own?.type !== "uint16" || !own.max;
+}
 const MODES = { rgb: 0, class: 2, level: 3, one: 4 };
 
 export class Renderer {
@@ -94,7 +102,7 @@ export class Renderer {
     const mode = this.modeOf(scene);
     gl.uniform1i(at.uColour, MODES[mode] ?? 1);
     if (mode in VALUES) {
-      gl.uniform1i(at.uValue, this.needed(scene) ? VALUES.attribute : VALUES[mode]);
+      gl.uniform1i(at.uValue, isApart(scene, mode) ? VALUES.attribute : VALUES[mode]);
       const [low, high] = this.#range(mode, cloud);
       gl.uniform2f(at.uRange, low, 1 / Math.max(high - low, 1e-30));
     }
@@ -126,16 +134,6 @@ export class Renderer {
     return has(colour) ? "attribute" : "height";
   }
 
-  /** The attribute whose values the colouring needs beside what all points have, if any. */
-  needed(scene) {
-    const mode = this.modeOf(scene);
-    const name = { intensity: "intensity", class: "classification", attribute: this.settings.colour }[mode];
-    const own = scene.attributes.find((each) => each.name === name);
-    // batches have neither intensities nor classes beside their colours; 16 bits of an intensity are its value only if it is such
-    const isBeside = scene.kind !== "batches" && (mode === "class" || (mode === "intensity" && own?.type === "uint16" && own.max));
-    return isBeside ? undefined : own;
-  }
-
   /** The range that was chosen, or, of a dataset that shows something else, its own. */
   #range(mode, cloud) {
     const { colour } = this.settings;
@@ -146,7 +144,7 @@ export class Renderer {
       [low, high] = mode === "height" ? [min[2], max[2]] : [own?.min?.[0] ?? 0, own?.max?.[0] ?? 65535];
     }
     if (mode === "height") return [low - this.heightBase, high - this.heightBase];
-    if (!this.needed(cloud.scene)) return [low, high];
+    if (!isApart(cloud.scene, mode)) return [low, high];
     return [low - cloud.extraBase, high - cloud.extraBase];
   }
 

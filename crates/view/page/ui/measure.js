@@ -8,7 +8,7 @@ export const metres = (x) => (x === 0 ? "0" : Math.abs(x) >= 1e7 || Math.abs(x) 
 
 export class Measure {
   constructor(app, overlay) {
-    Object.assign(this, { app, overlay, points: [], isOn: false });
+    Object.assign(this, { app, overlay, clicks: [], isOn: false });
   }
 
   toggle() {
@@ -17,24 +17,36 @@ export class Measure {
   }
 
   clear() {
-    this.points = [];
+    this.clicks = [];
     this.draw();
   }
 
-  add(place) {
-    this.points.push(place);
-    this.draw();
+  /** A click; the function takes the place once it is known, or nothing. Points keep the order of the clicks. */
+  begin() {
+    const click = {};
+    this.clicks.push(click);
+    return (place) => {
+      if (place) click.place = place;
+      else this.clicks = this.clicks.filter((each) => each !== click);
+      this.draw();
+    };
+  }
+
+  get points() {
+    return this.clicks.map(({ place }) => place).filter(Boolean);
   }
 
   /** Lengths of the parts and of all together, world units. */
   get lengths() {
-    return this.points.slice(1).map((place, i) => distance(place, this.points[i]));
+    const { points } = this;
+    return points.slice(1).map((place, i) => distance(place, points[i]));
   }
 
   draw() {
     const { camera } = this.app;
+    const { points, lengths } = this;
     const ratio = this.app.ratio;
-    const at = this.points.map((place) => camera.project(place)?.map((v) => v / ratio));
+    const at = points.map((place) => camera.project(place)?.map((v) => v / ratio));
     const nodes = [];
     const add = (name, fields, text) => {
       const made = document.createElementNS(SVG, name);
@@ -42,12 +54,11 @@ export class Measure {
       if (text) made.textContent = text;
       nodes.push(made);
     };
-    const lengths = this.lengths;
     lengths.forEach((length, i) => {
       const [a, b] = [at[i], at[i + 1]];
       if (!a || !b) return;
       add("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] });
-      const rise = this.points[i + 1][2] - this.points[i][2];
+      const rise = points[i + 1][2] - points[i][2];
       add("text", { x: (a[0] + b[0]) / 2 + 6, y: (a[1] + b[1]) / 2 }, `${metres(length)} (Δz ${metres(rise)})`);
     });
     for (const place of at) if (place) add("circle", { cx: place[0], cy: place[1], r: 4 });

@@ -5,7 +5,8 @@ const MOST = 5;
 export class Messages {
   constructor(parent) {
     this.parent = parent;
-    this.shown = new Set();
+    /** Lines by their text, the oldest first. */
+    this.shown = new Map();
   }
 
   fail(text) {
@@ -16,19 +17,25 @@ export class Messages {
     this.#show(text, "note");
   }
 
+  remove(text) {
+    this.shown.get(text)?.remove();
+    this.shown.delete(text);
+  }
+
   #show(text, kind) {
-    if (this.shown.has(text) || this.shown.size >= MOST) return;
-    this.shown.add(text);
+    if (this.shown.has(text)) return;
+    // errors make notes give way; what was told first is the cause
+    const [note] = [...this.shown].find(([, line]) => line.className === "note") ?? [];
+    if (this.shown.size >= MOST && note !== undefined) this.remove(note);
+    if (this.shown.size >= MOST) return;
     const line = document.createElement("p");
     line.className = kind;
     line.textContent = text;
     const close = document.createElement("button");
     close.textContent = "×";
     close.title = "Close";
-    close.onclick = () => {
-      line.remove();
-      this.shown.delete(text);
-    };
+    close.onclick = () => this.remove(text);
+    this.shown.set(text, line);
     line.append(close);
     this.parent.append(line);
   }

@@ -2,6 +2,7 @@
 
 import { VIEWS } from "pm/camera.js";
 import { GRADIENTS, classColour, classTitle, css } from "pm/gl/palettes.js";
+import { clamp } from "pm/math.js";
 import { button, check, choice, element, range, section, slider } from "pm/ui/elements.js";
 
 const millions = (n) => `${(n / 1e6).toFixed(1)} M`;
@@ -64,7 +65,7 @@ export class Panel {
     const known = ["rgb", "rgba", "intensity", "classification", "position", "x", "y", "z"];
     options.push(...[...names].filter((name) => !known.includes(name)));
     this.colour = choice("Colour", options, settings.colour, (value) => app.setColour(value));
-    this.range = range("Range", settings.range, (value) => app.change({ range: value }));
+    this.range = range("Range", settings.range, (value) => app.typeRange(value));
     this.gradient = element("div", { className: "gradient" });
     this.gradient.style.background = css(settings.gradient);
     const palette = choice("Gradient", GRADIENTS, settings.gradient, (value) => {
@@ -100,7 +101,8 @@ export class Panel {
     const parts = ["x", "y", "z"].flatMap((name, a) =>
       ["min", "max"].map((end) => {
         const extent = box.max[a] - box.min[a] || 1;
-        const show = (v) => (box.min[a] + v * extent).toPrecision(4);
+        const decimals = clamp(3 - Math.floor(Math.log10(extent)), 0, 9);
+        const show = (v) => (box.min[a] + v * extent).toFixed(decimals);
         return slider(`${name} ${end}`, { min: 0, max: 1, step: 0.002, value: end === "max" ? 1 : 0, show }, (v) =>
           app.setClip(end, a, box.min[a] + v * extent),
         );

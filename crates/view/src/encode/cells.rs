@@ -2,7 +2,7 @@
 
 use pointmill_format::{Lattice, NodePoints, Positions};
 
-/// The largest integer of 16 bits, and of a word of 32 bits: a shader subtracts the eye from it, as numbers with a sign.
+/// The largest integer of 16 bits, and of the 31 that differences of signed integers in a shader leave.
 const NARROW: u32 = u16::MAX as u32;
 const WIDE: u32 = i32::MAX as u32;
 
@@ -40,11 +40,11 @@ impl Cells {
         let greatest = axes.each_ref().map(|axis| axis.iter().step_by(every).copied().max().unwrap_or(0));
         let extent: [u32; 3] = std::array::from_fn(|a| greatest[a].abs_diff(least[a]));
         let origin = lattice.world(least.map(i64::from));
-        let is_small = extent.iter().all(|e| *e <= NARROW);
-        let most = if may_round { NARROW } else { WIDE };
-        if extent.iter().all(|e| *e <= most) {
-            return Self { is_wide: !is_small, origin, step: lattice.scale, rule: Rule::Exact { least } };
+        let fits = |most: u32| extent.iter().all(|e| *e <= most);
+        if fits(NARROW) || (!may_round && fits(WIDE)) {
+            return Self { is_wide: !fits(NARROW), origin, step: lattice.scale, rule: Rule::Exact { least } };
         }
+        let most = if may_round { NARROW } else { WIDE };
         let cells = f64::from(most);
         let step = std::array::from_fn(|a| f64::from(extent[a]) * lattice.scale[a] / cells);
         let factor = extent.map(|e| if e == 0 { 0.0 } else { cells / f64::from(e) });
@@ -108,6 +108,10 @@ mod tests {
         assert_eq!((wide.is_wide, wide.step, wide.origin), (true, LATTICE.scale, LATTICE.world([i32::MIN.into(); 3])));
         let rounded = of(131_070, true);
         assert_eq!((rounded.is_wide, rounded.step), (false, [0.02; 3]));
+        let all = Cells::of_lattice(&[vec![i32::MIN, i32::MAX], vec![0, 0], vec![0, 0]], &LATTICE, 1, false);
+        assert!(all.is_wide);
+        let ends = Positions::Quantized([vec![i32::MIN, i32::MAX], vec![0, 0], vec![0, 0]]);
+        assert_eq!([all.of(&ends, 0), all.of(&ends, 1)], [[0; 3], [WIDE, 0, 0]], "no integer has 32 bits");
     }
 
     /// Half a step of the box, which is more than one of the lattice.
@@ -167,5 +171,6 @@ mod tests {
         assert_eq!(cells.origin, [0.0, 7.0, -1e308]);
         assert_eq!((cells.step[0], cells.step[1]), (0.0, 0.0));
         assert!(cells.step.iter().all(|s| s.is_finite()));
+        assert_eq!(cells.of(&Positions::World(axes), 1)[2], i32::MAX as u32, "what a shader takes for positive");
     }
 }
