@@ -119,7 +119,10 @@ mod tests {
     fn integers_are_below_2_to_the_31() {
         let axes = [vec![i32::MIN, i32::MAX, 1], vec![i32::MIN + 1, 0, -7], vec![0, 0, 9]];
         let lattice = Cells::of_lattice(&axes, &LATTICE, 1, false);
-        assert_eq!((lattice.is_wide, lattice.rule == Rule::Exact { least: [i32::MIN, i32::MIN + 1, 0] }), (true, false));
+        assert_eq!(
+            (lattice.is_wide, lattice.rule == Rule::Exact { least: [i32::MIN, i32::MIN + 1, 0] }),
+            (true, false)
+        );
         let world: [Vec<f64>; 3] = axes.each_ref().map(|axis| axis.iter().map(|q| f64::from(*q)).collect());
         let cells = Cells::of_world(&world, 1, WIDE);
         for (cells, positions, scale) in
