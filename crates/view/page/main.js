@@ -4,8 +4,12 @@ import { App } from "pm/app.js";
 import { Messages } from "pm/ui/messages.js";
 import { ServerSource } from "pm/sources/server.js";
 
-performance.setResourceTimingBufferSize(100_000); // browsers remember 250 requests; `App.stats` counts them
+document.getElementById("start").remove(); // modules run: what it explains did not happen
+// `App.stats` counts requests; browsers remember 250 of them, which is enough for those who only look
+if (new URLSearchParams(location.search).has("stats")) performance.setResourceTimingBufferSize(100_000);
 const messages = new Messages(document.getElementById("messages"));
+window.addEventListener("error", (event) => messages.fail(`The page failed: ${event.message}`));
+window.addEventListener("unhandledrejection", (event) => messages.fail(`The page failed: ${event.reason?.message ?? event.reason}`));
 
 async function sources(config) {
   if (config.mode === "server") return config.scenes.map((base) => new ServerSource(base));

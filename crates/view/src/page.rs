@@ -29,6 +29,7 @@ macro_rules! files {
 const FILES: &[(&str, &str)] = files![
     "app.js",
     "camera.js",
+    "clip.js",
     "clouds/batches.js",
     "clouds/bintree.js",
     "clouds/block.js",
@@ -36,6 +37,7 @@ const FILES: &[(&str, &str)] = files![
     "clouds/octree.js",
     "clouds/open.js",
     "controls.js",
+    "cursor.js",
     "gl/context.js",
     "gl/palettes.js",
     "gl/renderer.js",
@@ -43,6 +45,7 @@ const FILES: &[(&str, &str)] = files![
     "index.html",
     "main.js",
     "math.js",
+    "recover.js",
     "sources/batches.js",
     "sources/bintree.js",
     "sources/columns.js",
@@ -58,6 +61,7 @@ const FILES: &[(&str, &str)] = files![
     "ui/measure.js",
     "ui/messages.js",
     "ui/panel.js",
+    "ui/picture.js",
     "ui/point.js",
 ];
 

@@ -3,10 +3,10 @@
 import { readBatches, readBoxes, readNodes, readPoints } from "pm/sources/units.js";
 
 /** The body of an answer; errors say what the server says. */
-async function get(url) {
+async function get(url, signal) {
   let answer;
   try {
-    answer = await fetch(url);
+    answer = await fetch(url, { signal });
   } catch {
     throw new Error("pointmill does not answer: it was stopped, or the connection is gone");
   }
@@ -59,7 +59,7 @@ export class ServerSource {
   }
 
   /** Everything that is stored of a point. `index` counts the points of the unit as they are stored. */
-  async point(unit, index) {
-    return (await get(`${this.base}/point?${query({ unit, index })}`)).json();
+  async point(unit, index, signal) {
+    return (await get(`${this.base}/point?${query({ unit, index })}`, signal)).json();
   }
 }
