@@ -13,6 +13,8 @@ const GESTURE_MS = 300;
 const GESTURE_PIXELS = 5;
 /** Within a gesture the place is looked for again when it is this much nearer: what is there is seen better then. */
 const GESTURE_NEARER = 4;
+/** Times as far as that place: behind it. */
+const BEHIND = 1.5;
 /** Pixels of the style sheet that an arrow key turns or moves by, and the notches of the keys + and -. */
 const KEY_PIXELS = 40;
 const KEY_NOTCHES = 1;
@@ -152,10 +154,12 @@ export class Controls {
     const isNear = isSame && distance(camera.eye, gesture.place) * GESTURE_NEARER < gesture.away;
     if (isSame) gesture.time = now;
     if (isSame && !isNear) return gesture.place;
+    const away = (to) => distance(camera.eye, to);
     const hit = this.actions.hit(x, y);
-    // between points that have grown apart, on to where it led before
-    const place = hit ?? (isSame ? gesture.place : onPlane(camera, camera.ray(x, y), camera.target));
-    this.gesture = { x, y, place, time: now, away: distance(camera.eye, place) };
+    // points grow apart: between them, and what is far behind, on to where it led before
+    const isThrough = isSame && (!hit || away(hit) > BEHIND * away(gesture.place));
+    const place = isThrough ? gesture.place : (hit ?? onPlane(camera, camera.ray(x, y), camera.target));
+    this.gesture = { x, y, place, time: now, away: away(place) };
     return place;
   }
 

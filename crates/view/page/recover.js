@@ -18,7 +18,7 @@ export function recoverWhenLost(app) {
   canvas.addEventListener("webglcontextrestored", async () => {
     try {
       await rebuild(app);
-      messages.withdraw(LOST);
+      messages.remove(LOST);
     } catch (error) {
       messages.fail(error.message);
     }

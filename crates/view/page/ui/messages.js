@@ -13,7 +13,7 @@ export class Messages {
   fail(text) {
     if (this.lines.some((line) => line.text === text)) return;
     const notes = this.lines.filter((line) => line.isNote);
-    if (this.lines.length >= MOST && notes.length > 0) this.#remove(notes[0]);
+    if (this.lines.length >= MOST && notes.length > 0) this.#take(notes[0]);
     this.lines.push(this.#line(text, false));
     this.#show();
   }
@@ -23,18 +23,18 @@ export class Messages {
     if (this.lines.some((line) => line.text === text)) return;
     const notes = this.lines.filter((line) => line.isNote);
     const former = notes.find((line) => slot && line.slot === slot) ?? (this.lines.length >= MOST ? notes[0] : undefined);
-    if (former) this.#remove(former);
+    if (former) this.#take(former);
     this.lines.push(this.#line(text, true, slot));
     this.#show();
   }
 
   /** It is over: the line goes. */
-  withdraw(text) {
-    this.lines.filter((line) => line.text === text).forEach((line) => this.#remove(line));
+  remove(text) {
+    this.lines.filter((line) => line.text === text).forEach((line) => this.#take(line));
     this.#show();
   }
 
-  #remove(line) {
+  #take(line) {
     this.lines = this.lines.filter((each) => each !== line);
   }
 
@@ -45,7 +45,7 @@ export class Messages {
     const close = document.createElement("button");
     close.textContent = "×";
     close.title = "Close";
-    close.onclick = () => this.withdraw(text);
+    close.onclick = () => this.remove(text);
     made.append(close);
     return { text, isNote, slot, made };
   }
