@@ -7,7 +7,7 @@ import * as clipping from "pm/clip.js";
 import { Controls } from "pm/controls.js";
 import { Cursor } from "pm/cursor.js";
 import { open as openContext } from "pm/gl/context.js";
-import { ELSEWHERE, Renderer, attributeOf, colouringBy } from "pm/gl/renderer.js";
+import { ELSEWHERE, Renderer, attributeOf, colouringBy, isApart } from "pm/gl/renderer.js";
 import { distance, union } from "pm/math.js";
 import { recoverWhenLost } from "pm/recover.js";
 import * as link from "pm/ui/link.js";
@@ -28,6 +28,7 @@ export class App {
     this.loader = new Loader(
       () => this.touch(),
       (error) => messages.fail(error.message),
+      (error) => messages.remove(error.message),
     );
     this.pointBox = new PointBox(document.getElementById("point"));
     this.measure = new Measure(this, document.getElementById("overlay"));
@@ -144,6 +145,7 @@ export class App {
       }
     } catch (error) {
       this.messages.fail(`The picture cannot be drawn: ${error.message}`);
+      console.error(error); // where it was
     } finally {
       requestAnimationFrame((next) => this.#loop(next)); // one picture that fails is not the last
     }
@@ -169,8 +171,7 @@ export class App {
 
   /** The range of another attribute grows with what is loaded, unless the dataset says it. */
   #newExtras(shown) {
-    const { colour } = this.renderer.settings;
-    if (ELSEWHERE.includes(colour) || this.isRangeKnown) return;
+    if (this.isRangeKnown) return;
     let [low, high] = [Infinity, -Infinity];
     for (const cloud of shown) {
       for (const { block } of cloud.draws(this.camera)) {
@@ -222,16 +223,16 @@ export class App {
     if (wanted in needs ? names.has(needs[wanted]) : ELSEWHERE.includes(wanted)) name = wanted;
     else if (names.has(other)) name = colouringBy(other);
     this.renderer.settings.colour = name;
-    const attribute = attributeOf(name);
+    const chosen = ELSEWHERE.includes(name) ? name : "attribute";
     const found = this.clouds.flatMap((cloud) => {
-      const own = cloud.scene.attributes.find((each) => each.name === (needs[name] ?? attribute));
+      const mode = this.renderer.modeOf(cloud.scene);
+      const shown = { attribute: attributeOf(name), class: "classification", intensity: "intensity" }[mode];
+      const own = cloud.scene.attributes.find((each) => each.name === shown);
       cloud.extraBase = own?.min?.[0] ?? 0;
-      // batches have neither intensities nor classes beside their colours
-      const isApart = cloud.scene.kind === "batches" && own && (name === "intensity" || name === "class");
-      cloud.setAttribute((attribute && own) || isApart ? own.name : undefined);
-      return own?.min && own?.max ? [[own.min[0], own.max[0]]] : [];
+      cloud.setAttribute(own && isApart(cloud.scene, mode) ? own.name : undefined);
+      return mode === chosen && own?.min && own?.max ? [[own.min[0], own.max[0]]] : [];
     });
-    this.isRangeKnown = found.length > 0 || name === "height";
+    this.isRangeKnown = found.length > 0 || !["intensity", "attribute"].includes(chosen);
     this.isRangeChosen = false;
     if (name === "height") this.#setRange([this.box.min[2], this.box.max[2]]);
     else if (found.length > 0) this.#setRange([Math.min(...found.map((r) => r[0])), Math.max(...found.map((r) => r[1]))]);
@@ -331,7 +332,8 @@ export class App {
 
   /** For tests: what is on the screen, and what it took. */
   stats() {
-    const entries = performance.getEntriesByType("resource");
+    // until there was a picture
+    const entries = performance.getEntriesByType("resource").filter((entry) => entry.responseEnd <= (this.firstPicture ?? Infinity));
     return {
       points: this.clouds.reduce((sum, cloud) => sum + cloud.shown, 0),
       firstPicture: this.firstPicture,

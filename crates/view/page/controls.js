@@ -149,18 +149,28 @@ export class Controls {
   #place(x, y) {
     const { camera, gesture } = this;
     const now = performance.now();
-    const moved = gesture ? Math.hypot(x - gesture.x, y - gesture.y) / this.#density : Infinity;
-    const isSame = gesture && now - gesture.time < GESTURE_MS && moved < GESTURE_PIXELS;
-    const isNear = isSame && distance(camera.eye, gesture.place) * GESTURE_NEARER < gesture.away;
-    if (isSame) gesture.time = now;
-    if (isSame && !isNear) return gesture.place;
+    const isHeld = gesture && this.#isUnder(gesture, x, y);
+    const isNear = isHeld && distance(camera.eye, gesture.place) * GESTURE_NEARER < gesture.away;
+    const isSame = isHeld && !isNear && now - gesture.time < GESTURE_MS;
+    if (isSame) {
+      gesture.time = now;
+      return gesture.place;
+    }
     const away = (to) => distance(camera.eye, to);
     const hit = this.actions.hit(x, y);
     // points grow apart: between them, and what is far behind, on to where it led before
-    const isThrough = isSame && (!hit || away(hit) > BEHIND * away(gesture.place));
+    const isThrough = isHeld && (!hit || away(hit) > BEHIND * away(gesture.place));
     const place = isThrough ? gesture.place : (hit ?? onPlane(camera, camera.ray(x, y), camera.target));
     this.gesture = { x, y, place, time: now, away: away(place) };
     return place;
+  }
+
+  /** Whether the cursor is where it was, and the place still under it and not too near to be drawn. */
+  #isUnder({ place, x: atX, y: atY }, x, y) {
+    const { camera } = this;
+    const pixel = camera.project(place);
+    const most = GESTURE_PIXELS * this.#density;
+    return pixel !== null && pixel[2] > camera.near && Math.hypot(pixel[0] - x, pixel[1] - y) < most && Math.hypot(atX - x, atY - y) < most;
   }
 
   #key(event, isDown) {

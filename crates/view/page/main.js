@@ -5,10 +5,9 @@ import { Messages } from "pm/ui/messages.js";
 import { ServerSource } from "pm/sources/server.js";
 
 document.getElementById("start").remove(); // modules run: what it explains did not happen
-// `App.stats` counts requests; browsers remember 250 of them, which is enough for those who only look
-if (new URLSearchParams(location.search).has("stats")) performance.setResourceTimingBufferSize(100_000);
 const messages = new Messages(document.getElementById("messages"));
-window.addEventListener("error", (event) => messages.fail(`The page failed: ${event.message}`));
+// without an exception of ours it is a remark of the browser
+window.addEventListener("error", (event) => event.error && messages.fail(`The page failed: ${event.message}`));
 window.addEventListener("unhandledrejection", (event) => messages.fail(`The page failed: ${event.reason?.message ?? event.reason}`));
 
 async function sources(config) {

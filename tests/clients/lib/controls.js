@@ -55,7 +55,7 @@ async function wheel(page, lines) {
   const before = await far();
   await page.mouse.move(...MIDDLE);
   for (let i = 0; i < 20; i++) await page.mouse.wheel(0, -200);
-  await sleep(REST);
+  await sleep(2 * REST);
   const after = await far();
   // 40 notches of 1.15 are a factor of 267; the place is that of a pixel, not of the point
   if (!(after.eye < before.eye / 50)) lines.push(`the wheel ends ${after.eye} from the point, it began at ${before.eye}`);
@@ -109,8 +109,9 @@ async function links(context, page, lines) {
   if (anew !== "3,7,true,true") lines.push(`a link in a new tab shows ${anew}`);
   const before = page.url();
   await page.evaluate(() => window.pointmill.setFlying(true));
+  const eye = await page.evaluate(() => window.pointmill.camera.eye.join());
   await page.keyboard.down("w");
-  await sleep(200);
+  await page.waitForFunction((from) => window.pointmill.camera.eye.join() !== from, eye, { timeout: PATIENCE });
   await page.keyboard.up("w");
   await sleep(REST);
   if (page.url() === before) lines.push("the address does not know of a flight");

@@ -3,7 +3,7 @@
 
 import { Heap, distances, sub } from "pm/math.js";
 import { batchBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
+import { named, together } from "pm/clouds/loader.js";
 
 const REQUEST_POINTS = 150_000;
 const FIRST_REQUEST_POINTS = 100_000;
@@ -111,7 +111,7 @@ export class BatchesCloud {
             if (attribute === "classification") this.#meet(points.extra);
           });
         } catch (error) {
-          throw new Error(`${this.scene.name}: ${error.message}`);
+          throw named(this.scene, error);
         } finally {
           this.pending--;
         }
@@ -139,7 +139,7 @@ export class BatchesCloud {
 
   #drop(part) {
     part.block?.free();
-    Object.assign(part, { block: undefined, planes: 0 });
+    Object.assign(part, { block: undefined, planes: 0, state: part.state === "loading" ? "loading" : "new" });
   }
 
   setAttribute(attribute) {

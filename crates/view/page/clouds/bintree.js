@@ -3,7 +3,7 @@
 
 import { Heap, distances } from "pm/math.js";
 import { pointBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
+import { named, together } from "pm/clouds/loader.js";
 
 /** Every how manyth point: what comes first, what it is refined to. */
 const STEPS = [16, 4, 1];
@@ -88,7 +88,7 @@ export class BintreeCloud {
             units[i].at = to;
           });
         } catch (error) {
-          throw new Error(`${this.scene.name}: ${error.message}`);
+          throw named(this.scene, error);
         } finally {
           this.pending--;
         }
@@ -110,7 +110,7 @@ export class BintreeCloud {
 
   #drop(leaf) {
     leaf.block?.free();
-    Object.assign(leaf, { block: undefined, at: -1 });
+    Object.assign(leaf, { block: undefined, at: -1, state: leaf.state === "loading" ? "loading" : "new" });
   }
 
   setAttribute(attribute) {

@@ -25,7 +25,7 @@ export function batchBlock(gl, points) {
   block.whole(3, points.colours, 4, gl.UNSIGNED_BYTE);
   block.whole(4, points.indices, 1, gl.UNSIGNED_SHORT);
   if (points.extra) block.single(5, points.extra);
-  return block.end({ min: points.min, sides: points.sides, planes: points.planes.length, indices: points.indices, extraRange: range(points.extra) });
+  return block.end({ min: points.min, sides: points.sides, planes: points.planes.length, indices: points.indices.slice(), extraRange: range(points.extra) });
 }
 
 /** The classes of the points. */

@@ -2,7 +2,7 @@
 
 import { Heap, scale, sub } from "pm/math.js";
 import { pointBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
+import { named, together } from "pm/clouds/loader.js";
 
 /** Nodes of smaller radius, in pixels, are not drawn. */
 const LEAST_PIXELS = 40;
@@ -66,8 +66,8 @@ export class OctreeCloud {
       total += node.points;
       if (total > budget && node !== this.root) break;
       node.used = this.frame;
-      // samples of a node lack the points of its ancestors
-      node.isDrawn = (node.parent?.isDrawn ?? true) && (node.block !== undefined || node.points === 0);
+      // samples of a node lack the points of its ancestors; those of a broken one never come
+      node.isDrawn = (node.parent?.isDrawn ?? true) && (node.block !== undefined || node.points === 0 || node.state === "failed");
       if (node.isDrawn && node.block) {
         node.at = this.visible.length;
         this.visible.push(node);
@@ -97,8 +97,8 @@ export class OctreeCloud {
           this.#insert(await this.source.chunk(node.name));
           node.chunkState = "ready";
         } catch (error) {
-          node.chunkState = "failed";
-          throw new Error(`${this.scene.name}: ${error.message}`);
+          node.chunkState = error.isTransient ? "new" : "failed";
+          throw named(this.scene, error);
         } finally {
           this.pending--;
         }
@@ -117,11 +117,12 @@ export class OctreeCloud {
           const all = await this.source.points(units.map((node) => node.name), { attribute });
           if (attribute !== this.attribute) return units.forEach((node) => (node.state = "new"));
           all.forEach((points, i) => {
+            units[i].block?.free();
             units[i].block = pointBlock(this.gl, points);
             units[i].block.classes.forEach((number) => this.classes.add(number));
           });
         } catch (error) {
-          throw new Error(`${this.scene.name}: ${error.message}`);
+          throw named(this.scene, error);
         } finally {
           this.pending--;
         }
@@ -145,21 +146,23 @@ export class OctreeCloud {
   #drop(node) {
     node.block?.free();
     node.block = undefined;
-    node.state = "new";
+    if (node.state !== "loading") node.state = "new"; // what is under way is told apart by its attribute
   }
 
   /** Another attribute is wanted beside colours and intensities: all points have to come again. */
   setAttribute(attribute) {
     if (attribute === this.attribute) return;
     this.attribute = attribute;
-    for (const node of this.nodes.values()) if (node.state !== "failed") this.#drop(node);
+    for (const node of this.nodes.values()) this.#drop(node);
   }
 
   /** For the shader: which children of each visible node are visible. They stand one behind the other. */
   nodeTable() {
     const { gl } = this;
-    const order = this.visible.length > 0 ? [this.visible[0]] : [];
     const isVisible = new Set(this.visible);
+    // the root, and what is below nodes without points or broken ones
+    const order = this.visible.filter((node) => !isVisible.has(node.parent)).slice(0, MOST_NODES);
+    for (const node of this.visible) node.row = -1;
     const entries = new Uint32Array(1024 * Math.max(1, Math.ceil(Math.min(this.visible.length, MOST_NODES) / 1024)));
     for (let i = 0; i < order.length; i++) {
       order[i].row = i;

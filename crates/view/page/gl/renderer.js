@@ -18,6 +18,12 @@ const ATTRIBUTE = "attribute:";
 export const colouringBy = (name) => ATTRIBUTE + name;
 /** The attribute that a colouring names, or nothing. */
 export const attributeOf = (colour) => (colour.startsWith(ATTRIBUTE) ? colour.slice(ATTRIBUTE.length) : undefined);
+/** True if what a colouring shows comes as another attribute, beside the points' colours and intensities of 16 bits. */
+export function isApart(scene, mode) {
+  if (mode === "class") return scene.kind === "batches";
+  if (mode !== "intensity") return mode === "attribute";
+  return scene.kind === "batches" || scene.attributes.find(({ name }) => name === "intensity")?.type !== "uint16";
+}
 const MODES = { rgb: 0, class: 2, level: 3, one: 4 };
 
 export class Renderer {
@@ -99,8 +105,7 @@ export class Renderer {
     const mode = this.modeOf(scene);
     gl.uniform1i(at.uColour, MODES[mode] ?? 1);
     if (mode in VALUES) {
-      // batches have intensities apart, as any other attribute
-      gl.uniform1i(at.uValue, scene.kind === "batches" && mode === "intensity" ? VALUES.attribute : VALUES[mode]);
+      gl.uniform1i(at.uValue, isApart(scene, mode) ? VALUES.attribute : VALUES[mode]);
       const [low, high] = this.#range(mode, cloud);
       gl.uniform2f(at.uRange, low, 1 / Math.max(high - low, 1e-30));
     }
@@ -146,7 +151,7 @@ export class Renderer {
       [low, high] = mode === "height" ? [min[2], max[2]] : [own?.min?.[0] ?? 0, own?.max?.[0] ?? 65535];
     }
     if (mode === "height") return [low - this.heightBase, high - this.heightBase];
-    if (mode === "intensity" && cloud.scene.kind !== "batches") return [low, high];
+    if (!isApart(cloud.scene, mode)) return [low, high];
     return [low - cloud.extraBase, high - cloud.extraBase];
   }
 

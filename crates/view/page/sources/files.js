@@ -10,11 +10,8 @@ async function get(url) {
   try {
     answer = await fetch(url, { cache: "no-cache" });
   } catch {
-    throw new Error(
-      location.protocol === "file:"
-        ? "A browser reads no files beside a page that was opened from the disk: put both on a web server, or use `pointmill view`."
-        : `${url}: the server does not answer`,
-    );
+    if (location.protocol === "file:") throw new Error("A browser reads no files beside a page that was opened from the disk: put both on a web server, or use `pointmill view`.");
+    throw Object.assign(new Error(`${url}: the server does not answer`), { isTransient: true });
   }
   if (!answer.ok) throw new Error(`${url}: the server answers ${answer.status}`);
   return answer;
@@ -72,7 +69,7 @@ export class RangedFile {
     try {
       answer = await fetch(this.url, { headers: { Range: `bytes=${start}-${end - 1}` } });
     } catch {
-      throw new Error(`${this.url}: the server does not answer`);
+      throw Object.assign(new Error(`${this.url}: the server does not answer`), { isTransient: true });
     }
     if (answer.status === 200) return this.#takeWhole(answer, start, end);
     if (answer.status === 416) throw new Error(`${this.url}: ends before byte ${end}`);

@@ -2,23 +2,28 @@
 
 import { readBatches, readBoxes, readNodes, readPoints } from "pm/sources/units.js";
 
-/** The body of an answer; errors say what the server says. */
+const decode = (bytes) => new TextDecoder().decode(bytes);
+
+/** The bytes of an answer; errors say what the server says. */
 async function get(url, signal) {
   let answer;
+  let bytes;
   try {
     answer = await fetch(url, { signal });
+    bytes = await answer.arrayBuffer();
   } catch {
-    throw new Error("pointmill does not answer: it was stopped, or the connection is gone");
+    const error = new Error("pointmill does not answer: it was stopped, or the connection is gone");
+    throw Object.assign(error, { isTransient: true });
   }
-  if (answer.ok) return answer;
-  const text = await answer.text();
+  if (answer.ok) return bytes;
+  const text = decode(bytes);
   let said = text;
   try {
     said = JSON.parse(text).error ?? text;
   } catch {
     // not ours: as it is
   }
-  throw new Error(said || `status ${answer.status}`);
+  throw Object.assign(new Error(said || `status ${answer.status}`), { isTransient: answer.status === 503 });
 }
 
 const query = (fields) =>
@@ -37,29 +42,29 @@ export class ServerSource {
   }
 
   async scene() {
-    return (await get(`${this.base}/scene`)).json();
+    return JSON.parse(decode(await get(`${this.base}/scene`)));
   }
 
   async chunk(name) {
-    return readNodes(await (await get(`${this.base}/nodes?${query({ of: name })}`)).arrayBuffer(), name);
+    return readNodes(await get(`${this.base}/nodes?${query({ of: name })}`), name);
   }
 
   async boxes() {
-    return readBoxes(await (await get(`${this.base}/nodes`)).arrayBuffer());
+    return readBoxes(await get(`${this.base}/nodes`));
   }
 
   async points(units, { attribute, every }) {
     const url = `${this.base}/points?${query({ units: units.join(","), attribute, every: every > 1 ? every : undefined })}`;
-    return readPoints(await (await get(url)).arrayBuffer());
+    return readPoints(await get(url));
   }
 
   async batches(units, { planes, lods, attribute }) {
     const url = `${this.base}/batches?${query({ units: units.join(","), planes, lods: `${lods[0]}-${lods[1]}`, attribute })}`;
-    return readBatches(await (await get(url)).arrayBuffer());
+    return readBatches(await get(url));
   }
 
   /** Everything that is stored of a point. `index` counts the points of the unit as they are stored. */
   async point(unit, index, signal) {
-    return (await get(`${this.base}/point?${query({ unit, index })}`, signal)).json();
+    return JSON.parse(decode(await get(`${this.base}/point?${query({ unit, index })}`, signal)));
   }
 }
