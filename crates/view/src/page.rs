@@ -29,6 +29,7 @@ macro_rules! files {
 const FILES: &[(&str, &str)] = files![
     "app.js",
     "camera.js",
+    "clip.js",
     "clouds/batches.js",
     "clouds/bintree.js",
     "clouds/block.js",
@@ -37,6 +38,7 @@ const FILES: &[(&str, &str)] = files![
     "clouds/open.js",
     "clouds/units.js",
     "controls.js",
+    "cursor.js",
     "gl/context.js",
     "gl/palettes.js",
     "gl/renderer.js",
@@ -44,6 +46,7 @@ const FILES: &[(&str, &str)] = files![
     "index.html",
     "main.js",
     "math.js",
+    "recover.js",
     "sources/batches.js",
     "sources/bintree.js",
     "sources/columns.js",
@@ -60,6 +63,7 @@ const FILES: &[(&str, &str)] = files![
     "ui/measure.js",
     "ui/messages.js",
     "ui/panel.js",
+    "ui/picture.js",
     "ui/point.js",
 ];
 
