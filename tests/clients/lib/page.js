@@ -7,6 +7,7 @@ import { join } from "node:path";
 import { checkControls } from "./controls.js";
 import { pointmill } from "./pointmill.js";
 import { serve } from "./server.js";
+import { checkSteady } from "./steady.js";
 import { start } from "./view.js";
 
 const KINDS = {
@@ -169,6 +170,7 @@ export async function checkPage(context, scan, out, report) {
   const { table, url, stop } = await behindTheProgram(context, path, out, report, (n) => (failures += n));
   failures += await alone(context, path, table, out, report);
   failures += await withoutRanges(context, path, report);
+  failures += await checkSteady(context, scan, path, out, report);
   failures += await checkControls(context, out, report);
   failures += await broken(context, path, url, report);
   failures += report("the page: the program ends", await stop());

@@ -22,7 +22,9 @@ export const attributeOf = (colour) => (colour.startsWith(ATTRIBUTE) ? colour.sl
 export function isApart(scene, mode) {
   if (mode === "class") return scene.kind === "batches";
   if (mode !== "intensity") return mode === "attribute";
-  return scene.kind === "batches" || scene.attributes.find(({ name }) => name === "intensity")?.type !== "uint16";
+  const own = scene.attributes.find(({ name }) => name === "intensity");
+  // without a range that is known, it grows with the values
+  return scene.kind === "batches" || own?.type !== "uint16" || !own.max;
 }
 const MODES = { rgb: 0, class: 2, level: 3, one: 4 };
 
