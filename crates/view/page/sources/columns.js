@@ -20,9 +20,12 @@ export function column(view, type, start, stride) {
 /** 8 bits of a channel: the nearest of 255 parts. */
 export const eightBit = (v) => Math.floor((v * 255 + 32767) / 65535);
 
+/** The greatest integer of a place: shaders take no larger ones. */
+const MOST_INTEGER = 2 ** 31 - 1;
+
 /**
  * Points from functions of their number. `integer`: the lattice's integers; or else `world`: coordinates, put on 2^31 steps of
- * their box. The others may be missing. Of `stored` points the first of every `every` is taken.
+ * their box, as integers are that need more. The others may be missing. Of `stored` points the first of every `every` is taken.
  */
 export function makePoints(stored, { every = 1, integer, scale, offset, world, colour, classification, intensity, extra, extraBase = 0 }) {
   const count = Math.ceil(stored / every);
@@ -41,20 +44,22 @@ export function makePoints(stored, { every = 1, integer, scale, offset, world, c
   if (count === 0) low.fill(0);
   const extent = low.map((v, a) => (count === 0 ? 0 : high[a] - v));
   const isWide = !integer || Math.max(...extent) > 65535;
-  const step = integer ? scale : extent.map((e) => (e > 0 ? e / (2 ** 31 - 1) : 1));
+  const isExact = integer && Math.max(...extent) <= MOST_INTEGER;
+  const cell = extent.map((e) => (isExact || e === 0 ? 1 : e / MOST_INTEGER));
+  const step = integer ? cell.map((c, a) => c * scale[a]) : cell;
   const origin = integer ? low.map((v, a) => v * scale[a] + offset[a]) : low;
   const places = isWide ? new Uint32Array(4 * count) : new Uint16Array(4 * count);
   const colours = new Uint8Array(4 * count);
   const extras = extra ? new Float32Array(count) : null;
   for (let i = 0; i < count; i++) {
-    for (let a = 0; a < 3; a++) places[4 * i + a] = integer ? place(i, a) - low[a] : Math.round((place(i, a) - low[a]) / step[a]);
+    for (let a = 0; a < 3; a++) places[4 * i + a] = Math.round((place(i, a) - low[a]) / cell[a]);
     if (intensity) places[4 * i + 3] = intensity(i);
     if (colour) for (let c = 0; c < 3; c++) colours[4 * i + c] = colour(i, c);
     if (classification) colours[4 * i + 3] = classification(i);
     if (extras) extras[i] = extra(i) - extraBase;
   }
   const has = (isWide ? HAS.WIDE : 0) | (colour ? HAS.COLOUR : 0) | (extra ? HAS.EXTRA : 0) | (classification ? HAS.CLASS : 0) | (intensity ? HAS.INTENSITY : 0);
-  return { count, stored, isWide, origin, step: [...step], places, colours, extra: extras, has };
+  return { count, stored, isWide, origin, step, places, colours, extra: extras, has };
 }
 
 /** What makes points of columns that have the names of LAS. `find` gives the column of an attribute, or nothing. */

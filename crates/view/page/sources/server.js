@@ -1,30 +1,25 @@
 // A dataset behind `pointmill view`: the format crate decodes it there.
 
+import { request } from "pm/sources/request.js";
 import { readBatches, readBoxes, readNodes, readPoints } from "pm/sources/units.js";
 
-const decode = (bytes) => new TextDecoder().decode(bytes);
+const LOST = "pointmill does not answer: it was stopped, or the connection is gone";
 
-/** The bytes of an answer; errors say what the server says. */
-async function get(url) {
-  let answer;
-  let bytes;
-  try {
-    answer = await fetch(url);
-    bytes = await answer.arrayBuffer();
-  } catch {
-    const error = new Error("pointmill does not answer: it was stopped, or the connection is gone");
-    throw Object.assign(error, { isTransient: true });
-  }
+/** The body of an answer; errors say what the server says. */
+async function get(url, signal) {
+  const { answer, bytes } = await request(url, { lost: LOST, signal });
   if (answer.ok) return bytes;
-  const text = decode(bytes);
+  const text = new TextDecoder().decode(bytes);
   let said = text;
   try {
     said = JSON.parse(text).error ?? text;
   } catch {
     // not ours: as it is
   }
-  throw Object.assign(new Error(said || `status ${answer.status}`), { isTransient: answer.status === 503 });
+  throw new Error(said || `status ${answer.status}`);
 }
+
+const json = async (bytes) => JSON.parse(new TextDecoder().decode(await bytes));
 
 const query = (fields) =>
   Object.entries(fields)
@@ -42,7 +37,7 @@ export class ServerSource {
   }
 
   async scene() {
-    return JSON.parse(decode(await get(`${this.base}/scene`)));
+    return json(get(`${this.base}/scene`));
   }
 
   async chunk(name) {
@@ -63,8 +58,8 @@ export class ServerSource {
     return readBatches(await get(url));
   }
 
-  /** Everything that is stored of a point. `index` counts the points of the unit as they are stored. */
-  async point(unit, index) {
-    return JSON.parse(decode(await get(`${this.base}/point?${query({ unit, index })}`)));
+  /** Everything that is stored of a point. `index` counts the points of the unit as they are stored. `signal` may abort it. */
+  async point(unit, index, signal) {
+    return json(get(`${this.base}/point?${query({ unit, index })}`, signal));
   }
 }

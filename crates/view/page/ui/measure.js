@@ -8,7 +8,7 @@ export const metres = (x) => (x === 0 ? "0" : Math.abs(x) >= 1e7 || Math.abs(x) 
 
 export class Measure {
   constructor(app, overlay) {
-    Object.assign(this, { app, overlay, clicks: [], isOn: false });
+    Object.assign(this, { app, overlay, entries: [], isOn: false });
   }
 
   toggle() {
@@ -17,35 +17,41 @@ export class Measure {
   }
 
   clear() {
-    this.clicks = [];
+    this.entries = [];
     this.draw();
   }
 
-  /** A click; the function takes the place once it is known, or nothing. Points keep the order of the clicks. */
-  begin() {
-    const click = {};
-    this.clicks.push(click);
-    return (place) => {
-      if (place) click.place = place;
-      else this.clicks = this.clicks.filter((each) => each !== click);
-      this.draw();
-    };
+  /** A place in the order of clicks: answers may come in another one. `key` tells points apart. */
+  reserve(key) {
+    const entry = { key };
+    this.entries.push(entry);
+    return entry;
+  }
+
+  fill(entry, place) {
+    entry.place = place;
+    this.draw();
+  }
+
+  drop(entry) {
+    this.entries = this.entries.filter((each) => each !== entry);
+    this.draw();
   }
 
   get points() {
-    return this.clicks.map(({ place }) => place).filter(Boolean);
+    return this.entries.flatMap(({ place }) => (place ? [place] : []));
   }
 
   /** Lengths of the parts and of all together, world units. */
   get lengths() {
-    const { points } = this;
+    const points = this.points;
     return points.slice(1).map((place, i) => distance(place, points[i]));
   }
 
   draw() {
     const { camera } = this.app;
-    const { points, lengths } = this;
     const ratio = this.app.ratio;
+    const points = this.points;
     const at = points.map((place) => camera.project(place)?.map((v) => v / ratio));
     const nodes = [];
     const add = (name, fields, text) => {
@@ -54,6 +60,7 @@ export class Measure {
       if (text) made.textContent = text;
       nodes.push(made);
     };
+    const lengths = this.lengths;
     lengths.forEach((length, i) => {
       const [a, b] = [at[i], at[i + 1]];
       if (!a || !b) return;

@@ -114,6 +114,30 @@ mod tests {
         assert_eq!([all.of(&ends, 0), all.of(&ends, 1)], [[0; 3], [WIDE, 0, 0]], "no integer has 32 bits");
     }
 
+    /// Half a step of the box, which is more than one of the lattice.
+    #[test]
+    fn integers_are_below_2_to_the_31() {
+        let axes = [vec![i32::MIN, i32::MAX, 1], vec![i32::MIN + 1, 0, -7], vec![0, 0, 9]];
+        let lattice = Cells::of_lattice(&axes, &LATTICE, 1, false);
+        assert_eq!(
+            (lattice.is_wide, lattice.rule == Rule::Exact { least: [i32::MIN, i32::MIN + 1, 0] }),
+            (true, false)
+        );
+        let world: [Vec<f64>; 3] = axes.each_ref().map(|axis| axis.iter().map(|q| f64::from(*q)).collect());
+        let cells = Cells::of_world(&world, 1, WIDE);
+        for (cells, positions, scale) in
+            [(lattice, Positions::Quantized(axes), LATTICE.scale[0]), (cells, Positions::World(world.clone()), 1.0)]
+        {
+            for (i, a) in (0..3).flat_map(|i| (0..3).map(move |a| (i, a))) {
+                let integer = cells.of(&positions, i)[a];
+                assert!(integer <= i32::MAX as u32, "{integer}");
+                let found = f64::from(integer) * cells.step[a];
+                let meant = (world[a][i] - world[a].iter().copied().fold(f64::INFINITY, f64::min)) * scale;
+                assert!((found - meant).abs() <= 0.5 * cells.step[a] * (1.0 + 1e-6), "{found}, not {meant}");
+            }
+        }
+    }
+
     /// Half a step, and the rounding of sums and products in double precision.
     #[test]
     fn rounded_integers_are_the_nearest() {

@@ -119,6 +119,8 @@ fn the_page_is_served_with_the_datasets() {
     let served = serve(&[&fixture("potree2/default"), &fixture("bintree/files")]);
     let page = served.get("/");
     assert_eq!(page.header("content-type"), Some("text/html; charset=utf-8"));
+    let policy = page.header("content-security-policy").unwrap();
+    assert!(policy.contains("frame-ancestors 'none'") && policy.contains("connect-src 'self'"), "{policy}");
     let text = String::from_utf8(page.body).unwrap();
     assert!(text.contains(r#""scenes":["api/0","api/1"]"#) && text.contains(pointmill_view::GENERATOR), "{text}");
     assert_eq!(served.get("/favicon.ico").status, 204);
