@@ -34,7 +34,10 @@ export class Controls {
     on("keydown", (event) => this.#key(event, true));
     on("keyup", (event) => this.#key(event, false));
     on("pointerleave", (event) => event.pointerType === "mouse" && actions.leave());
-    on("blur", () => this.keys.clear());
+    on("blur", () => {
+      this.keys.clear();
+      this.#isPointed(false);
+    });
   }
 
   /** Pixels of the picture per pixel of the style sheet. */
@@ -53,7 +56,13 @@ export class Controls {
     return [(event.clientX - rect.left) * ratio, (event.clientY - rect.top) * ratio];
   }
 
+  /** For the style: frame and cross are for those who use keys, and browsers show the frame after `focus()`, too. */
+  #isPointed(isPointed) {
+    this.canvas.classList.toggle("pointed", isPointed);
+  }
+
   #down(event) {
+    this.#isPointed(true);
     this.canvas.focus();
     try {
       this.canvas.setPointerCapture(event.pointerId);
@@ -187,6 +196,7 @@ export class Controls {
       event.preventDefault();
     } else if (this.#steer(key, event.shiftKey)) {
       event.preventDefault();
+      this.#isPointed(false);
       this.actions.change();
       this.actions.rest();
     } else if (!event.repeat) this.actions.key(key);

@@ -28,6 +28,7 @@ async function open(context, url, lines) {
   const page = await context.newPage();
   await page.setViewportSize(SIZE);
   page.on("pageerror", (error) => lines.push(`exception: ${error.message}`));
+  page.setDefaultTimeout(PATIENCE / 4);
   await page.goto(url);
   await page.waitForFunction(() => window.pointmill?.firstPicture, undefined, { timeout: PATIENCE });
   await page.evaluate(() => window.pointmill.idle());
@@ -213,6 +214,9 @@ async function forbidden(context, url, lines) {
   await page.close();
 }
 
+/** What a check waited for in vain is a line, too. */
+const tried = (check, lines) => check.catch((error) => lines.push(error.message.split("\n")[0]));
+
 /** Checks the page of an octree of `scan`, live, and that of a table, on a web server. Returns the number of failures. */
 export async function checkControls(context, out, report) {
   const table = join(out, "scans", "table.csv");
@@ -226,7 +230,7 @@ export async function checkControls(context, out, report) {
     const lines = [];
     const page = await open(context, single.url, lines);
     await page.locator("#picture").focus();
-    await check(page, lines);
+    await tried(check(page, lines), lines);
     await page.close();
     failures += report(`the page by hand: ${title}`, lines);
   }
@@ -235,9 +239,9 @@ export async function checkControls(context, out, report) {
   const url = `${server.url}/data/controls-bintree.html`;
   const lines = [];
   const page = await open(context, url, lines);
-  await settings(page, lines);
+  await tried(settings(page, lines), lines);
   await page.close();
-  await forbidden(context, url, lines);
+  await tried(forbidden(context, url, lines), lines);
   await server.close();
   return failures + report("the page by hand: settings, and without scripts", lines);
 }
