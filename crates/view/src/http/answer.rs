@@ -45,11 +45,12 @@ pub(super) fn nothing() -> Answer {
     answer
 }
 
-pub(super) fn refusal(refusal: &Refusal) -> Answer {
+/// `allowed`: the methods that the address answers.
+pub(super) fn refusal(refusal: &Refusal, allowed: &'static str) -> Answer {
     let status = StatusCode::from_u16(refusal.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     let mut answer = answer(status, JSON, json!({ "error": refusal.line }).to_string().into());
     if status == StatusCode::METHOD_NOT_ALLOWED {
-        answer.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
+        answer.headers_mut().insert(ALLOW, HeaderValue::from_static(allowed));
     }
     answer
 }

@@ -135,7 +135,11 @@ fn other_hosts_and_other_methods_are_refused() {
         assert_eq!(Answer::parse(&served.raw(request.as_bytes())).refusal().0, 403, "{head}");
     }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "BREW"] {
-        let answer = served.request(method, "/api/0/scene", "");
-        assert_eq!((answer.status, answer.header("allow")), (405, Some("GET, HEAD")), "{method}");
+        for (target, allowed) in [("/", "GET, HEAD"), ("/api/0/scene", "GET")] {
+            let answer = served.request(method, target, "");
+            assert_eq!((answer.status, answer.header("allow")), (405, Some(allowed)), "{method} {target}");
+        }
     }
+    assert_eq!(served.request("HEAD", "/", "").status, 200);
+    assert_eq!(served.request("HEAD", "/api/0/points?units=r", "").status, 405, "nothing is decoded for a head");
 }
