@@ -3,6 +3,7 @@
 import { Camera, VIEWS } from "pm/camera.js";
 import { Loader } from "pm/clouds/loader.js";
 import { openCloud } from "pm/clouds/open.js";
+import { shares } from "pm/clouds/units.js";
 import * as clipping from "pm/clip.js";
 import { Controls } from "pm/controls.js";
 import { Cursor } from "pm/cursor.js";
@@ -155,18 +156,18 @@ export class App {
   frame() {
     const shown = this.clouds.filter((cloud) => cloud.isShown);
     this.camera.setRange(shown.map((cloud) => cloud.box));
-    const each = Math.floor(this.budget / Math.max(shown.length, 1));
-    for (const cloud of shown) cloud.update(this.camera, each, this.loader);
+    const points = shares(shown, this.budget);
+    for (const cloud of shown) cloud.update(this.camera, points.get(cloud), this.loader);
     this.#newExtras(shown);
     this.#legend();
     this.renderer.draw(shown, this.camera);
     this.measure.draw();
     this.frames++;
-    const points = shown.reduce((sum, cloud) => sum + cloud.shown, 0);
-    if (points > 0) this.firstPicture ??= performance.now();
+    const drawn = shown.reduce((sum, cloud) => sum + cloud.shown, 0);
+    if (drawn > 0) this.firstPicture ??= performance.now();
     const isLoading = shown.some((cloud) => cloud.isLoading);
     this.isIdle = !isLoading && this.loader.running === 0;
-    this.status.textContent = `${points.toLocaleString("en")} points${isLoading ? " …" : ""}`;
+    this.status.textContent = `${drawn.toLocaleString("en")} points${isLoading ? " …" : ""}`;
   }
 
   /** The range of another attribute grows with what is loaded, unless the dataset says it. */
@@ -272,6 +273,7 @@ export class App {
 
   show(cloud, isShown) {
     cloud.isShown = isShown;
+    if (!isShown) cloud.forget(0); // but for what was drawn last
     this.changed();
   }
 

@@ -86,7 +86,7 @@ export class BatchesCloud {
       if (lod + 1 < slot.parts.length && lod < slot.finest) heap.push(slot.pixels / 2 ** (lod + 1), { slot, lod: lod + 1 });
     }
     this.#load(wanted, loader);
-    this.#forget(budget);
+    this.forget(budget);
     this.isLoading = wanted.length > 0 || this.pending > 0;
   }
 
@@ -128,7 +128,7 @@ export class BatchesCloud {
     for (const value of values ?? []) this.classes.add(Math.round(value + base) & 255);
   }
 
-  #forget(budget) {
+  forget(budget) {
     const loaded = this.slots.flatMap((slot) => slot.parts.filter((part) => part.block));
     let total = loaded.reduce((sum, part) => sum + part.block.count, 0);
     if (total <= 3 * budget) return;

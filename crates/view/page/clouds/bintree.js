@@ -67,7 +67,7 @@ export class BintreeCloud {
     }
     wanted.push(...this.#tooFine(camera, budget));
     this.#load(wanted, camera, loader);
-    this.#forget(budget);
+    this.forget(budget);
     this.isLoading = wanted.length > 0 || this.pending > 0;
   }
 
@@ -117,7 +117,7 @@ export class BintreeCloud {
     }
   }
 
-  #forget(budget) {
+  forget(budget) {
     const loaded = this.leaves.filter((leaf) => leaf.block);
     let total = loaded.reduce((sum, leaf) => sum + leaf.block.count, 0);
     if (total <= 3 * budget) return;

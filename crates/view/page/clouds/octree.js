@@ -82,7 +82,7 @@ export class OctreeCloud {
       }
     }
     this.#load(proxies, loader);
-    this.#forget(budget);
+    this.forget(budget);
     this.isLoading = this.wanted.length > 0 || proxies.some((node) => node.chunk.state === "new") || this.pending > 0;
   }
 
@@ -124,7 +124,7 @@ export class OctreeCloud {
   }
 
   /** Of nodes that were not drawn for long the points go, as soon as there are three times as many as are drawn at once. */
-  #forget(budget) {
+  forget(budget) {
     const loaded = [...this.nodes.values()].filter((node) => node.block);
     let total = loaded.reduce((sum, node) => sum + node.block.count, 0);
     if (total <= 3 * budget) return;

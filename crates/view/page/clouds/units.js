@@ -30,3 +30,16 @@ export function drop(unit) {
   unit.block = undefined;
   if (unit.state !== "loading") unit.state = "new";
 }
+
+/** How many points each cloud may draw: what small ones do not need is for the others. */
+export function shares(clouds, budget) {
+  const points = ({ scene }) => scene.points ?? Infinity;
+  let left = budget;
+  const share = (cloud, i) => {
+    const most = Math.floor(left / (clouds.length - i));
+    left -= Math.min(most, points(cloud));
+    return [cloud, most];
+  };
+  const bySize = [...clouds].sort((a, b) => (points(a) === points(b) ? 0 : points(a) - points(b)));
+  return new Map(bySize.map(share));
+}

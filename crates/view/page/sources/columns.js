@@ -14,7 +14,17 @@ export function column(view, type, start, stride) {
   const [name, size] = READERS[type] ?? [];
   if (!name) throw new Error(`attributes of type ${type} are not known`);
   const get = view[name].bind(view);
-  return (point, element = 0) => Number(get(start + point * stride + element * size, true));
+  const raw = (point, element = 0) => get(start + point * stride + element * size, true);
+  const value = (point, element) => Number(raw(point, element));
+  value.raw = raw; // a BigInt of 64 bits
+  return value;
+}
+
+/** Least and greatest meant values, of the stored ones that formats give; nothing if these are not there, or no numbers. */
+export function meant({ min, max, scale, offset, elements }) {
+  const ends = Array.from({ length: elements }, (_, e) => [min, max].map((all) => Number(all?.[e] ?? NaN) * (scale?.[e] ?? 1) + (offset?.[e] ?? 0)));
+  if (!ends.flat().every(Number.isFinite)) return { min: undefined, max: undefined };
+  return { min: ends.map((pair) => Math.min(...pair)), max: ends.map((pair) => Math.max(...pair)) }; // a scale may be negative
 }
 
 /** 8 bits of a channel: the nearest of 255 parts. */
@@ -86,8 +96,13 @@ export function everything(position, attributes, find, index) {
     position,
     attributes: attributes.map(({ name, elements, scale, offset }) => {
       const get = find(name);
-      const values = Array.from({ length: elements }, (_, e) => get(index, e) * (scale?.[e] ?? 1) + (offset?.[e] ?? 0));
-      return { name, values };
+      const each = Array.from({ length: elements }, (_, e) => ({ raw: get.raw?.(index, e), value: get(index, e), scale: scale?.[e] ?? 1, offset: offset?.[e] ?? 0 }));
+      const values = each.map((own) => own.value * own.scale + own.offset);
+      const texts = each.filter((own) => own.scale === 1 && own.offset === 0 && !isExact(own)).map((own) => String(own.raw ?? own.value));
+      return texts.length > 0 ? { name, values, text: texts.join(" ") } : { name, values };
     }),
   };
 }
+
+/** A number of JavaScript says it. */
+const isExact = ({ raw, value }) => Number.isFinite(value) && (typeof raw !== "bigint" || Math.abs(value) <= 2 ** 53);
