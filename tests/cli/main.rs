@@ -27,6 +27,7 @@ mod mistakes;
 mod mounted;
 mod odd_places;
 mod overwriting;
+mod packaging;
 mod placing;
 mod potree1;
 mod potree1_of_others;
