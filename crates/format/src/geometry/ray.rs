@@ -174,6 +174,7 @@ mod tests {
             }
             assert!(met > 100, "{met}");
         }
-        assert_eq!(up_y([0.0, -5.0, 0.0], 0.0).enter(&of([0.0; 3])), Some(5.0), "without any width");
+        let without_width = up_y([0.0, -5.0, 0.0], 0.0).enter(&of([0.0; 3]));
+        assert!(without_width.is_some_and(|t| t > 4.999 && t <= 5.0), "{without_width:?}");
     }
 }
