@@ -145,7 +145,7 @@ fn cubes_of_unequal_scales_have_the_longest_axis_and_room_for_the_coarsest_step(
 
 #[test]
 fn nearest_tree_coordinates_are_rounded_and_in_the_cube() {
-    for steps in [129, 131, 65_537, (1 << 30) + 1, (1 << 31) - 1] {
+    for steps in [129u64, 131, 65_537, (1 << 30) + 1, (1 << 31) - 1] {
         let cube = long(steps as i64 - 1);
         for x in (0..steps).step_by(1 + steps as usize / 997).chain([steps - 1]) {
             let nearest = ((u128::from(x) << 32) + u128::from(steps)) / u128::from(2 * steps);
