@@ -1,13 +1,16 @@
 #!/usr/bin/env python3
 """Writes the licence texts of everything that is linked into the program to one file.
 
-    python3 packaging/licences.py OUT
+    python3 packaging/licences.py OUT [TARGET]
+    python3 packaging/licences.py --check     names what has no text, and writes nothing
 
-The list is that of `cargo metadata` for this machine: normal dependencies of the package `pointmill`, and theirs. Texts are the
-files LICENSE*, LICENCE*, COPYING*, NOTICE* and UNLICENSE* of each package, those of bundled C libraries included. Packages
-without such a file that are under the MIT licence get its text with their authors; any other ends the run. Needs Python 3.9.
+The list is that of `cargo metadata` for this machine, or for TARGET: normal dependencies of the package `pointmill`, and theirs.
+Texts are the files LICENSE*, LICENCE*, COPYING*, NOTICE* and UNLICENSE* of each package, those of bundled C libraries included.
+Packages without such a file that are under the MIT licence get its text with their authors; any other ends the run. The notices
+of Rust's standard library are those that come with the compiler. Needs Python 3.9.
 """
 
+import html
 import json
 import re
 import subprocess
@@ -21,9 +24,9 @@ DEPTH = 3
 HOLDERS = {"brotlic-sys": "2009, 2010, 2013-2016 by the Brotli Authors, and the authors of brotlic-sys"}
 
 
-def metadata():
-    host = re.search(r"host: (\S+)", subprocess.run(["rustc", "-vV"], check=True, capture_output=True, text=True).stdout)[1]
-    command = ["cargo", "metadata", "--format-version", "1", "--locked", "--filter-platform", host]
+def metadata(target):
+    target = target or re.search(r"host: (\S+)", subprocess.run(["rustc", "-vV"], check=True, capture_output=True, text=True).stdout)[1]
+    command = ["cargo", "metadata", "--format-version", "1", "--locked", "--filter-platform", target]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
@@ -60,18 +63,31 @@ def without_file(package):
     return [("MIT", re.sub(r"^Copyright.*$", lambda _: f"Copyright (c) {holders}", text, count=1, flags=re.MULTILINE).strip())]
 
 
-def main(out):
-    lines = ["pointmill contains the software below, under the licences that follow it.", ""]
-    packages = linked(metadata())
-    for package in packages:
-        lines += ["=" * 100, f"{package['name']} {package['version']}: {package['license'] or 'see below'}", ""]
-        for name, text in texts(package) or without_file(package):
-            lines += [f"--- {name}", "", text, ""]
-    Path(out).write_text("\n".join(lines) + "\n", "utf-8")
-    print(f"{out}: {len(packages)} packages")
+def standard_library():
+    """The notices of Rust's standard library and of what it is made with; compilers of distributions come without the file."""
+    found = subprocess.run(["rustc", "--print", "sysroot"], check=True, capture_output=True, text=True).stdout.strip()
+    notices = Path(found) / "share" / "doc" / "rust" / "COPYRIGHT-library.html"
+    if not notices.is_file():
+        return without_file({"name": "Rust", "version": "", "license": "MIT", "authors": ["The Rust Project Developers"]})
+    text = html.unescape(re.sub(r"<[^>]+>", "", notices.read_text("utf-8")))
+    return [("notices", re.sub(r"\n\s*\n\s*\n+", "\n\n", text).strip())]
+
+
+def main(out, target=None):
+    lines = ["pointmill contains the software below, under the licences that follow it."]
+    packages = linked(metadata(target))
+    parts = [(f"{p['name']} {p['version']}: {p['license'] or 'see below'}", texts(p) or without_file(p)) for p in packages]
+    parts.append(("The Rust standard library: MIT OR Apache-2.0", standard_library()))
+    for title, licences in parts:
+        lines += ["", "=" * 100, title]
+        for name, text in licences:
+            lines += ["", f"--- {name}", "", text]
+    if out is not None:
+        Path(out).write_text("\n".join(lines) + "\n", "utf-8")
+    print(f"{out or 'complete'}: {len(packages)} packages")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
-    main(sys.argv[1])
+    main(None if sys.argv[1] == "--check" else sys.argv[1], *sys.argv[2:])

@@ -145,6 +145,7 @@ impl From<ConvertError> for Failure {
             ConvertError::Input(_) => Self::Input(line),
             ConvertError::Io { .. } => Self::Io(line),
             ConvertError::Memory { .. } => Self::Memory(line),
+            ConvertError::Refused { .. } => Self::Faults(line),
             ConvertError::Interrupted => Self::Interrupted(line),
             _ => Self::Internal(line),
         }

@@ -127,7 +127,7 @@ pub(crate) fn say(line: impl Into<String>) {
         let _ = done.send(());
     });
     if printer.is_ok() {
-        let _ = wait.recv_timeout(Duration::from_millis(200));
+        let _ = wait.recv_timeout(Duration::from_millis(400)); // on a busy machine a thread begins late
     }
 }
 

@@ -519,6 +519,27 @@ namespace Pointmill
             return distance;
         }
 
+        /// <summary>Batches: the weight of the point with that storage index; see pm_clod_weight.</summary>
+        public static float ClodWeight(uint index) { return Native.pm_clod_weight(index); }
+
+        /// <summary>Batches: the spacing that the picture wants of points; see pm_clod_spacing.</summary>
+        public static float ClodSpacing(float distance, float clod, float ndcRadius)
+        {
+            return Native.pm_clod_spacing(distance, clod, ndcRadius);
+        }
+
+        /// <summary>Batches: whether a point of that level and weight is drawn; see pm_clod_keeps.</summary>
+        public static bool ClodKeeps(uint level, float weight, float cell, float spacing)
+        {
+            return Native.pm_clod_keeps(level, weight, cell, spacing) != 0;
+        }
+
+        /// <summary>Batches: how many levels of a batch that is dMin away can be seen, 0 to 4.</summary>
+        public static int ClodLevels(double dMin, float clod, float cell)
+        {
+            return (int)Native.pm_clod_levels(dMin, clod, cell);
+        }
+
         /// <summary>The material of a box between dMin and dMax.</summary>
         public static Material Material(double dMin, double dMax, double switchDistance)
         {
@@ -651,6 +672,13 @@ namespace Pointmill
             double pointRadius, double verticalFov, double height, out double distance);
         [DllImport(Lib, CallingConvention = C)] internal static extern Material pm_material(
             double dMin, double dMax, double switchDistance);
+        [DllImport(Lib, CallingConvention = C)] internal static extern float pm_clod_weight(uint index);
+        [DllImport(Lib, CallingConvention = C)] internal static extern float pm_clod_spacing(
+            float distance, float clod, float ndcRadius);
+        [DllImport(Lib, CallingConvention = C)] internal static extern uint pm_clod_keeps(
+            uint level, float weight, float cell, float spacing);
+        [DllImport(Lib, CallingConvention = C)] internal static extern uint pm_clod_levels(
+            double dMin, float clod, float cell);
         [DllImport(Lib, CallingConvention = C)] internal static extern Status pm_pick(
             DatasetHandle dataset, ref Ray ray, out Hit hit);
         [DllImport(Lib, CallingConvention = C)] internal static extern Status pm_section(

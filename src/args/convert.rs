@@ -148,6 +148,12 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "DIR", help_heading = "Resources")]
     pub(crate) temp_dir: Option<PathBuf>,
 
+    /// Validates what was made before it gets its name, and keeps none of it if anything is wrong (exit code 7): its promises
+    /// (dataset), or these and every point against the scans, which are read again (scans)
+    #[arg(long, value_enum, value_name = "WITH", num_args = 0..=1, require_equals = true, default_missing_value = "dataset",
+          help_heading = "Output")]
+    pub(crate) verify: Option<VerifyArg>,
+
     /// Writes a copy of the run report OUT/report.json to FILE
     #[arg(long, value_name = "FILE", help_heading = "Reporting")]
     pub(crate) report: Option<PathBuf>,
@@ -159,6 +165,27 @@ pub(crate) struct ConvertArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) talk: TalkArgs,
+}
+
+/// What a new dataset is held against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum VerifyArg {
+    /// What its format promises
+    Dataset,
+    /// That, and every point of the scans
+    Scans,
+}
+
+impl VerifyArg {
+    /// What there is to say once nothing wrong was found.
+    pub(crate) const fn passed(self) -> &'static str {
+        match self {
+            Self::Dataset => "validated before it got its name: it keeps the promises of its format",
+            Self::Scans => {
+                "validated before it got its name: it keeps the promises of its format, and holds every point once"
+            }
+        }
+    }
 }
 
 /// What a conversion is good for.

@@ -21,7 +21,7 @@ pub(crate) use common::{InputArgs, ProgressArg, ReadingArgs, TalkArgs};
 pub(crate) use convert::{
     BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg, FaultArg,
     LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, ProfileArg, RgbDepthArg, SEED, SamplingArg, SplitArg,
-    TargetArg,
+    TargetArg, VerifyArg,
 };
 pub(crate) use export::ExportArgs;
 pub(crate) use manual::{CompletionsArgs, ManArgs};

@@ -11,6 +11,7 @@ use pointmill_format::bintree::{Layout, SplitRule};
 
 use super::page_file::PageFile;
 use super::report_file::ReportFile;
+use super::verify::verify;
 use crate::args::{
     Attributes, BROTLI_QUALITY, BatchesArgs, BintreeArgs, ConvertArgs, DarkColoursArg, DuplicatesArg, EncodingArg,
     FaultArg, LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg, SplitArg,
@@ -49,7 +50,9 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     });
     let report_file = report_file.transpose()?;
     let progress = Progress::new(&args.talk, Some(stop_flag()));
-    let result = pointmill_converter::convert(&plan, &targets, &progress);
+    let result = pointmill_converter::convert_verified(&plan, &targets, &progress, &|folder| {
+        args.verify.map_or(Ok(()), |how| verify(folder, how, &plan, &progress))
+    });
     no_more_checks();
     let for_people = progress.end();
     let report = result?;
@@ -58,6 +61,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let page = page.map_err(|failure| after_all(failure, &plan.output))?;
     if for_people {
         conversion::report(&report, &plan, args.talk.verbose).iter().for_each(|line| print_line(line));
+        args.verify.iter().for_each(|how| print_line(how.passed()));
         page.iter()
             .for_each(|file| print_line(&format!("{}: the page that shows it, from any web server", file.display())));
     }

@@ -10,5 +10,6 @@ mod page_file;
 pub(crate) mod preview;
 mod report_file;
 pub(crate) mod validate;
+mod verify;
 pub(crate) mod view;
 mod whole_file;

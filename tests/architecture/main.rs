@@ -38,7 +38,7 @@ const LAYERS: [(&str, Layers<'static>); 9] = [
             &["dataset", "camera", "check"],
             &["info"],
             &["nodes"],
-            &["decode", "sections", "select"],
+            &["decode", "detail", "sections", "select"],
             &["colours", "pick"],
             &["points"],
         ],

@@ -203,6 +203,7 @@ fn values_that_are_none() {
         ("convert~a.las~-o~o~--attributes~colour", 2, &["--attributes", "\"colour\"", "the inputs have", "intensity"]),
         ("convert~a.las~-o~o~--duplicates~some", 2, &["--duplicates 'some'", "keep, drop"]),
         ("convert~a.las~-o~o~--rgb-depth~12", 2, &["--rgb-depth '12'", "auto, 8, 16"]),
+        ("convert~a.las~-o~o~--verify=all", 2, &["--verify 'all'", "dataset, scans"]),
         ("convert~a.las~-o~o~--progress~dots", 2, &["--progress 'dots'", "auto, bar, json, none"]),
         ("convert~a.las~-o~o~--to~batches~--planes~15", 2, &["--planes '15'", "10, 20, 30 or auto"]),
         ("convert~a.las~-o~o~--to~batches~--lod-cell~0", 2, &["--lod-cell '0'"]),

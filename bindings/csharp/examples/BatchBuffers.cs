@@ -71,6 +71,19 @@ namespace Pointmill.Examples
             }
         }
 
+        /// <summary>Levels of detail of a batch that is dMin away which a compute shader would keep a point of: 0 to 4.</summary>
+        public int Levels(double dMin, float clod)
+        {
+            return Library.ClodLevels(dMin, clod, (float)dataset.Info.GridCell);
+        }
+
+        /// <summary>True if the shader keeps a point in the middle of the picture; level: the top byte of its colour word.</summary>
+        public bool Keeps(uint index, uint level, float distance, float clod)
+        {
+            float spacing = Library.ClodSpacing(distance, clod, 0);
+            return Library.ClodKeeps(level, Library.ClodWeight(index), (float)dataset.Info.GridCell, spacing);
+        }
+
         /// <summary>The batches in sight, the nearest first, and the bits that each needs: what a cull pass would find.</summary>
         public List<KeyValuePair<uint, uint>> Visible(Camera camera, ulong budget)
         {

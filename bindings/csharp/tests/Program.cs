@@ -1,5 +1,5 @@
 // Program walk PATH AXES: every figure of a dataset, line by line, as walk.c of the C interface prints it.
-// Program examples OCTREE BATCHES BLOCKS BINTREE, program mistakes DATASET FOREIGN: prints what is checked.
+// Program examples OCTREE BATCHES BLOCKS BINTREE, program surfels OCTREE AXES, program mistakes DATASET FOREIGN: prints what is checked.
 
 using System;
 using System.Collections.Generic;
@@ -284,6 +284,11 @@ internal static class Program
                     for (int i = 0; i < count; i++) sum += (uint)values[i];
                 });
             int visible = buffers.Visible(CameraOf(path, Axes.ZUp), ulong.MaxValue).Count;
+            // a point of level 1 with the weight 0.408 (index 1): half of the cells of level 0 to a quarter
+            Line("clod", (double)Library.ClodWeight(1), Library.ClodLevels(0, 1, 1), Library.ClodLevels(300, 1, 1),
+                Library.ClodLevels(1001, 1, 1), Library.ClodKeeps(1, Library.ClodWeight(1), 1, Library.ClodSpacing(100, 2, 0)) ? 1 : 0,
+                Library.ClodKeeps(1, Library.ClodWeight(1), 1, Library.ClodSpacing(200, 2, 0)) ? 1 : 0);
+            Line("kept", buffers.Levels(0, 1), buffers.Keeps(0, 0, 0, 1) ? 1 : 0, buffers.Keeps(0, 0, 1e9f, 1) ? 1 : 0);
             Line("batches", buffers.Batches, buffers.Points, buffers.Records().Length, words, sum, visible);
         }
     }
@@ -304,6 +309,26 @@ internal static class Program
                 Line("materials", leaves, tree.Far.Count, far, tree.Near.Count, near);
             }
             Line("pick", tree.Pick(camera.Eye, camera.Forward, 1.0).Found ? 1 : 0);
+        }
+    }
+
+    private static void ShowSurfels(string path, Axes axes)
+    {
+        using (SurfelBuffers surfels = new SurfelBuffers(path, axes))
+        {
+            foreach (uint id in surfels.Visible(CameraOf(path, axes), ulong.MaxValue))
+            {
+                SurfelNode node = surfels.Load(id);
+                Line("surfels", node.Count, surfels.HasNormals ? 1 : 0, surfels.HasRadii ? 1 : 0, node.Buffers.Count);
+                foreach (Surfel[] buffer in node.Buffers)
+                {
+                    Surfel s = buffer[buffer.Length - 1];
+                    double x = node.Place.X + s.X, y = node.Place.Y + s.Y, z = node.Place.Z + s.Z;
+                    Line("buffer", buffer.Length, Math.Round(x, 3), Math.Round(y, 3), Math.Round(z, 3), (double)s.NormalX,
+                        (double)s.NormalY, (double)s.NormalZ, (double)s.Radius, s.Red, s.Green, s.Blue, s.Alpha,
+                        System.Runtime.InteropServices.Marshal.SizeOf(typeof(Surfel)));
+                }
+            }
         }
     }
 
@@ -359,6 +384,9 @@ internal static class Program
                 ShowBatches(args[2]);
                 ShowBatches(args[3]);
                 ShowMaterials(args[4]);
+                return 0;
+            case "surfels":
+                ShowSurfels(args[1], (Axes)uint.Parse(args[2], CultureInfo.InvariantCulture));
                 return 0;
             default:
                 Mistakes(args[1], args[2]);

@@ -762,6 +762,38 @@ uint32_t pm_api_version(void);
 const char *pm_version(void);
 
 /*
+ Batches: the weight of the point with storage index `index` (PmBatchRecord::first_point plus its number in the batch), in
+ [0, 1): spreads the transition between levels. The same number as shaders compute. Any thread.
+ */
+float pm_clod_weight(uint32_t index);
+
+/*
+ Batches: the spacing that the picture wants of points at `distance` from the eye, world units. `clod`: the factor of the method;
+ 1 is fine, more is fewer points. `ndc_radius`: distance from the middle of the picture in normalised device coordinates, ≥ 0.
+ (Schütz, Krösl, Wimmer 2019.) Any thread.
+ */
+float pm_clod_spacing(float distance,
+                      float clod,
+                      float ndc_radius);
+
+/*
+ Batches: 1 if a point of level `level` (the top byte of its colour word) with that weight is drawn where the picture wants points
+ `spacing` apart, else 0. `cell`: PmInfo::grid_cell. Any thread.
+ */
+uint32_t pm_clod_keeps(uint32_t level,
+                       float weight,
+                       float cell,
+                       float spacing);
+
+/*
+ Batches: how many levels of a batch whose nearest point is `d_min` away (PmDraw::d_min) the picture can show, 0 to 4: points of
+ the others need not be loaded. `clod` and `cell` as above. Any thread.
+ */
+uint32_t pm_clod_levels(double d_min,
+                        float clod,
+                        float cell);
+
+/*
  What is known of the dataset without reading points.
 
  `*info` is overwritten. Any thread.

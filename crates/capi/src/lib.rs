@@ -18,6 +18,7 @@ mod check;
 mod colours;
 mod dataset;
 mod decode;
+mod detail;
 mod info;
 mod nodes;
 mod octree;
@@ -33,6 +34,7 @@ pub use axes::PmAxes;
 pub use camera::PmCamera;
 pub use check::{PmValidation, pm_validate};
 pub use dataset::{PM_NO_NODE, PmDataset, pm_api_version, pm_close, pm_open, pm_version};
+pub use detail::{pm_clod_keeps, pm_clod_levels, pm_clod_spacing, pm_clod_weight};
 pub use info::{PmAttribute, PmBox, PmInfo, PmKind, PmType, pm_attribute, pm_format, pm_info, pm_projection};
 pub use nodes::{
     PM_NODE_DRAWABLE, PM_NODE_LEAF, PM_NODE_PROXY, PmNode, pm_children, pm_distances, pm_load, pm_load_all, pm_node,

@@ -1,5 +1,6 @@
 //! A run, all passes in order.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -20,7 +21,23 @@ use crate::warning::Warning;
 /// # Errors
 /// See [`ConvertError`]; the output folder is then as it was before.
 pub fn convert(plan: &Plan, targets: &[Target], events: &dyn Events) -> Result<Report, ConvertError> {
-    convert_on(Arc::new(SystemDisk), plan, targets, events)
+    run(Arc::new(SystemDisk), plan, targets, events, &|_| Ok(()))
+}
+
+/// Looks at the folder that is about to become the output, complete but for its name, and refuses it with an error.
+pub type Verify<'a> = dyn Fn(&Path) -> Result<(), ConvertError> + 'a;
+
+/// [`convert`], but the output appears only if `verify` accepts it.
+///
+/// # Errors
+/// As [`convert`], and that of `verify`; the output folder is then as it was before.
+pub fn convert_verified(
+    plan: &Plan,
+    targets: &[Target],
+    events: &dyn Events,
+    verify: &Verify<'_>,
+) -> Result<Report, ConvertError> {
+    run(Arc::new(SystemDisk), plan, targets, events, verify)
 }
 
 /// [`convert`] on another disk, such as one that fails.
@@ -33,6 +50,16 @@ pub fn convert_on(
     targets: &[Target],
     events: &dyn Events,
 ) -> Result<Report, ConvertError> {
+    run(disk, plan, targets, events, &|_| Ok(()))
+}
+
+fn run(
+    disk: Arc<dyn Disk>,
+    plan: &Plan,
+    targets: &[Target],
+    events: &dyn Events,
+    verify: &Verify<'_>,
+) -> Result<Report, ConvertError> {
     let mut clock = Clock::start(events);
     clock.begin(Phase::Probe, plan.inputs.len() as u64);
     outputs::check(plan, targets)?;
@@ -40,6 +67,7 @@ pub fn convert_on(
     staged.warnings.iter().for_each(|w| events.warning(w));
     events.works_in(staged.path());
     let written = write(plan, targets, events, &staged, disk, &mut clock);
+    let written = written.and_then(|report| verify(&staged.path_of_new()).map(|()| report));
     events.settling();
     match written {
         Ok(mut report) => {

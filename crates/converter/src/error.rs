@@ -45,6 +45,13 @@ pub enum ConvertError {
         /// What needs them.
         why: MemoryNeed,
     },
+    /// What was made was looked at before it got its name, and refused.
+    Refused {
+        /// The output.
+        output: PathBuf,
+        /// Why.
+        why: String,
+    },
     /// The run was asked to stop.
     Interrupted,
     /// A promise of our own code did not hold.
@@ -255,6 +262,9 @@ impl ConvertError {
             Self::Memory { ceiling, why, .. } => {
                 format!("the memory ceiling of {} is too small: {why}", amount(*ceiling))
             }
+            Self::Refused { output, why } => {
+                format!("{}: the new dataset is not valid and was not kept: {why}", output.display())
+            }
             Self::Interrupted => "interrupted; nothing was written".to_owned(),
             Self::Internal(what) => {
                 format!("internal fault: {what}; please report it with the command line and the input")
@@ -277,7 +287,7 @@ impl ConvertError {
                 _ => None,
             },
             Self::Memory { needed, .. } => Some(Advice::RaiseMemory { mib: (needed >> 20) + 1 }),
-            Self::Read(_) | Self::Plan(_) | Self::Interrupted | Self::Internal(_) => None,
+            Self::Read(_) | Self::Plan(_) | Self::Refused { .. } | Self::Interrupted | Self::Internal(_) => None,
         }
     }
 }

@@ -50,7 +50,7 @@ mod sources;
 mod warning;
 
 pub use advice::Advice;
-pub use convert::{convert, convert_on};
+pub use convert::{Verify, convert, convert_on, convert_verified};
 pub use error::{ConvertError, InputFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
 pub use export::{ExportReport, ExportedAttribute, ExportedPoints, PositionChange, export, export_on};

@@ -3,18 +3,19 @@
 import { Camera, VIEWS } from "pm/camera.js";
 import { Loader } from "pm/clouds/loader.js";
 import { openCloud } from "pm/clouds/open.js";
-import { Controls, onPlane } from "pm/controls.js";
+import { shares } from "pm/clouds/units.js";
+import * as clipping from "pm/clip.js";
+import { Controls } from "pm/controls.js";
+import { Cursor } from "pm/cursor.js";
 import { open as openContext } from "pm/gl/context.js";
-import { GRADIENTS } from "pm/gl/palettes.js";
-import { ELSEWHERE, Renderer } from "pm/gl/renderer.js";
+import { ELSEWHERE, Renderer, attributeOf, colouringBy, isApart } from "pm/gl/renderer.js";
 import { distance, union } from "pm/math.js";
+import { recoverWhenLost } from "pm/recover.js";
 import * as link from "pm/ui/link.js";
 import { Measure } from "pm/ui/measure.js";
 import { Panel } from "pm/ui/panel.js";
 import { PointBox } from "pm/ui/point.js";
 
-/** Milliseconds that the cursor rests before the point under it is looked up. */
-const HOVER_MS = 120;
 const FEW_POINTS = 10_000;
 
 export class App {
@@ -28,10 +29,13 @@ export class App {
     this.loader = new Loader(
       () => this.touch(),
       (error) => messages.fail(error.message),
+      (error) => messages.remove(error.message),
     );
     this.pointBox = new PointBox(document.getElementById("point"));
     this.measure = new Measure(this, document.getElementById("overlay"));
-    this.canvas.addEventListener("webglcontextlost", () => messages.fail("The graphics card gave up the picture: load the page again, with fewer points."));
+    this.cursor = new Cursor(this);
+    this.address = new link.Address(this);
+    recoverWhenLost(this);
     new ResizeObserver(() => this.resize()).observe(this.canvas);
     this.resize();
   }
@@ -56,37 +60,49 @@ export class App {
     for (const cloud of clouds) cloud.hasClasses = cloud.scene.attributes.some(({ name }) => name === "classification");
     this.#controls();
     this.camera.fit(this.box, VIEWS.fit);
-    this.#restore();
-    this.panel = new Panel(document.getElementById("panel"), this);
-    this.setColour(this.renderer.settings.colour);
+    this.#restore(this.#usualColour());
+    // a link that is pasted into the same tab
+    addEventListener("hashchange", () => this.#restore(this.renderer.settings.colour));
     requestAnimationFrame((time) => this.#loop(time));
   }
 
   #controls() {
+    const { cursor } = this;
     this.controls = new Controls(this.canvas, this.camera, {
-      change: () => this.touch(),
-      rest: () => this.#rest(),
-      click: (x, y) => this.#click(x, y),
-      hover: (x, y) => this.#hover(x, y),
-      goTo: (x, y) => this.#goTo(x, y),
-      under: (x, y) => this.#under(x, y),
-      least: () => Math.max(distance(this.box.min, this.box.max) * 1e-9, 1e-6),
+      change: () => {
+        cursor.leave();
+        this.touch();
+      },
+      rest: () => this.address.rest(),
+      click: (x, y, isTold) => cursor.click(x, y, isTold),
+      hover: (x, y) => cursor.hover(x, y),
+      leave: () => cursor.leave(),
+      goTo: (x, y) => cursor.goTo(x, y),
+      hit: (x, y) => cursor.hit(x, y),
+      least: () => this.leastReach,
       most: () => Math.max(distance(this.box.min, this.box.max) * 1e3, 1),
       pace: () => Math.max(distance(this.box.min, this.box.max) / 10, 1e-3),
       key: (key) => this.#key(key),
     });
   }
 
-  #restore() {
-    const { eye, target, fov, budget, ...settings } = link.read(location.hash);
-    if (eye && target && distance(eye, target) > 0) Object.assign(this.camera, { eye, target });
-    if (fov) this.camera.fov = fov;
-    if (budget) this.budget = budget;
-    if (settings.gradient && !GRADIENTS.includes(settings.gradient)) delete settings.gradient;
-    Object.assign(this.renderer.settings, settings);
-    if (!settings.colour) this.renderer.settings.colour = this.#usualColour();
-    this.renderer.setTables();
-    this.camera.update();
+  /** World units between eye and target, at least: what doubles tell apart. */
+  get leastReach() {
+    return Math.max(distance(this.box.min, this.box.max) * 1e-9, 1e-6);
+  }
+
+  /** What the address says; `colour` where it says none. */
+  #restore(colour) {
+    this.renderer.settings.colour = colour;
+    this.showPanel(link.apply(this, location.hash));
+  }
+
+  /** The settings as they are, after more than one of them has changed. */
+  showPanel(range) {
+    this.panel = new Panel(document.getElementById("panel"), this);
+    this.classCount = undefined;
+    this.setColour(this.renderer.settings.colour);
+    if (range) this.chooseRange(range);
   }
 
   /** Coloured by what there is. */
@@ -114,38 +130,49 @@ export class App {
     this.isDirty = true;
   }
 
+  /** A view was chosen: draws it, and the address gets it. */
+  changed() {
+    this.touch();
+    this.address.rest();
+  }
+
   #loop(time) {
-    if (this.controls.fly(Math.min((time - (this.time ?? time)) / 1000, 0.2))) this.touch();
-    this.time = time;
-    if (this.isDirty) {
-      this.isDirty = false;
-      this.frame();
+    try {
+      if (this.controls.fly(Math.min((time - (this.time ?? time)) / 1000, 0.2))) this.touch();
+      this.time = time;
+      if (this.isDirty && !this.isLost) {
+        this.isDirty = false;
+        this.frame();
+      }
+    } catch (error) {
+      this.messages.fail(`The picture cannot be drawn: ${error.message}`);
+      console.error(error); // where it was
+    } finally {
+      requestAnimationFrame((next) => this.#loop(next)); // one picture that fails is not the last
     }
-    requestAnimationFrame((next) => this.#loop(next));
   }
 
   /** One picture. */
   frame() {
     const shown = this.clouds.filter((cloud) => cloud.isShown);
     this.camera.setRange(shown.map((cloud) => cloud.box));
-    const each = Math.floor(this.budget / Math.max(shown.length, 1));
-    for (const cloud of shown) cloud.update(this.camera, each, this.loader);
+    const points = shares(shown, this.budget);
+    for (const cloud of shown) cloud.update(this.camera, points.get(cloud), this.loader);
     this.#newExtras(shown);
     this.#legend();
     this.renderer.draw(shown, this.camera);
     this.measure.draw();
     this.frames++;
-    const points = shown.reduce((sum, cloud) => sum + cloud.shown, 0);
-    if (points > 0) this.firstPicture ??= performance.now();
+    const drawn = shown.reduce((sum, cloud) => sum + cloud.shown, 0);
+    if (drawn > 0) this.firstPicture ??= performance.now();
     const isLoading = shown.some((cloud) => cloud.isLoading);
     this.isIdle = !isLoading && this.loader.running === 0;
-    this.status.textContent = `${points.toLocaleString("en")} points${isLoading ? " …" : ""}`;
+    this.status.textContent = `${drawn.toLocaleString("en")} points${isLoading ? " …" : ""}`;
   }
 
   /** The range of another attribute grows with what is loaded, unless the dataset says it. */
   #newExtras(shown) {
-    const { colour } = this.renderer.settings;
-    if (ELSEWHERE.includes(colour) || this.isRangeKnown) return;
+    if (this.isRangeKnown) return;
     let [low, high] = [Infinity, -Infinity];
     for (const cloud of shown) {
       for (const { block } of cloud.draws(this.camera)) {
@@ -170,49 +197,58 @@ export class App {
   change(settings) {
     Object.assign(this.renderer.settings, settings);
     if (settings.gradient) this.renderer.setTables();
-    this.touch();
-    this.#rest();
+    this.changed();
   }
 
   each(kind, fields) {
     for (const cloud of this.clouds) if (cloud.scene.kind === kind) Object.assign(cloud, fields);
-    this.touch();
+    this.changed();
   }
 
   setBudget(points) {
     this.budget = points;
-    this.touch();
-    this.#rest();
+    this.changed();
   }
 
   setFov(degrees) {
     this.camera.fov = degrees;
     this.camera.update();
-    this.touch();
+    this.changed();
   }
 
   setColour(wanted) {
     const names = new Set(this.clouds.flatMap((cloud) => cloud.scene.attributes.map((each) => each.name)));
-    const needs = { class: "classification", intensity: "intensity" }[wanted];
-    const isKnown = needs ? names.has(needs) : ELSEWHERE.includes(wanted) || names.has(wanted);
-    const name = isKnown ? wanted : this.#usualColour();
+    const needs = { class: "classification", intensity: "intensity" };
+    const other = attributeOf(wanted) ?? wanted;
+    let name = this.#usualColour();
+    if (wanted in needs ? names.has(needs[wanted]) : ELSEWHERE.includes(wanted)) name = wanted;
+    else if (names.has(other)) name = colouringBy(other);
     this.renderer.settings.colour = name;
-    const attribute = ELSEWHERE.includes(name) ? undefined : name;
+    const chosen = ELSEWHERE.includes(name) ? name : "attribute";
     const found = this.clouds.flatMap((cloud) => {
-      const own = cloud.scene.attributes.find((each) => each.name === (name === "class" ? "classification" : name));
+      const mode = this.renderer.modeOf(cloud.scene);
+      const shown = { attribute: attributeOf(name), class: "classification", intensity: "intensity" }[mode];
+      const own = cloud.scene.attributes.find((each) => each.name === shown);
       cloud.extraBase = own?.min?.[0] ?? 0;
-      // batches have neither intensities nor classes beside their colours
-      const isApart = cloud.scene.kind === "batches" && own && (name === "intensity" || name === "class");
-      cloud.setAttribute((attribute && own) || isApart ? own.name : undefined);
-      return own?.min && own?.max ? [[own.min[0], own.max[0]]] : [];
+      cloud.setAttribute(own && isApart(cloud.scene, mode) ? own.name : undefined);
+      return mode === chosen && own?.min && own?.max ? [[own.min[0], own.max[0]]] : [];
     });
-    this.isRangeKnown = found.length > 0 || name === "height";
+    this.isRangeKnown = found.length > 0 || !["intensity", "attribute"].includes(chosen);
+    this.isRangeChosen = false;
     if (name === "height") this.#setRange([this.box.min[2], this.box.max[2]]);
     else if (found.length > 0) this.#setRange([Math.min(...found.map((r) => r[0])), Math.max(...found.map((r) => r[1]))]);
     this.panel.colour.set(name);
     this.panel.ramp.hidden = ["rgb", "class", "level", "one"].includes(name);
-    this.touch();
-    this.#rest();
+    this.panel.setFilter(this.clouds.some((cloud) => this.renderer.knowsClasses(cloud)));
+    this.changed();
+  }
+
+  /** A range that was typed: it stays, whatever is loaded. */
+  chooseRange(range) {
+    this.isRangeKnown = true;
+    this.isRangeChosen = true;
+    this.#setRange(range);
+    this.changed();
   }
 
   #setRange(range) {
@@ -232,137 +268,64 @@ export class App {
     if (isShown) hidden.delete(number);
     else hidden.add(number);
     this.renderer.setTables();
-    this.touch();
+    this.changed();
   }
 
   show(cloud, isShown) {
     cloud.isShown = isShown;
-    this.touch();
+    if (!isShown) cloud.forget(0); // but for what was drawn last
+    this.changed();
   }
 
   look(name) {
     this.camera.fit(this.box, VIEWS[name]);
-    this.touch();
-    this.#rest();
+    this.cursor.leave();
+    this.changed();
   }
 
   fit(box) {
     this.camera.fit(box);
-    this.touch();
-    this.#rest();
+    this.changed();
   }
 
   setFlying(isFlying) {
-    this.controls.isFlying = isFlying;
+    this.controls.setFlying(isFlying);
     this.panel.fly.setAttribute("aria-pressed", String(isFlying));
     this.canvas.focus();
   }
 
+  /** The box outside of which nothing is drawn; without one, everything is. */
+  setClipBox(box) {
+    if (box) this.clipBox = box;
+    this.change({ clip: box ? clipping.drawn(box, this.box) : null });
+  }
+
   setClipping(isOn) {
-    this.clipBox ??= { min: [...this.box.min], max: [...this.box.max] };
-    this.change({ clip: isOn ? this.clipBox : null });
+    this.setClipBox(isOn ? (this.clipBox ?? clipping.copy(this.box)) : null);
   }
 
   setClip(end, axis, value) {
-    this.clipBox ??= { min: [...this.box.min], max: [...this.box.max] };
-    this.clipBox[end][axis] = value;
+    const box = clipping.copy(this.clipBox ?? this.box);
+    box[end][axis] = value;
     this.panel.clip.set(true);
-    this.change({ clip: this.clipBox });
+    this.setClipBox(box);
   }
 
   #key(key) {
     const names = { t: "top", n: "north", s: "south", e: "east", w: "west", f: "fit" };
     if (names[key]) this.look(names[key]);
+    else if (key === "enter") this.cursor.click(this.camera.width / 2, this.camera.height / 2, true);
     else if (key === "m") this.measure.toggle();
     else if (key === "b") this.change({ boxes: !this.renderer.settings.boxes });
     else if (key === "escape") this.measure.clear();
   }
 
-  /** What is drawn at a pixel: the cloud, its unit and the number of the point in it. */
   pick(x, y) {
-    const shown = this.clouds.filter((cloud) => cloud.isShown);
-    const found = this.renderer.pick(shown, this.camera, x, y);
-    const at = found?.cloud?.unitOf(found.number, found.index);
-    return at && { cloud: found.cloud, ...at };
+    return this.cursor.pick(x, y);
   }
 
-  /** Everything that is stored of the point at a pixel. */
-  async pointAt(x, y) {
-    const found = this.pick(x, y);
-    if (!found) return null;
-    const point = await found.cloud.source.point(found.unit, found.index);
-    return { scene: found.cloud.scene, point };
-  }
-
-  #hover(x, y) {
-    clearTimeout(this.hovering);
-    this.hovering = setTimeout(async () => {
-      const turn = (this.hoverTurn = (this.hoverTurn ?? 0) + 1);
-      try {
-        const found = await this.pointAt(x, y);
-        if (turn !== this.hoverTurn) return;
-        if (found) this.pointBox.show(found.scene, found.point);
-        else this.pointBox.hide();
-      } catch (error) {
-        this.messages.fail(error.message);
-      }
-    }, HOVER_MS);
-  }
-
-  async #click(x, y) {
-    if (!this.measure.isOn) return;
-    try {
-      const found = await this.pointAt(x, y);
-      if (found) this.measure.add(found.point.position);
-    } catch (error) {
-      this.messages.fail(error.message);
-    }
-  }
-
-  async #goTo(x, y) {
-    const found = await this.pointAt(x, y).catch(() => null);
-    if (!found) return;
-    const { camera } = this;
-    const reach = distance(camera.eye, camera.target) / 3;
-    camera.target = found.point.position;
-    camera.eye = camera.target.map((v, a) => v + camera.back[a] * reach);
-    camera.update();
-    this.touch();
-    this.#rest();
-  }
-
-  /** The place that the wheel comes nearer to: on the plane through the target, under the cursor. */
-  #under(x, y) {
-    return onPlane(this.camera, this.camera.ray(x, y), this.camera.target);
-  }
-
-  /** After a change: the address gets the view, once it rests. */
-  #rest() {
-    clearTimeout(this.resting);
-    this.resting = setTimeout(() => {
-      try {
-        history.replaceState(null, "", link.write(this));
-      } catch {
-        // browsers limit how often; the next change tries again
-      }
-    }, 300);
-  }
-
-  async copyLink() {
-    history.replaceState(null, "", link.write(this));
-    await navigator.clipboard?.writeText(location.href).catch(() => undefined);
-    this.messages.note(`Link: ${location.href}`);
-  }
-
-  savePicture() {
-    this.frame(); // what is on the canvas is gone after the frame
-    this.canvas.toBlob((blob) => {
-      const a = document.createElement("a");
-      a.href = URL.createObjectURL(blob);
-      a.download = `${this.clouds[0]?.scene.name ?? "pointmill"}.png`;
-      a.click();
-      setTimeout(() => URL.revokeObjectURL(a.href), 1000);
-    }, "image/png");
+  pointAt(x, y) {
+    return this.cursor.pointAt(x, y);
   }
 
   systems() {
@@ -371,7 +334,8 @@ export class App {
 
   /** For tests: what is on the screen, and what it took. */
   stats() {
-    const entries = performance.getEntriesByType("resource");
+    // until there was a picture
+    const entries = performance.getEntriesByType("resource").filter((entry) => entry.responseEnd <= (this.firstPicture ?? Infinity));
     return {
       points: this.clouds.reduce((sum, cloud) => sum + cloud.shown, 0),
       firstPicture: this.firstPicture,

@@ -1,10 +1,24 @@
 // Orbit, pan and zoom as in Potree: left button turns, right button (or with Shift) moves, the wheel comes nearer to what is under the
-// cursor, a double click goes there. Fly: W A S D, Q and E, the mouse looks. One finger turns, two move and zoom.
+// cursor, a double click goes there. Fly: W A S D, Q and E, the mouse looks. One finger turns, two move and zoom. By keys: arrows turn,
+// with Shift they move, + and - zoom.
 
 import { add, clamp, distance, dot, scale, sub, unit } from "pm/math.js";
 
 /** Angle, radians, below which the eye does not come to the vertical. */
 const UPRIGHT = 0.01;
+/** Pixels of the style sheet that a click may move; a finger rolls. */
+const CLICK_MOVES = { mouse: 5, other: 10 };
+/** Milliseconds and pixels of the style sheet: a wheel that rests, or a cursor that moves as far, begins a new gesture. */
+const GESTURE_MS = 300;
+const GESTURE_PIXELS = 5;
+/** Within a gesture the place is looked for again when it is this much nearer: what is there is seen better then. */
+const GESTURE_NEARER = 4;
+/** Times as far as that place: behind it. */
+const BEHIND = 1.5;
+/** Pixels of the style sheet that an arrow key turns or moves by, and the notches of the keys + and -. */
+const KEY_PIXELS = 40;
+const KEY_NOTCHES = 1;
+const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, -1], arrowdown: [0, 1] };
 
 export class Controls {
   constructor(canvas, camera, actions) {
@@ -19,7 +33,21 @@ export class Controls {
     on("dblclick", (event) => actions.goTo(...this.#pixel(event)));
     on("keydown", (event) => this.#key(event, true));
     on("keyup", (event) => this.#key(event, false));
-    on("blur", () => this.keys.clear());
+    on("pointerleave", (event) => event.pointerType === "mouse" && actions.leave());
+    on("blur", () => {
+      this.keys.clear();
+      this.#isPointed(false);
+    });
+  }
+
+  /** Pixels of the picture per pixel of the style sheet. */
+  get #density() {
+    return this.camera.height / Math.max(this.canvas.clientHeight, 1);
+  }
+
+  setFlying(isFlying) {
+    this.isFlying = isFlying;
+    this.keys.clear();
   }
 
   #pixel(event) {
@@ -28,7 +56,13 @@ export class Controls {
     return [(event.clientX - rect.left) * ratio, (event.clientY - rect.top) * ratio];
   }
 
+  /** For the style: frame and cross are for those who use keys, and browsers show the frame after `focus()`, too. */
+  #isPointed(isPointed) {
+    this.canvas.classList.toggle("pointed", isPointed);
+  }
+
   #down(event) {
+    this.#isPointed(true);
     this.canvas.focus();
     try {
       this.canvas.setPointerCapture(event.pointerId);
@@ -40,9 +74,12 @@ export class Controls {
   }
 
   #up(event) {
-    const wasClick = this.pointers.size === 1 && this.travelled < 5 && event.type === "pointerup" && event.button === 0;
+    const isMouse = event.pointerType === "mouse";
+    const isStill = this.travelled / this.#density < (isMouse ? CLICK_MOVES.mouse : CLICK_MOVES.other);
+    const wasClick = this.pointers.size === 1 && isStill && event.type === "pointerup" && event.button === 0;
     this.pointers.delete(event.pointerId);
-    if (wasClick) this.actions.click(...this.#pixel(event));
+    // a finger has no way to rest above a point: a tap asks for it
+    if (wasClick) this.actions.click(...this.#pixel(event), !isMouse);
     this.actions.rest();
   }
 
@@ -93,11 +130,16 @@ export class Controls {
     camera.update();
   }
 
-  /** Towards a place, which keeps its pixel; a factor below 1 comes nearer. */
+  /**
+   * Towards a place, which keeps its pixel; a factor below 1 comes nearer. The target comes to the depth of the place, so that
+   * nearness is never used up while the place is still far.
+   */
   zoom(factor, place = this.camera.target) {
     const { camera } = this;
-    const reach = distance(camera.eye, camera.target) * factor;
-    if (!(reach > this.actions.least() && reach < this.actions.most())) return;
+    const reach = -dot(sub(place, camera.eye), camera.back) * factor;
+    const isTooNear = !(reach > this.actions.least()) && factor < 1;
+    const isTooFar = !(reach < this.actions.most()) && factor > 1;
+    if (isTooNear || isTooFar || !(reach > 0)) return;
     camera.eye = add(place, scale(sub(camera.eye, place), factor));
     camera.target = sub(camera.eye, scale(camera.back, reach));
     camera.update();
@@ -107,20 +149,67 @@ export class Controls {
     event.preventDefault();
     const notches = clamp(event.deltaY / (event.deltaMode === 1 ? 3 : 100), -3, 3);
     if (this.isFlying) this.speed *= 1.2 ** -notches;
-    else this.zoom(1.15 ** notches, this.actions.under(...this.#pixel(event)));
+    else this.zoom(1.15 ** notches, this.#place(...this.#pixel(event)));
     this.actions.change();
     this.actions.rest();
   }
 
+  /** Where the wheel leads to. It is looked up once per gesture: looking costs a drawing of all points. */
+  #place(x, y) {
+    const { camera, gesture } = this;
+    const now = performance.now();
+    const isHeld = gesture && this.#isUnder(gesture, x, y);
+    const isNear = isHeld && distance(camera.eye, gesture.place) * GESTURE_NEARER < gesture.away;
+    const isSame = isHeld && !isNear && now - gesture.time < GESTURE_MS;
+    if (isSame) {
+      gesture.time = now;
+      return gesture.place;
+    }
+    const away = (to) => distance(camera.eye, to);
+    const hit = this.actions.hit(x, y);
+    // points grow apart: between them, and what is far behind, on to where it led before
+    const isThrough = isHeld && (!hit || away(hit) > BEHIND * away(gesture.place));
+    const place = isThrough ? gesture.place : (hit ?? onPlane(camera, camera.ray(x, y), camera.target));
+    this.gesture = { x, y, place, time: now, away: away(place) };
+    return place;
+  }
+
+  /** Whether the cursor is where it was, and the place still under it and not too near to be drawn. */
+  #isUnder({ place, x: atX, y: atY }, x, y) {
+    const { camera } = this;
+    const pixel = camera.project(place);
+    const most = GESTURE_PIXELS * this.#density;
+    return pixel !== null && pixel[2] > camera.near && Math.hypot(pixel[0] - x, pixel[1] - y) < most && Math.hypot(atX - x, atY - y) < most;
+  }
+
   #key(event, isDown) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const key = event.key.toLowerCase();
+    // also with Ctrl, or after the flight: a key whose release is missed would fly for ever
+    if (!isDown) {
+      if (this.keys.delete(key)) this.actions.rest();
+      return;
+    }
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (this.isFlying && "wasdqe".includes(key) && key.length === 1) {
-      if (isDown) this.keys.add(key);
-      else this.keys.delete(key);
+      this.keys.add(key);
       this.actions.change();
       event.preventDefault();
-    } else if (isDown) this.actions.key(key);
+    } else if (this.#steer(key, event.shiftKey)) {
+      event.preventDefault();
+      this.#isPointed(false);
+      this.actions.change();
+      this.actions.rest();
+    } else if (!event.repeat) this.actions.key(key);
+  }
+
+  /** Turns, moves or zooms by a key; false if it is none of these. */
+  #steer(key, isShifted) {
+    const [dx, dy] = (ARROWS[key] ?? [0, 0]).map((v) => v * KEY_PIXELS * this.#density);
+    if (key in ARROWS) this[isShifted ? "pan" : "turn"](dx, dy);
+    else if (key === "+" || key === "=") this.zoom(1.15 ** -KEY_NOTCHES);
+    else if (key === "-") this.zoom(1.15 ** KEY_NOTCHES);
+    else return false;
+    return true;
   }
 
   /** Moves on while keys of flying are held; true if the picture changed. */

@@ -4,8 +4,11 @@ import { App } from "pm/app.js";
 import { Messages } from "pm/ui/messages.js";
 import { ServerSource } from "pm/sources/server.js";
 
-performance.setResourceTimingBufferSize(100_000); // browsers remember 250 requests; `App.stats` counts them
+document.getElementById("start").remove(); // modules run: what it explains did not happen
 const messages = new Messages(document.getElementById("messages"));
+// without an exception of ours it is a remark of the browser
+window.addEventListener("error", (event) => event.error && messages.fail(`The page failed: ${event.message}`));
+window.addEventListener("unhandledrejection", (event) => messages.fail(`The page failed: ${event.reason?.message ?? event.reason}`));
 
 async function sources(config) {
   if (config.mode === "server") return config.scenes.map((base) => new ServerSource(base));

@@ -5,6 +5,7 @@ mod compiler;
 mod csharp;
 mod dataset;
 mod expected;
+mod surfels;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -35,6 +35,13 @@ fn head(section: &[u8]) -> Option<(u32, u32)> {
     Some((u32::from_le_bytes(*per_block), u32::from_le_bytes(*blocks)))
 }
 
+/// The table of a section that was checked: all of it that is before the first block.
+#[cfg(feature = "zstd")]
+pub(super) fn table(section: &[u8]) -> &[u8] {
+    let end = entry(section, 0).and_then(|end| usize::try_from(end).ok());
+    end.and_then(|end| section.get(..end)).unwrap_or(&[])
+}
+
 /// Where entry `i` of the table says that block `i` begins.
 fn entry(section: &[u8], i: u32) -> Option<u64> {
     let at = 8 + 8 * i as usize;
@@ -65,10 +72,14 @@ pub(super) fn check_table(section: &[u8], batches: u32) -> Result<u64, String> {
 }
 
 #[cfg(feature = "zstd")]
+pub(super) use zstd_blocks::Blocks;
+#[cfg(feature = "zstd")]
 pub use zstd_blocks::DEFAULT_BATCHES_PER_BLOCK;
 
 #[cfg(feature = "zstd")]
 mod zstd_blocks {
+    use std::ops::Range;
+
     use super::super::{BATCH_POINTS, Part};
     use super::{BlockScratch, FileId, entry, head};
 
@@ -82,27 +93,42 @@ mod zstd_blocks {
     /// The largest block that is decompressed: 256 batches of 200 bytes a point.
     const MAX_BLOCK_BYTES: u64 = 512 << 20;
 
+    /// The blocks of a section that was checked.
+    #[derive(Debug, Clone, Copy)]
+    pub(in super::super) struct Blocks<'a> {
+        /// The section, or its table alone.
+        pub(in super::super) table: &'a [u8],
+        pub(in super::super) file: FileId,
+        pub(in super::super) part: Part,
+        /// Bytes per point.
+        pub(in super::super) size: usize,
+        /// Of the file.
+        pub(in super::super) points: u64,
+    }
+
     impl BlockScratch {
-        /// The raw bytes of `slot`, out of a checked compressed `section` with `size` bytes per point; the pair says which
-        /// section it is.
+        /// The raw bytes of `slot`; `frame` gives the bytes of the section that it is asked for, unless its block is here.
         ///
-        /// On failure: where in the section, and what.
-        pub(in super::super) fn batch(
+        /// On failure: what `frame` says, or `broken` makes of where in the section it is and what.
+        pub(in super::super) fn batch<F: AsRef<[u8]>, E>(
             &mut self,
-            section: &[u8],
-            (file, part): (FileId, Part),
-            size: usize,
+            blocks: Blocks<'_>,
             slot: u32,
-            points: u64,
-        ) -> Result<&[u8], (u64, String)> {
-            let (per_block, _) = head(section).filter(|(k, _)| *k > 0).ok_or((0, "has no block table".to_owned()))?;
+            frame: impl FnOnce(Range<u64>) -> Result<F, E>,
+            broken: impl Fn(u64, String) -> E,
+        ) -> Result<&[u8], E> {
+            let Blocks { table, file, part, size, points } = blocks;
+            let no_table = || broken(0, "has no block table".to_owned());
+            let (per_block, _) = head(table).filter(|(k, _)| *k > 0).ok_or_else(no_table)?;
             let block = slot / per_block;
             if self.block != Some((file, part, block)) {
                 self.block = None;
                 let first = u64::from(block * per_block) * u64::from(BATCH_POINTS);
                 let full = u64::from(per_block) * u64::from(BATCH_POINTS);
                 let raw = points.saturating_sub(first).min(full) * size as u64;
-                self.decompress(section, block, raw)?;
+                let (start, end) = entry(table, block).zip(entry(table, block + 1)).ok_or_else(no_table)?;
+                let found = self.decompress(frame(start..end)?.as_ref(), raw);
+                found.map_err(|what| broken(start, format!("block {block} {what}")))?;
                 self.block = Some((file, part, block));
             }
             let batch = BATCH_POINTS as usize * size;
@@ -111,28 +137,25 @@ mod zstd_blocks {
             Ok(&bytes[start..(start + batch).min(bytes.len())])
         }
 
-        fn decompress(&mut self, section: &[u8], block: u32, raw: u64) -> Result<(), (u64, String)> {
-            let ends = entry(section, block).zip(entry(section, block + 1));
-            let (start, end) = ends.ok_or((0, "has no block table".to_owned()))?;
-            let broken = |what: String| (start, format!("block {block} {what}"));
-            let frame = section.get(start as usize..end as usize).unwrap_or(&[]);
+        /// On failure: what the block does.
+        fn decompress(&mut self, frame: &[u8], raw: u64) -> Result<(), String> {
             let declared = zstd::zstd_safe::get_frame_content_size(frame).ok().flatten();
             if declared != Some(raw) {
                 let declared = declared.map_or("nothing".to_owned(), |t| t.to_string());
-                return Err(broken(format!("is no zstd frame of {raw} bytes: its header declares {declared}")));
+                return Err(format!("is no zstd frame of {raw} bytes: its header declares {declared}"));
             }
             if raw > (frame.len() as u64).saturating_mul(MAX_RATIO) {
-                return Err(broken(format!("claims {raw} bytes, more than {} compressed bytes can hold", frame.len())));
+                return Err(format!("claims {raw} bytes, more than {} compressed bytes can hold", frame.len()));
             }
             if raw > MAX_BLOCK_BYTES {
-                return Err(broken(format!("has {raw} bytes, at most {MAX_BLOCK_BYTES} are decompressed at once")));
+                return Err(format!("has {raw} bytes, at most {MAX_BLOCK_BYTES} are decompressed at once"));
             }
             let fits = usize::try_from(raw).ok().filter(|len| self.bytes.try_resize(*len).is_ok());
-            fits.ok_or_else(|| broken(format!("has {raw} bytes, which do not fit memory")))?;
+            fits.ok_or_else(|| format!("has {raw} bytes, which do not fit memory"))?;
             match zstd::bulk::decompress_to_buffer(frame, self.bytes.as_mut()) {
                 Ok(len) if len as u64 == raw => Ok(()),
-                Ok(len) => Err(broken(format!("decompresses to {len} bytes, not {raw}"))),
-                Err(e) => Err(broken(format!("does not decompress: {e}"))),
+                Ok(len) => Err(format!("decompresses to {len} bytes, not {raw}")),
+                Err(e) => Err(format!("does not decompress: {e}")),
             }
         }
     }

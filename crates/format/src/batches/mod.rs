@@ -38,6 +38,8 @@ mod clod;
 mod colour;
 #[cfg(feature = "zstd")]
 mod compress;
+#[cfg(feature = "zstd")]
+mod compressed_section;
 mod describe;
 mod encode;
 mod grid;
@@ -62,6 +64,8 @@ pub use clod::{keeps, target_spacing, weight};
 pub use colour::{ColourSum, colour_word, eight_bit, grey, lod_of, rgb_of};
 #[cfg(feature = "zstd")]
 pub use compress::compress;
+#[cfg(feature = "zstd")]
+pub use compressed_section::CompressedSection;
 pub use describe::{AttributeEntry, ColourSource, Description, ErrorFigures, LatticeEntry, PlaneErrors};
 pub use encode::{EncodedBatch, ErrorSums, encode_batch, le_bytes};
 pub use grid::{Grid, LOD_LEVELS, f32_above, f32_below};

@@ -1,5 +1,7 @@
 //! A file that is open: sections as slices.
 
+#[cfg(feature = "zstd")]
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use bytemuck::{AnyBitPattern, Pod, Zeroable};
@@ -9,10 +11,15 @@ use crate::{Attribute, Element, ReadError};
 
 use super::blocks::FileId;
 use super::check::{Check, Places};
-use super::header::CORRUPT;
 use super::{
     AlignedBytes, BATCH_POINTS, BATCHES_FILE, BatchRecord, BlockScratch, Decoder, Description, Flags, Header, Part,
     Precision, Section, rgb_of, swap_slot,
+};
+#[cfg(feature = "zstd")]
+use super::{
+    CompressedSection,
+    blocks::{Blocks, table},
+    compressed_section::broken_block,
 };
 
 /// The colour of a point before it was replaced by the mean of its cell.
@@ -197,17 +204,38 @@ impl<B: AsRef<[u8]>> Batches<B> {
         }
         #[cfg(feature = "zstd")]
         {
-            scratch.batch(bytes, (self.id, part), size, slot, self.header.points).map_err(|(at, what)| {
-                let what = format!("section {}: {what}", self.name(part));
-                ReadError::broken(&self.path, section.offset + at, what).advise(CORRUPT)
-            })
+            let blocks = Blocks { table: bytes, file: self.id, part, size, points: self.header.points };
+            let frame = |at: Range<u64>| Ok(bytes.get(at.start as usize..at.end as usize).unwrap_or(&[]));
+            scratch
+                .batch(blocks, slot, frame, |at, what| broken_block(&self.path, section, &self.name(part), at, &what))
         }
         #[cfg(not(feature = "zstd"))]
         {
-            let _ = (scratch, self.id, CORRUPT);
+            let _ = (scratch, self.id);
             let what = "has compressed sections, which this program cannot read";
             Err(ReadError::unsupported(&self.path, what).advise("build it with the feature zstd"))
         }
+    }
+
+    /// What is needed to read a compressed section by positions, without these bytes.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::Unsupported`] if the section is absent or the file is not compressed.
+    #[cfg(feature = "zstd")]
+    pub fn compressed_section(&self, part: Part) -> Result<CompressedSection, ReadError> {
+        let found = self.place(part).filter(|_| self.is_compressed());
+        let (section, size) = found.ok_or_else(|| self.absent(part))?;
+        Ok(CompressedSection {
+            table: table(self.range(section)).to_vec(),
+            file: self.id,
+            part,
+            size,
+            points: self.header.points,
+            batches: self.header.batches,
+            section,
+            name: self.name(part),
+            path: self.path.clone(),
+        })
     }
 
     /// As [`Self::batch`], for sections with entries of 4 bytes.

@@ -247,6 +247,22 @@ fn compressed_sections_hold_the_same() {
             }
         }
         assert!(packed.batch(Part::Hi10, 8, &mut a).is_err());
+        for part in parts {
+            let (section, mut reads) = (packed.compressed_section(part).unwrap(), 0);
+            let mut c = BlockScratch::default();
+            for slot in 0..8 {
+                let read = |at: u64, out: &mut [u8]| {
+                    reads += 1;
+                    out.copy_from_slice(&file.get_ref()[at as usize..at as usize + out.len()]);
+                    Ok(())
+                };
+                assert_eq!(section.batch(slot, &mut c, read).unwrap(), raw.batch(part, slot, &mut b).unwrap());
+            }
+            assert_eq!(reads, 8u32.div_ceil(per_block), "once a block");
+            let unread = |_, _: &mut [u8]| panic!("there is no such slot");
+            assert!(section.batch(8, &mut c, unread).is_err());
+        }
+        assert!(packed.compressed_section(Part::Lo10).is_err() && raw.compressed_section(Part::Hi10).is_err());
     }
 }
 

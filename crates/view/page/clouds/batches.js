@@ -3,7 +3,8 @@
 
 import { Heap, distances, sub } from "pm/math.js";
 import { batchBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
+import { named, together } from "pm/clouds/loader.js";
+import { drop, isCurrent, put, renew } from "pm/clouds/units.js";
 
 const REQUEST_POINTS = 150_000;
 const FIRST_REQUEST_POINTS = 100_000;
@@ -30,8 +31,8 @@ export class BatchesCloud {
     this.classes = new Set();
     this.slots = slots.map((slot) => {
       const counts = this.hasParts ? slot.lods.map((n, lod) => n - (lod > 0 ? slot.lods[lod - 1] : 0)) : [slot.points];
-      const parts = counts.map((size, lod) => ({ slot, lod, size, state: size > 0 ? "new" : "ready", planes: 0 }));
-      return { ...slot, parts, used: 0 };
+      const parts = counts.map((size, lod) => ({ slot, lod, size, state: size > 0 ? "new" : "ready", planes: 0, used: 0 }));
+      return { ...slot, parts };
     });
   }
 
@@ -58,7 +59,6 @@ export class BatchesCloud {
     const heap = new Heap();
     for (const slot of this.slots) {
       if (!camera.sees(slot.box)) continue;
-      slot.used = this.frame;
       slot.bits = this.bitsFor(slot.box, camera);
       slot.pixels = Math.min(camera.pixels(slot.box), 1e9);
       slot.finest = this.hasParts ? this.#finest(slot.box, camera) : 0;
@@ -73,7 +73,8 @@ export class BatchesCloud {
       const part = slot.parts[lod];
       total += part.size;
       if (total > budget && this.shown > 0) break;
-      const isTooCoarse = part.planes * 10 < slot.bits && part.size > 0;
+      part.used = this.frame;
+      const isWanted = part.size > 0 && (part.planes * 10 < slot.bits || !isCurrent(part, this.attribute));
       part.goal = slot.bits / 10;
       if (part.block) {
         part.owner = slot;
@@ -81,11 +82,11 @@ export class BatchesCloud {
         this.visible.push(part);
         this.shown += part.block.count;
       }
-      if (isTooCoarse && part.state !== "loading" && part.state !== "failed") wanted.push(part);
+      if (isWanted && part.state !== "loading" && part.state !== "failed") wanted.push(part);
       if (lod + 1 < slot.parts.length && lod < slot.finest) heap.push(slot.pixels / 2 ** (lod + 1), { slot, lod: lod + 1 });
     }
     this.#load(wanted, loader);
-    this.#forget(budget);
+    this.forget(budget);
     this.isLoading = wanted.length > 0 || this.pending > 0;
   }
 
@@ -99,23 +100,26 @@ export class BatchesCloud {
       wanted.splice(0, wanted.length, ...rest);
       const attribute = this.attribute;
       const lods = this.hasParts ? [lod, lod] : [0, 255];
-      loader.run(parts, async () => {
-        this.pending++;
-        try {
-          const all = await this.source.batches(parts.map((part) => part.slot.unit), { planes: goal, lods, attribute });
-          if (attribute !== this.attribute) return;
-          all.forEach((points, i) => {
-            parts[i].block?.free();
-            parts[i].block = batchBlock(this.gl, points);
-            parts[i].planes = points.planes.length;
-            if (attribute === "classification") this.#meet(points.extra);
-          });
-        } catch (error) {
-          throw new Error(`${this.scene.name}: ${error.message}`);
-        } finally {
-          this.pending--;
-        }
-      });
+      const request = async () => {
+        const all = await this.source.batches(parts.map((part) => part.slot.unit), { planes: goal, lods, attribute });
+        all.forEach((points, i) => {
+          put(parts[i], batchBlock(this.gl, points), attribute, this.attribute);
+          parts[i].planes = points.planes.length;
+          if (attribute === "classification" && attribute === this.attribute) this.#meet(points.extra);
+        });
+      };
+      loader.run(parts, () => this.#pending(request));
+    }
+  }
+
+  async #pending(work) {
+    this.pending++;
+    try {
+      await work();
+    } catch (error) {
+      throw named(this.scene, error);
+    } finally {
+      this.pending--;
     }
   }
 
@@ -124,28 +128,24 @@ export class BatchesCloud {
     for (const value of values ?? []) this.classes.add(Math.round(value + base) & 255);
   }
 
-  #forget(budget) {
-    const loaded = this.slots.filter((slot) => slot.parts.some((part) => part.block));
-    const count = (slot) => slot.parts.reduce((sum, part) => sum + (part.block?.count ?? 0), 0);
-    let total = loaded.reduce((sum, slot) => sum + count(slot), 0);
+  forget(budget) {
+    const loaded = this.slots.flatMap((slot) => slot.parts.filter((part) => part.block));
+    let total = loaded.reduce((sum, part) => sum + part.block.count, 0);
     if (total <= 3 * budget) return;
+    // of slots in sight the levels that this view has no use for go, too
     loaded.sort((a, b) => a.used - b.used);
-    for (const slot of loaded) {
-      if (total <= 2 * budget || slot.used === this.frame) break;
-      total -= count(slot);
-      slot.parts.forEach((part) => this.#drop(part));
+    for (const part of loaded) {
+      if (total <= 2 * budget || part.used === this.frame) break;
+      total -= part.block.count;
+      drop(part);
+      part.planes = 0;
     }
-  }
-
-  #drop(part) {
-    part.block?.free();
-    Object.assign(part, { block: undefined, planes: 0 });
   }
 
   setAttribute(attribute) {
     if (attribute === this.attribute) return;
     this.attribute = attribute;
-    for (const slot of this.slots) slot.parts.forEach((part) => this.#drop(part));
+    renew(this.slots.flatMap((slot) => slot.parts), attribute);
   }
 
   draws(camera) {

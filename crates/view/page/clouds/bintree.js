@@ -3,10 +3,12 @@
 
 import { Heap, distances } from "pm/math.js";
 import { pointBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
+import { named, together } from "pm/clouds/loader.js";
+import { drop, isCurrent, put, renew } from "pm/clouds/units.js";
 
-/** Every how manyth point: what comes first, what it is refined to. */
+/** Every how manyth point: what comes first, what it is refined to. Of large trees even fewer come first. */
 const STEPS = [16, 4, 1];
+const MOST_COARSE_POINTS = 100_000;
 const REQUEST_POINTS = 150_000;
 const FIRST_REQUEST_POINTS = 100_000;
 
@@ -15,7 +17,8 @@ export const MATERIAL = { PLAIN: 0, FAR: 1, NEAR: 2 };
 export class BintreeCloud {
   constructor(gl, source, scene, leaves) {
     Object.assign(this, { gl, source, scene, box: scene.bounds, visible: [], shown: 0, frame: 0, pending: 0 });
-    this.steps = STEPS;
+    this.steps = [...STEPS];
+    while (leaves.reduce((sum, leaf) => sum + leaf.points, 0) / this.steps[0] > MOST_COARSE_POINTS) this.steps.unshift(4 * this.steps[0]);
     this.leaves = leaves.map((leaf) => ({ ...leaf, state: "new", at: -1, used: 0 }));
     /** Numbers of the classes that were met. */
     this.classes = new Set();
@@ -59,11 +62,26 @@ export class BintreeCloud {
         this.visible.push(leaf);
         this.shown += leaf.block.count;
       }
-      if (leaf.goal > leaf.at && leaf.state !== "loading" && leaf.state !== "failed") wanted.push(leaf);
+      const isWanted = leaf.goal > leaf.at || !isCurrent(leaf, this.attribute);
+      if (isWanted && leaf.state !== "loading" && leaf.state !== "failed") wanted.push(leaf);
     }
+    wanted.push(...this.#tooFine(camera, budget));
     this.#load(wanted, camera, loader);
-    this.#forget(budget);
+    this.forget(budget);
     this.isLoading = wanted.length > 0 || this.pending > 0;
+  }
+
+  /** Leaves that were loaded for a nearer view, the smallest first, as many as are over the budget: they come again, coarser. */
+  #tooFine(camera, budget) {
+    const found = [];
+    let shown = this.shown;
+    const finer = this.visible.filter((leaf) => leaf.at > leaf.goal && leaf.goal >= 0);
+    for (const leaf of finer.sort((a, b) => camera.pixels(a.box) - camera.pixels(b.box))) {
+      if (shown <= budget) break;
+      shown -= leaf.block.count - Math.ceil(leaf.points / this.steps[leaf.goal]);
+      if (leaf.state === "ready") found.push(leaf);
+    }
+    return found;
   }
 
   #load(wanted, camera, loader) {
@@ -76,27 +94,30 @@ export class BintreeCloud {
       const units = together(alike, this.shown === 0 ? FIRST_REQUEST_POINTS : REQUEST_POINTS, this.source.mostUnits);
       for (const leaf of units) wanted.splice(wanted.indexOf(leaf), 1);
       const attribute = this.attribute;
-      loader.run(units, async () => {
-        this.pending++;
-        try {
-          const all = await this.source.points(units.map((leaf) => leaf.unit), { attribute, every: this.steps[to] });
-          if (attribute !== this.attribute) return;
-          all.forEach((points, i) => {
-            units[i].block?.free();
-            units[i].block = pointBlock(this.gl, points);
-            units[i].block.classes.forEach((number) => this.classes.add(number));
-            units[i].at = to;
-          });
-        } catch (error) {
-          throw new Error(`${this.scene.name}: ${error.message}`);
-        } finally {
-          this.pending--;
-        }
-      });
+      const request = async () => {
+        const all = await this.source.points(units.map((leaf) => leaf.unit), { attribute, every: this.steps[to] });
+        all.forEach((points, i) => {
+          put(units[i], pointBlock(this.gl, points), attribute, this.attribute);
+          units[i].block.classes.forEach((number) => this.classes.add(number));
+          units[i].at = to;
+        });
+      };
+      loader.run(units, () => this.#pending(request));
     }
   }
 
-  #forget(budget) {
+  async #pending(work) {
+    this.pending++;
+    try {
+      await work();
+    } catch (error) {
+      throw named(this.scene, error);
+    } finally {
+      this.pending--;
+    }
+  }
+
+  forget(budget) {
     const loaded = this.leaves.filter((leaf) => leaf.block);
     let total = loaded.reduce((sum, leaf) => sum + leaf.block.count, 0);
     if (total <= 3 * budget) return;
@@ -104,26 +125,22 @@ export class BintreeCloud {
     for (const leaf of loaded) {
       if (total <= 2 * budget || leaf.used === this.frame) break;
       total -= leaf.block.count;
-      this.#drop(leaf);
+      drop(leaf);
+      leaf.at = -1;
     }
-  }
-
-  #drop(leaf) {
-    leaf.block?.free();
-    Object.assign(leaf, { block: undefined, at: -1 });
   }
 
   setAttribute(attribute) {
     if (attribute === this.attribute) return;
     this.attribute = attribute;
-    this.leaves.forEach((leaf) => this.#drop(leaf));
+    renew(this.leaves, attribute);
   }
 
   /** Leaves that both materials concern are drawn twice. */
   draws(camera) {
     const limit = this.switchDistance(camera);
     return this.visible.flatMap((leaf) => {
-      const draw = { block: leaf.block, unit: leaf.number, level: STEPS.length - leaf.at, row: -1, cubeMin: [0, 0, 0], side: 1, limit };
+      const draw = { block: leaf.block, unit: leaf.number, level: this.steps.length - leaf.at, row: -1, cubeMin: [0, 0, 0], side: 1, limit };
       const [near, far] = distances(leaf.box, camera.eye);
       if (this.radius === 0) return [{ ...draw, material: MATERIAL.PLAIN }];
       if (near > limit) return [{ ...draw, material: MATERIAL.FAR }];

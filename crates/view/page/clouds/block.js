@@ -14,8 +14,8 @@ export function pointBlock(gl, points) {
   block.add(points.colours);
   gl.enableVertexAttribArray(1);
   gl.vertexAttribPointer(1, 4, gl.UNSIGNED_BYTE, true, 0, 0);
-  if (points.extra) block.single(2, points.extra);
-  return block.end({ origin: points.origin, step: points.step, stored: points.stored, extraRange: range(points.extra), classes: classes(points) });
+  if (points.extra) block.extra(2, points.extra);
+  return block.end({ origin: points.origin, step: points.step, stored: points.stored, classes: classes(points) });
 }
 
 /** Of batches. */
@@ -24,8 +24,10 @@ export function batchBlock(gl, points) {
   points.planes.forEach((plane, at) => block.whole(at, plane, 1, gl.UNSIGNED_INT));
   block.whole(3, points.colours, 4, gl.UNSIGNED_BYTE);
   block.whole(4, points.indices, 1, gl.UNSIGNED_SHORT);
-  if (points.extra) block.single(5, points.extra);
-  return block.end({ min: points.min, sides: points.sides, planes: points.planes.length, indices: points.indices, extraRange: range(points.extra) });
+  if (points.extra) block.extra(5, points.extra);
+  // a copy: a view would keep the whole answer
+  const indices = points.indices.slice();
+  return block.end({ min: points.min, sides: points.sides, planes: points.planes.length, indices }, indices.byteLength);
 }
 
 /** The classes of the points. */
@@ -50,6 +52,7 @@ function begin(gl, count) {
   gl.bindVertexArray(vao);
   const buffers = [];
   let bytes = 0;
+  let extra;
   const add = (data) => {
     buffers.push(buffer(gl, data));
     bytes += data.byteLength;
@@ -61,18 +64,31 @@ function begin(gl, count) {
       gl.enableVertexAttribArray(at);
       gl.vertexAttribIPointer(at, size, type, 0, 0);
     },
-    single(at, data) {
+    extra(at, data) {
       add(data);
       gl.enableVertexAttribArray(at);
       gl.vertexAttribPointer(at, 1, gl.FLOAT, false, 0, 0);
+      extra = { at, buffer: buffers.pop(), bytes: data.byteLength, range: range(data) };
     },
-    end(rest) {
+    /** `kept`: bytes beside those on the card. */
+    end(rest, kept = 0) {
       gl.bindVertexArray(null);
-      const free = () => {
-        buffers.forEach((made) => gl.deleteBuffer(made));
+      const block = { vao, count, bytes: bytes + kept, extraRange: extra?.range ?? null, ...rest };
+      block.dropExtra = () => {
+        Object.assign(block, { attribute: undefined, extraRange: null });
+        if (!extra) return;
+        gl.bindVertexArray(vao);
+        gl.disableVertexAttribArray(extra.at);
+        gl.bindVertexArray(null);
+        gl.deleteBuffer(extra.buffer);
+        block.bytes -= extra.bytes;
+        extra = undefined;
+      };
+      block.free = () => {
+        buffers.concat(extra?.buffer ?? []).forEach((made) => gl.deleteBuffer(made));
         gl.deleteVertexArray(vao);
       };
-      return { vao, count, bytes, free, ...rest };
+      return block;
     },
   };
 }

@@ -2,19 +2,28 @@
 
 /** At the same time. */
 const MOST_REQUESTS = 3;
+/** Milliseconds until a connection that is gone is tried again: the first and the longest pause. */
+const PAUSES = [1000, 30_000];
+
+/** An error of a dataset. */
+export function named(scene, error) {
+  return Object.assign(new Error(`${scene.name}: ${error.message}`), { isTransient: error.isTransient });
+}
 
 export class Loader {
-  constructor(onChange, onError) {
-    Object.assign(this, { onChange, onError, running: 0, requests: 0 });
+  /** `onBack` gets the error that `onError` got, once there is an answer again. */
+  constructor(onChange, onError, onBack) {
+    Object.assign(this, { onChange, onError, onBack, running: 0, requests: 0, isPaused: false, pause: 0 });
   }
 
   get isFull() {
-    return this.running >= MOST_REQUESTS;
+    return this.isPaused || this.running >= MOST_REQUESTS;
   }
 
   /**
-   * Runs a request if there is room. Its units are "loading" until it ends; those of one that fails are "failed", and are not
-   * requested again.
+   * Runs a request if there is room. Its units are "loading" until it ends. Of one that fails fewer are requested at once, until the
+   * one is found that is "failed", and is not requested again; if there is no answer at all, they are requested again after a
+   * pause.
    */
   run(units, request) {
     if (this.isFull) return false;
@@ -23,10 +32,16 @@ export class Loader {
     for (const unit of units) unit.state = "loading";
     request()
       .then(
-        () => units.forEach((unit) => unit.state === "loading" && (unit.state = "ready")),
+        () => {
+          units.forEach((unit) => unit.state === "loading" && (unit.state = "ready"));
+          this.#back();
+        },
         (error) => {
-          for (const unit of units) unit.state = "failed";
-          this.onError(error);
+          const isFinal = !error.isTransient && units.length === 1;
+          for (const unit of units) unit.state = isFinal ? "failed" : "new";
+          if (error.isTransient) this.#wait(error);
+          else if (isFinal) this.onError(error);
+          else for (const unit of units) unit.most = Math.ceil(units.length / 2);
         },
       )
       .finally(() => {
@@ -35,14 +50,35 @@ export class Loader {
       });
     return true;
   }
+
+  #wait(error) {
+    if (this.isPaused) return;
+    this.gone ??= error;
+    this.onError(this.gone);
+    this.pause = Math.min(Math.max(2 * this.pause, PAUSES[0]), PAUSES[1]);
+    this.isPaused = true;
+    setTimeout(() => {
+      this.isPaused = false;
+      this.onChange();
+    }, this.pause);
+  }
+
+  #back() {
+    this.pause = 0;
+    if (!this.gone) return;
+    this.onBack(this.gone);
+    this.gone = undefined;
+  }
 }
 
-/** The first units, as many as have `most` points together, and one at least. */
+/** The first units, as many as have `most` points together, and one at least. `most` of a unit: how many may be with it. */
 export function together(units, most, mostUnits) {
   const taken = [];
   let points = 0;
+  let room = mostUnits;
   for (const unit of units) {
-    if (taken.length >= mostUnits || (taken.length > 0 && points + unit.size > most)) break;
+    room = Math.min(room, unit.most ?? mostUnits);
+    if (taken.length >= room || (taken.length > 0 && points + unit.size > most)) break;
     taken.push(unit);
     points += unit.size;
   }

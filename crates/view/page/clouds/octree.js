@@ -2,7 +2,8 @@
 
 import { Heap, scale, sub } from "pm/math.js";
 import { pointBlock } from "pm/clouds/block.js";
-import { together } from "pm/clouds/loader.js";
+import { named, together } from "pm/clouds/loader.js";
+import { drop, put, renew } from "pm/clouds/units.js";
 
 /** Nodes of smaller radius, in pixels, are not drawn. */
 const LEAST_PIXELS = 40;
@@ -23,7 +24,8 @@ export class OctreeCloud {
 
   #node(name, min, side) {
     const box = { min, max: min.map((low) => low + side) };
-    const node = { name, level: name.length - 1, box, side, points: 0, size: 0, isProxy: false, state: "new", chunkState: "new", children: [], used: 0 };
+    const node = { name, level: name.length - 1, box, side, points: 0, size: 0, isProxy: false, state: "new", children: [], used: 0 };
+    node.chunk = { state: "new" }; // of a proxy
     node.child = name.length > 1 ? Number(name.at(-1)) : 0;
     this.nodes.set(name, node);
     return node;
@@ -66,21 +68,22 @@ export class OctreeCloud {
       total += node.points;
       if (total > budget && node !== this.root) break;
       node.used = this.frame;
-      // samples of a node lack the points of its ancestors
-      node.isDrawn = (node.parent?.isDrawn ?? true) && (node.block !== undefined || node.points === 0);
+      // samples of a node lack the points of its ancestors; those that cannot be read are not waited for
+      node.isDrawn = (node.parent?.isDrawn ?? true) && (node.block !== undefined || node.points === 0 || node.state === "failed");
       if (node.isDrawn && node.block) {
         node.at = this.visible.length;
         this.visible.push(node);
         this.shown += node.block.count;
-      } else if (node.state === "new" && node.points > 0) this.wanted.push(node);
+      }
+      if (node.state === "new" && node.points > 0) this.wanted.push(node);
       for (const child of node.children) {
         const pixels = camera.pixels(child.box);
         if (pixels >= LEAST_PIXELS) heap.push(pixels, child);
       }
     }
     this.#load(proxies, loader);
-    this.#forget(budget);
-    this.isLoading = this.wanted.length > 0 || proxies.some((node) => node.chunkState === "new") || this.pending > 0;
+    this.forget(budget);
+    this.isLoading = this.wanted.length > 0 || proxies.some((node) => node.chunk.state === "new") || this.pending > 0;
   }
 
   pending = 0;
@@ -89,48 +92,39 @@ export class OctreeCloud {
 
   #load(proxies, loader) {
     for (const node of proxies) {
-      if (node.chunkState !== "new") continue;
-      const holder = { state: "new" };
-      const isRunning = loader.run([holder], async () => {
-        this.pending++;
-        try {
-          this.#insert(await this.source.chunk(node.name));
-          node.chunkState = "ready";
-        } catch (error) {
-          node.chunkState = "failed";
-          throw new Error(`${this.scene.name}: ${error.message}`);
-        } finally {
-          this.pending--;
-        }
-      });
+      if (node.chunk.state !== "new") continue;
+      const isRunning = loader.run([node.chunk], () => this.#pending(async () => this.#insert(await this.source.chunk(node.name))));
       if (!isRunning) return;
-      node.chunkState = "loading";
     }
     while (this.wanted.length > 0 && !loader.isFull) {
       const most = this.shown === 0 ? FIRST_REQUEST_POINTS : REQUEST_POINTS;
       const units = together(this.wanted, most, this.source.mostUnits);
       this.wanted.splice(0, units.length);
       const attribute = this.attribute;
-      loader.run(units, async () => {
-        this.pending++;
-        try {
-          const all = await this.source.points(units.map((node) => node.name), { attribute });
-          if (attribute !== this.attribute) return units.forEach((node) => (node.state = "new"));
-          all.forEach((points, i) => {
-            units[i].block = pointBlock(this.gl, points);
-            units[i].block.classes.forEach((number) => this.classes.add(number));
-          });
-        } catch (error) {
-          throw new Error(`${this.scene.name}: ${error.message}`);
-        } finally {
-          this.pending--;
-        }
-      });
+      const request = async () => {
+        const all = await this.source.points(units.map((node) => node.name), { attribute });
+        all.forEach((points, i) => {
+          put(units[i], pointBlock(this.gl, points), attribute, this.attribute);
+          units[i].block.classes.forEach((number) => this.classes.add(number));
+        });
+      };
+      loader.run(units, () => this.#pending(request));
+    }
+  }
+
+  async #pending(work) {
+    this.pending++;
+    try {
+      await work();
+    } catch (error) {
+      throw named(this.scene, error);
+    } finally {
+      this.pending--;
     }
   }
 
   /** Of nodes that were not drawn for long the points go, as soon as there are three times as many as are drawn at once. */
-  #forget(budget) {
+  forget(budget) {
     const loaded = [...this.nodes.values()].filter((node) => node.block);
     let total = loaded.reduce((sum, node) => sum + node.block.count, 0);
     if (total <= 3 * budget) return;
@@ -138,28 +132,24 @@ export class OctreeCloud {
     for (const node of loaded) {
       if (total <= 2 * budget || node.used === this.frame) break;
       total -= node.block.count;
-      this.#drop(node);
+      drop(node);
     }
   }
 
-  #drop(node) {
-    node.block?.free();
-    node.block = undefined;
-    node.state = "new";
-  }
-
-  /** Another attribute is wanted beside colours and intensities: all points have to come again. */
+  /** Another attribute is wanted beside colours and intensities. */
   setAttribute(attribute) {
     if (attribute === this.attribute) return;
     this.attribute = attribute;
-    for (const node of this.nodes.values()) if (node.state !== "failed") this.#drop(node);
+    renew(this.nodes.values(), attribute);
   }
 
   /** For the shader: which children of each visible node are visible. They stand one behind the other. */
   nodeTable() {
     const { gl } = this;
-    const order = this.visible.length > 0 ? [this.visible[0]] : [];
     const isVisible = new Set(this.visible);
+    // the root, and what is below a node that has no points or cannot be read
+    const order = this.visible.filter((node) => !isVisible.has(node.parent)).slice(0, MOST_NODES);
+    for (const node of this.visible) node.row = -1;
     const entries = new Uint32Array(1024 * Math.max(1, Math.ceil(Math.min(this.visible.length, MOST_NODES) / 1024)));
     for (let i = 0; i < order.length; i++) {
       order[i].row = i;

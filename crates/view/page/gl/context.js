@@ -73,7 +73,7 @@ export class Target {
       return made;
     };
     this.colour = this.isPick
-      ? texture(gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT)
+      ? texture(gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT)
       : texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE);
     this.depth = texture(gl.DEPTH_COMPONENT32F, gl.DEPTH_COMPONENT, gl.FLOAT);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);

@@ -13,6 +13,19 @@ const PICK = 9;
 const VALUES = { intensity: 0, height: 1, attribute: 2 };
 /** Colourings that are no other attribute. */
 export const ELSEWHERE = ["rgb", "class", "intensity", "height", "level", "one"];
+const ATTRIBUTE = "attribute:";
+/** The colouring by an attribute, whatever its name is: data may have a "level", too. */
+export const colouringBy = (name) => ATTRIBUTE + name;
+/** The attribute that a colouring names, or nothing. */
+export const attributeOf = (colour) => (colour.startsWith(ATTRIBUTE) ? colour.slice(ATTRIBUTE.length) : undefined);
+/** True if what a colouring shows comes as another attribute, beside the points' colours and intensities of 16 bits. */
+export function isApart(scene, mode) {
+  if (mode === "class") return scene.kind === "batches";
+  if (mode !== "intensity") return mode === "attribute";
+  const own = scene.attributes.find(({ name }) => name === "intensity");
+  // without a range that is known, it grows with the values
+  return scene.kind === "batches" || own?.type !== "uint16" || !own.max;
+}
 const MODES = { rgb: 0, class: 2, level: 3, one: 4 };
 
 export class Renderer {
@@ -94,15 +107,13 @@ export class Renderer {
     const mode = this.modeOf(scene);
     gl.uniform1i(at.uColour, MODES[mode] ?? 1);
     if (mode in VALUES) {
-      // batches have intensities apart, as any other attribute
-      gl.uniform1i(at.uValue, scene.kind === "batches" && mode === "intensity" ? VALUES.attribute : VALUES[mode]);
+      gl.uniform1i(at.uValue, isApart(scene, mode) ? VALUES.attribute : VALUES[mode]);
       const [low, high] = this.#range(mode, cloud);
       gl.uniform2f(at.uRange, low, 1 / Math.max(high - low, 1e-30));
     }
     gl.uniform1f(at.uEyeHeight, camera.eye[2] - this.heightBase);
     gl.uniform3fv(at.uOne, settings.one);
-    const knowsClasses = cloud.hasClasses && (scene.kind !== "batches" || mode === "class");
-    gl.uniform1i(at.uFilter, settings.hidden.size > 0 && knowsClasses ? 1 : 0);
+    gl.uniform1i(at.uFilter, settings.hidden.size > 0 && this.knowsClasses(cloud) ? 1 : 0);
     gl.uniform1i(at.uShape, settings.shape === "circle" ? 1 : 0);
     gl.uniform2f(at.uDepth, -camera.projection[10], camera.projection[14]);
     [[at.uGradient, this.tables.gradient], [at.uClasses, this.tables.classes]].forEach(([place, texture], unit) => {
@@ -116,6 +127,11 @@ export class Renderer {
   /** Heights are singles relative to this, world units. */
   heightBase = 0;
 
+  /** Whether points come with their classes: batches have them as the attribute that is shown. */
+  knowsClasses(cloud) {
+    return cloud.hasClasses && (cloud.scene.kind !== "batches" || this.modeOf(cloud.scene) === "class");
+  }
+
   /** The colouring of a dataset: one that it can show. */
   modeOf(scene) {
     const { colour } = this.settings;
@@ -124,7 +140,7 @@ export class Renderer {
     if (colour === "class" && !has("classification")) return "height";
     if (colour === "intensity" && !has(colour)) return "height";
     if (ELSEWHERE.includes(colour)) return colour;
-    return has(colour) ? "attribute" : "height";
+    return has(attributeOf(colour)) ? "attribute" : "height";
   }
 
   /** The range that was chosen, or, of a dataset that shows something else, its own. */
@@ -137,7 +153,7 @@ export class Renderer {
       [low, high] = mode === "height" ? [min[2], max[2]] : [own?.min?.[0] ?? 0, own?.max?.[0] ?? 65535];
     }
     if (mode === "height") return [low - this.heightBase, high - this.heightBase];
-    if (mode === "intensity" && cloud.scene.kind !== "batches") return [low, high];
+    if (!isApart(cloud.scene, mode)) return [low, high];
     return [low - cloud.extraBase, high - cloud.extraBase];
   }
 
@@ -260,7 +276,7 @@ export class Renderer {
     return { used, at, vao };
   }
 
-  /** The drawn point nearest to a pixel: { cloud, number, index }, or nothing. Row 0 is at the top. */
+  /** The drawn point nearest to a pixel: { cloud, number, index, depth }, or nothing. Row 0 is at the top. */
   pick(clouds, camera, x, y) {
     const { gl } = this;
     this.numbers ??= new Target(gl, true);
@@ -282,8 +298,9 @@ export class Renderer {
     for (let i = 0; i < PICK * PICK; i++) {
       const unit = found[4 * i];
       const away = Math.hypot((i % PICK) - half, Math.floor(i / PICK) - half);
-      if (unit > 0 && (!best || away < best.away)) best = { away, unit: unit - 1, index: found[4 * i + 1] };
+      if (unit > 0 && (!best || away < best.away)) best = { away, unit: unit - 1, index: found[4 * i + 1], at: 4 * i + 2 };
     }
-    return best && { cloud: clouds[best.unit >>> 24], number: best.unit & 0xffffff, index: best.index };
+    const depth = best && new Float32Array(found.buffer)[best.at];
+    return best && { cloud: clouds[best.unit >>> 24], number: best.unit & 0xffffff, index: best.index, depth };
   }
 }

@@ -174,16 +174,16 @@ void main() {
 }
 `;
 
-/** Numbers of unit and point, for what is under the cursor. */
+/** Numbers of unit and point, and the depth, for what is under the cursor. */
 export const NUMBERS = `
 flat in vec3 vColour;
 flat in uvec2 vId;
 uniform int uShape;
-out uvec2 id;
+out uvec4 id;
 void main() {
   vec2 at = gl_PointCoord * 2.0 - 1.0;
   if (uShape == 1 && dot(at, at) > 1.0) discard;
-  id = uvec2(vId.x + 1u, vId.y); // 0: nothing
+  id = uvec4(vId.x + 1u, vId.y, floatBitsToUint(1.0 / gl_FragCoord.w), 0u); // 0: nothing
 }
 `;
 

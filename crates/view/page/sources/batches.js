@@ -1,6 +1,6 @@
 // Quantised batches without compression (docs/formats/batches.md): planes go to the graphics card as they are.
 
-import { column, everything, sizeOf } from "pm/sources/columns.js";
+import { column, everything, meant, sizeOf } from "pm/sources/columns.js";
 import { RangedFile } from "pm/sources/files.js";
 
 const HEADER = 256;
@@ -38,7 +38,10 @@ export class BatchesSource {
     const description = await this.file.read(u64(168), u64(168) + u64(176));
     this.about = JSON.parse(new TextDecoder().decode(description));
     this.records = new DataView(await this.file.read(records, records + RECORD * this.slots));
-    this.attributes = this.about.attributes.map((own) => ({ ...own, at: own.offset, scale: own.valueScale, offset: own.valueOffset }));
+    this.attributes = this.about.attributes.map((own) => {
+      const made = { ...own, at: own.offset, scale: own.valueScale, offset: own.valueOffset };
+      return { ...made, ...meant(made) };
+    });
     return {
       kind: "batches", format: "Quantised batches", name: this.about.name || this.name, points: this.count, projection: this.about.projection ?? "",
       bounds: { min: three(56), max: three(80) }, cell: view.getFloat64(104, true), planes: this.planes.length, batches: this.slots,

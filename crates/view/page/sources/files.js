@@ -1,27 +1,29 @@
 // Files of a static server, read by ranges.
 
+import { Interrupted, request } from "pm/sources/request.js";
+
 /** Of a server that ignores ranges, files up to this size are read whole. */
 const MOST_WHOLE = 64 * 1024 * 1024;
 /** Gaps up to this are read with what is around them. */
 const MOST_GAP = 32 * 1024;
 
 async function get(url) {
-  let answer;
-  try {
-    answer = await fetch(url, { cache: "no-cache" });
-  } catch {
-    throw new Error(
-      location.protocol === "file:"
-        ? "A browser reads no files beside a page that was opened from the disk: put both on a web server, or use `pointmill view`."
-        : `${url}: the server does not answer`,
-    );
-  }
+  const { answer, bytes } = await ask(url, { cache: "no-cache" });
   if (!answer.ok) throw new Error(`${url}: the server answers ${answer.status}`);
-  return answer;
+  return bytes;
 }
 
-export const readText = async (url) => (await get(url)).text();
-export const readBytes = async (url) => (await get(url)).arrayBuffer();
+async function ask(url, options) {
+  try {
+    return await request(url, { lost: `${url}: the server does not answer`, ...options });
+  } catch (error) {
+    if (!(error instanceof Interrupted) || location.protocol !== "file:") throw error;
+    throw new Error("A browser reads no files beside a page that was opened from the disk: put both on a web server, or use `pointmill view`.");
+  }
+}
+
+export const readText = async (url) => new TextDecoder().decode(await get(url));
+export const readBytes = get;
 
 export class RangedFile {
   constructor(url, messages) {
@@ -68,29 +70,24 @@ export class RangedFile {
   }
 
   async #request(start, end) {
-    let answer;
-    try {
-      answer = await fetch(this.url, { headers: { Range: `bytes=${start}-${end - 1}` } });
-    } catch {
-      throw new Error(`${this.url}: the server does not answer`);
+    const accept = (answer) => answer.status === 200 && this.#acceptWhole(answer);
+    const { answer, bytes } = await ask(this.url, { headers: { Range: `bytes=${start}-${end - 1}` }, accept });
+    if (answer.status === 200) {
+      this.whole = bytes;
+      return this.#part(start, end);
     }
-    if (answer.status === 200) return this.#takeWhole(answer, start, end);
     if (answer.status === 416) throw new Error(`${this.url}: ends before byte ${end}`);
     if (answer.status !== 206) throw new Error(`${this.url}: the server answers ${answer.status}`);
-    const bytes = await answer.arrayBuffer();
     if (bytes.byteLength !== end - start) throw new Error(`${this.url}: bytes ${start} to ${end} are not all there`);
     return bytes;
   }
 
-  async #takeWhole(answer, start, end) {
+  #acceptWhole(answer) {
     const size = Number(answer.headers.get("content-length") ?? 0);
     const fault = `${location.host} ignores ranges of bytes, as python's http.server does`;
     if (!(size > 0 && size <= MOST_WHOLE)) {
-      await answer.body?.cancel();
       throw new Error(`${this.url}: ${fault}: use \`pointmill view\`, nginx, Apache or another server that answers 206`);
     }
     this.messages?.note(`${fault}: files are read whole.`);
-    this.whole = await answer.arrayBuffer();
-    return this.#part(start, end);
   }
 }

@@ -39,7 +39,7 @@ export class Potree1Source {
     this.stride = at;
     this.attributes = this.columns.filter(({ name }) => name && name !== "position");
     return {
-      kind: "octree", format: `Potree ${meta.version}`, name: meta.pointmill?.name ?? this.name, points: meta.points ?? 0, projection: meta.projection ?? "",
+      kind: "octree", format: `Potree ${meta.version}`, name: meta.pointmill?.name ?? this.name, points: meta.points ?? null, projection: meta.projection ?? "",
       cube: this.cube, spacing: meta.spacing, bounds: meta.tightBoundingBox ? box(meta.tightBoundingBox) : this.cube,
       colour: this.attributes.some(({ name }) => name === "rgb" || name === "rgba"), attributes: this.attributes,
     };

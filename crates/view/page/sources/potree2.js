@@ -1,6 +1,6 @@
 // Potree 2.0, DEFAULT and BROTLI (docs/formats/potree2.md).
 
-import { column, everything, makePoints, sizeOf, usual } from "pm/sources/columns.js";
+import { column, everything, makePoints, meant, sizeOf, usual } from "pm/sources/columns.js";
 import { RangedFile, readText } from "pm/sources/files.js";
 
 const RECORD = 22;
@@ -30,7 +30,7 @@ export class Potree2Source {
       return made;
     });
     this.stride = at;
-    this.attributes = this.columns.filter(({ name }) => name !== "position");
+    this.attributes = this.columns.filter(({ name }) => name !== "position").map((own) => ({ ...own, ...meant(own) }));
     const position = this.columns.find(({ name }) => name === "position");
     const cube = meta.boundingBox;
     this.chunks.set("r", { offset: 0, size: meta.hierarchy.firstChunkSize });

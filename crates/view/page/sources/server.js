@@ -1,17 +1,15 @@
 // A dataset behind `pointmill view`: the format crate decodes it there.
 
+import { request } from "pm/sources/request.js";
 import { readBatches, readBoxes, readNodes, readPoints } from "pm/sources/units.js";
 
+const LOST = "pointmill does not answer: it was stopped, or the connection is gone";
+
 /** The body of an answer; errors say what the server says. */
-async function get(url) {
-  let answer;
-  try {
-    answer = await fetch(url);
-  } catch {
-    throw new Error("pointmill does not answer: it was stopped, or the connection is gone");
-  }
-  if (answer.ok) return answer;
-  const text = await answer.text();
+async function get(url, signal) {
+  const { answer, bytes } = await request(url, { lost: LOST, signal });
+  if (answer.ok) return bytes;
+  const text = new TextDecoder().decode(bytes);
   let said = text;
   try {
     said = JSON.parse(text).error ?? text;
@@ -20,6 +18,8 @@ async function get(url) {
   }
   throw new Error(said || `status ${answer.status}`);
 }
+
+const json = async (bytes) => JSON.parse(new TextDecoder().decode(await bytes));
 
 const query = (fields) =>
   Object.entries(fields)
@@ -37,29 +37,29 @@ export class ServerSource {
   }
 
   async scene() {
-    return (await get(`${this.base}/scene`)).json();
+    return json(get(`${this.base}/scene`));
   }
 
   async chunk(name) {
-    return readNodes(await (await get(`${this.base}/nodes?${query({ of: name })}`)).arrayBuffer(), name);
+    return readNodes(await get(`${this.base}/nodes?${query({ of: name })}`), name);
   }
 
   async boxes() {
-    return readBoxes(await (await get(`${this.base}/nodes`)).arrayBuffer());
+    return readBoxes(await get(`${this.base}/nodes`));
   }
 
   async points(units, { attribute, every }) {
     const url = `${this.base}/points?${query({ units: units.join(","), attribute, every: every > 1 ? every : undefined })}`;
-    return readPoints(await (await get(url)).arrayBuffer());
+    return readPoints(await get(url));
   }
 
   async batches(units, { planes, lods, attribute }) {
     const url = `${this.base}/batches?${query({ units: units.join(","), planes, lods: `${lods[0]}-${lods[1]}`, attribute })}`;
-    return readBatches(await (await get(url)).arrayBuffer());
+    return readBatches(await get(url));
   }
 
-  /** Everything that is stored of a point. `index` counts the points of the unit as they are stored. */
-  async point(unit, index) {
-    return (await get(`${this.base}/point?${query({ unit, index })}`)).json();
+  /** Everything that is stored of a point. `index` counts the points of the unit as they are stored. `signal` may abort it. */
+  async point(unit, index, signal) {
+    return json(get(`${this.base}/point?${query({ unit, index })}`, signal));
   }
 }

@@ -52,11 +52,43 @@ export function check(title, value, onChange) {
 export function range(title, value, onChange) {
   const inputs = [0, 1].map((i) => {
     const input = element("input", { type: "number", step: "any", value: value[i], title: `${title}, ${i ? "end" : "start"}` });
-    input.onchange = () => onChange(inputs.map((each) => Number(each.value)));
+    input.onchange = () => {
+      // a field that is empty, or no number, says nothing
+      const typed = inputs.map((each) => each.valueAsNumber);
+      if (typed.every(Number.isFinite)) onChange(typed);
+    };
     return input;
   });
   const made = row(title, ...inputs);
   made.set = (next) => inputs.forEach((input, i) => (input.value = round(next[i])));
+  made.set(value);
+  return made;
+}
+
+/** A slider between two numbers, and the number itself, which can be typed to any digit. */
+export function place(title, { min, max, value }, onInput) {
+  const extent = max - min || 1;
+  // a thousandth of the extent is told, whatever the size of the coordinates
+  const digits = Math.min(Math.max(Math.ceil(3 - Math.log10(extent)), 0), 9);
+  const slide = element("input", { type: "range", min: 0, max: 1, step: 0.001, title: `${title}, slider` });
+  const typed = element("input", { type: "number", step: "any", title });
+  const made = row(title, slide, typed);
+  made.className = "place";
+  made.set = (next) => {
+    slide.value = (next - min) / extent;
+    typed.value = next.toFixed(digits);
+  };
+  slide.oninput = () => {
+    const next = Number(slide.value) === 1 ? max : min + Number(slide.value) * extent; // the very end, without rounding
+    typed.value = next.toFixed(digits);
+    onInput(next);
+  };
+  typed.onchange = () => {
+    const next = typed.valueAsNumber;
+    if (!Number.isFinite(next)) return;
+    slide.value = (next - min) / extent;
+    onInput(next);
+  };
   made.set(value);
   return made;
 }

@@ -8,7 +8,7 @@ export const metres = (x) => (x === 0 ? "0" : Math.abs(x) >= 1e7 || Math.abs(x) 
 
 export class Measure {
   constructor(app, overlay) {
-    Object.assign(this, { app, overlay, points: [], isOn: false });
+    Object.assign(this, { app, overlay, entries: [], isOn: false });
   }
 
   toggle() {
@@ -17,24 +17,42 @@ export class Measure {
   }
 
   clear() {
-    this.points = [];
+    this.entries = [];
     this.draw();
   }
 
-  add(place) {
-    this.points.push(place);
+  /** A place in the order of clicks: answers may come in another one. `key` tells points apart. */
+  reserve(key) {
+    const entry = { key };
+    this.entries.push(entry);
+    return entry;
+  }
+
+  fill(entry, place) {
+    entry.place = place;
     this.draw();
+  }
+
+  drop(entry) {
+    this.entries = this.entries.filter((each) => each !== entry);
+    this.draw();
+  }
+
+  get points() {
+    return this.entries.flatMap(({ place }) => (place ? [place] : []));
   }
 
   /** Lengths of the parts and of all together, world units. */
   get lengths() {
-    return this.points.slice(1).map((place, i) => distance(place, this.points[i]));
+    const points = this.points;
+    return points.slice(1).map((place, i) => distance(place, points[i]));
   }
 
   draw() {
     const { camera } = this.app;
     const ratio = this.app.ratio;
-    const at = this.points.map((place) => camera.project(place)?.map((v) => v / ratio));
+    const points = this.points;
+    const at = points.map((place) => camera.project(place)?.map((v) => v / ratio));
     const nodes = [];
     const add = (name, fields, text) => {
       const made = document.createElementNS(SVG, name);
@@ -47,7 +65,7 @@ export class Measure {
       const [a, b] = [at[i], at[i + 1]];
       if (!a || !b) return;
       add("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] });
-      const rise = this.points[i + 1][2] - this.points[i][2];
+      const rise = points[i + 1][2] - points[i][2];
       add("text", { x: (a[0] + b[0]) / 2 + 6, y: (a[1] + b[1]) / 2 }, `${metres(length)} (Δz ${metres(rise)})`);
     });
     for (const place of at) if (place) add("circle", { cx: place[0], cy: place[1], r: 4 });

@@ -2,23 +2,37 @@
 
 import { VIEWS } from "pm/camera.js";
 import { GRADIENTS, classColour, classTitle, css } from "pm/gl/palettes.js";
-import { button, check, choice, element, range, section, slider } from "pm/ui/elements.js";
+import { colouringBy } from "pm/gl/renderer.js";
+import { button, check, choice, element, place, range, section, slider } from "pm/ui/elements.js";
+import { savePicture } from "pm/ui/picture.js";
 
 const millions = (n) => `${(n / 1e6).toFixed(1)} M`;
 
 export class Panel {
   constructor(parent, app) {
     this.app = app;
-    const title = element("h1", { textContent: "pointmill ▾", title: "Show or hide the settings" });
-    title.onclick = () => parent.classList.toggle("closed");
-    if (window.innerWidth < 600) parent.classList.add("closed");
-    parent.replaceChildren(title, this.#view(), this.#points(), this.#colours(), this.#clip(), this.#tools(), this.#datasets());
+    const wasOpen = [...parent.querySelectorAll("details")].map((each) => each.open);
+    if (wasOpen.length === 0 && window.innerWidth < 600) parent.classList.add("closed");
+    parent.replaceChildren(this.#title(parent), this.#view(), this.#points(), this.#colours(), this.#clip(), this.#tools(), this.#datasets());
+    // made anew for another link: what was unfolded stays so
+    [...parent.querySelectorAll("details")].forEach((each, i) => (each.open = wasOpen[i] ?? each.open));
+  }
+
+  #title(parent) {
+    const title = button("pointmill", "Show or hide the settings", () => {
+      parent.classList.toggle("closed");
+      tell();
+    });
+    const tell = () => title.setAttribute("aria-expanded", String(!parent.classList.contains("closed")));
+    tell();
+    return element("h1", {}, title);
   }
 
   #view() {
     const { app } = this;
     const names = Object.keys(VIEWS).map((name) => button(name, `Look from there at everything`, () => app.look(name)));
     this.fly = button("fly", "Fly with W A S D, Q and E; the wheel changes the pace", () => app.setFlying(!app.controls.isFlying));
+    this.fly.setAttribute("aria-pressed", String(app.controls.isFlying));
     const field = slider("Field of view", { min: 10, max: 120, step: 1, value: app.camera.fov, show: (v) => `${v}°` }, (v) => app.setFov(v));
     return section("View", true, element("div", { className: "row" }, ...names, this.fly), field);
   }
@@ -39,15 +53,16 @@ export class Panel {
       slider("Eye-dome", { min: 0, max: 2, step: 0.05, value: settings.edl }, change("edl")),
       check("Boxes", settings.boxes, change("boxes")),
     ];
-    const kinds = new Set(app.clouds.map((cloud) => cloud.scene.kind));
-    if (kinds.has("batches")) {
+    const first = (kind) => app.clouds.find((cloud) => cloud.scene.kind === kind);
+    const [batches, bintree] = [first("batches"), first("bintree")];
+    if (batches) {
       parts.push(
-        slider("Detail (CLOD)", { min: 0, max: 10, step: 0.1, value: 1, show: (v) => (v === 0 ? "all" : v) }, (v) => app.each("batches", { clod: v })),
-        choice("Bits", [["0", "by size"], "10", "20", "30"], "0", (v) => app.each("batches", { bits: Number(v) })),
+        slider("Detail (CLOD)", { min: 0, max: 10, step: 0.1, value: batches.clod, show: (v) => (v === 0 ? "all" : v) }, (v) => app.each("batches", { clod: v })),
+        choice("Bits", [["0", "by size"], "10", "20", "30"], String(batches.bits), (v) => app.each("batches", { bits: Number(v) })),
       );
     }
-    if (kinds.has("bintree")) {
-      parts.push(slider("Disc radius", { min: 0, max: 1, step: 0.01, value: 0, show: (v) => (v === 0 ? "off" : v) }, (v) => app.each("bintree", { radius: v })));
+    if (bintree) {
+      parts.push(slider("Disc radius", { min: 0, max: 1, step: 0.01, value: bintree.radius, show: (v) => (v === 0 ? "off" : v) }, (v) => app.each("bintree", { radius: v })));
     }
     return section("Points", true, ...parts);
   }
@@ -62,18 +77,25 @@ export class Panel {
     if (names.has("classification")) options.push(["class", "classification"]);
     options.push("height", "level", ["one", "one colour"]);
     const known = ["rgb", "rgba", "intensity", "classification", "position", "x", "y", "z"];
-    options.push(...[...names].filter((name) => !known.includes(name)));
+    options.push(...[...names].filter((name) => !known.includes(name)).map((name) => [colouringBy(name), name]));
     this.colour = choice("Colour", options, settings.colour, (value) => app.setColour(value));
-    this.range = range("Range", settings.range, (value) => app.change({ range: value }));
+    this.range = range("Range", settings.range, (value) => app.chooseRange(value));
     this.gradient = element("div", { className: "gradient" });
     this.gradient.style.background = css(settings.gradient);
     const palette = choice("Gradient", GRADIENTS, settings.gradient, (value) => {
       this.gradient.style.background = css(value);
       app.change({ gradient: value });
     });
-    this.classes = element("div", {});
+    this.classes = element("fieldset", {});
     this.ramp = element("div", {}, this.range, palette, this.gradient);
     return section("Colours", true, this.colour, this.ramp, this.classes);
+  }
+
+  /** Whether classes can be hidden while these colours are shown. */
+  setFilter(isKnown) {
+    this.classes.disabled = !isKnown;
+    this.classes.classList.toggle("off", !isKnown);
+    this.classes.title = isKnown ? "" : "Batches have either colours or classes: choose the colour classification to hide some";
   }
 
   /** The legend of the classes that were met. */
@@ -96,26 +118,24 @@ export class Panel {
 
   #clip() {
     const { app } = this;
-    const box = app.box;
+    const { box, clipBox } = app;
     const parts = ["x", "y", "z"].flatMap((name, a) =>
-      ["min", "max"].map((end) => {
-        const extent = box.max[a] - box.min[a] || 1;
-        const show = (v) => (box.min[a] + v * extent).toPrecision(4);
-        return slider(`${name} ${end}`, { min: 0, max: 1, step: 0.002, value: end === "max" ? 1 : 0, show }, (v) =>
-          app.setClip(end, a, box.min[a] + v * extent),
-        );
-      }),
+      ["min", "max"].map((end) =>
+        place(`${name} ${end}`, { min: box.min[a], max: box.max[a], value: (clipBox ?? box)[end][a] }, (value) => app.setClip(end, a, value)),
+      ),
     );
-    this.clip = check("Clip", false, (isOn) => app.setClipping(isOn));
-    return section("Clip box", false, this.clip, ...parts);
+    const isOn = app.renderer.settings.clip !== null;
+    this.clip = check("Clip", isOn, (next) => app.setClipping(next));
+    return section("Clip box", isOn, this.clip, ...parts);
   }
 
   #tools() {
     const { app } = this;
     this.measuring = button("measure", "Distances between points that are clicked", () => app.measure.toggle());
+    this.measuring.setAttribute("aria-pressed", String(app.measure.isOn));
     const clear = button("clear", "Forget the measured points", () => app.measure.clear());
-    const picture = button("picture", "Save the picture as PNG", () => app.savePicture());
-    const link = button("link", "Copy a link to this view", () => app.copyLink());
+    const picture = button("picture", "Save the picture as PNG", () => savePicture(app));
+    const link = button("link", "Copy a link to this view", () => app.address.copy());
     return section("Tools", true, element("div", { className: "row" }, this.measuring, clear, picture, link));
   }
 
@@ -123,7 +143,7 @@ export class Panel {
     const { app } = this;
     const rows = app.clouds.map((cloud) => {
       const { scene } = cloud;
-      const box = check("", true, (isShown) => app.show(cloud, isShown));
+      const box = check("", cloud.isShown, (isShown) => app.show(cloud, isShown));
       box.firstChild.remove();
       const points = scene.points === null ? "" : ` · ${scene.points.toLocaleString("en")} points`;
       const text = `${scene.name} · ${scene.format}${points}`;

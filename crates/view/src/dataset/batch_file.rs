@@ -1,12 +1,11 @@
 //! The sections of a file of batches, read batch by batch: a file that is cut while it is served is an error, where a map of it
-//! would end the process. Compressed sections are read through a map all the same, after a look at the length of the file; one that
-//! is cut in the moment between the two ends the process.
+//! would end the process. It is mapped while it is opened, to look at header, records, description and tables.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use pointmill_format::batches::{
-    AttributeEntry, BATCH_POINTS, BatchRecord, Batches, BlockScratch, ColourSource, Header, MappedFile, Part,
+    AttributeEntry, BATCH_POINTS, BatchRecord, Batches, BlockScratch, ColourSource, CompressedSection, Header, Part,
 };
 use pointmill_format::bytes::{open_file, read_exact_at};
 use pointmill_format::{Attribute, ReadError};
@@ -22,8 +21,8 @@ pub(super) struct BatchFile {
     pub(super) colour: ColourSource,
     file: File,
     path: PathBuf,
-    /// Of a compressed file, whose blocks only the map decompresses.
-    compressed: Option<Batches<MappedFile>>,
+    /// Sections of a compressed file.
+    compressed: Option<Vec<(Part, CompressedSection)>>,
     /// Bytes of the file when it was opened.
     bytes: u64,
 }
@@ -34,6 +33,12 @@ impl BatchFile {
         let file = open_file(batches.path()).map_err(|e| ReadError::io(path, "opening", e))?;
         let bytes = file.metadata().map_err(|e| ReadError::io(path, "asking for the size", e))?.len();
         let description = batches.description();
+        let planes =
+            [Part::Hi10, Part::Mid10, Part::Lo10].into_iter().take(batches.header().precision().planes() as usize);
+        let attributes = (0..batches.attributes().len()).map(Part::Attribute);
+        let parts = planes.chain([Part::Colour]).chain(attributes);
+        let section = |part| Ok((part, batches.compressed_section(part)?));
+        let compressed = batches.is_compressed().then(|| parts.map(section).collect::<Result<_, ReadError>>());
         Ok(Self {
             header: batches.header().clone(),
             records: batches.records().to_vec(),
@@ -43,7 +48,7 @@ impl BatchFile {
             colour: description.colour,
             file,
             path: batches.path().to_path_buf(),
-            compressed: batches.is_compressed().then_some(batches),
+            compressed: compressed.transpose()?,
             bytes,
         })
     }
@@ -57,16 +62,19 @@ impl BatchFile {
         out: &mut Vec<u8>,
     ) -> Result<(), ReadError> {
         out.clear();
-        if let Some(batches) = &self.compressed {
-            self.check_length()?;
-            out.extend_from_slice(batches.batch(part, slot, scratch)?);
+        if let Some(sections) = &self.compressed {
+            let (_, section) = sections.iter().find(|(p, _)| *p == part).ok_or_else(|| self.absent())?;
+            out.extend_from_slice(section.batch(slot, scratch, |at, bytes| self.read_at(at, bytes))?);
             return Ok(());
         }
         let Some(((start, size), record)) = self.place(part).zip(self.records.get(slot as usize)) else {
-            return Err(ReadError::unsupported(&self.path, "the file has no such section or batch"));
+            return Err(self.absent());
         };
         out.resize(record.points as usize * size, 0);
-        let at = start + u64::from(slot) * u64::from(BATCH_POINTS) * size as u64;
+        self.read_at(start + u64::from(slot) * u64::from(BATCH_POINTS) * size as u64, out)
+    }
+
+    fn read_at(&self, at: u64, out: &mut [u8]) -> Result<(), ReadError> {
         read_exact_at(&self.file, out, at).map_err(|error| match error.kind() {
             std::io::ErrorKind::UnexpectedEof => self.cut(),
             _ => ReadError::io(&self.path, "reading a batch", error),
@@ -85,9 +93,8 @@ impl BatchFile {
         }
     }
 
-    fn check_length(&self) -> Result<(), ReadError> {
-        let now = self.file.metadata().map_err(|e| ReadError::io(&self.path, "asking for the size", e))?.len();
-        if now < self.bytes { Err(self.cut()) } else { Ok(()) }
+    fn absent(&self) -> ReadError {
+        ReadError::unsupported(&self.path, "the file has no such section or batch")
     }
 
     fn cut(&self) -> ReadError {

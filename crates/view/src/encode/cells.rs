@@ -2,9 +2,9 @@
 
 use pointmill_format::{Lattice, NodePoints, Positions};
 
-/// The largest integer of 16 and of 32 bits.
+/// The largest integer of 16 bits, and of the 31 that differences of signed integers in a shader leave.
 const NARROW: u32 = u16::MAX as u32;
-const WIDE: u32 = u32::MAX;
+const WIDE: u32 = i32::MAX as u32;
 
 /// How positions of a unit become integers: `world = origin + integer · step`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +20,7 @@ enum Rule {
     /// Lattice integers, less the least.
     Exact { least: [i32; 3] },
     /// Lattice integers over the box, rounded: `(q − least) · factor`.
-    Lattice { least: [i32; 3], factor: [f64; 3] },
+    Lattice { least: [i32; 3], factor: [f64; 3], most: u32 },
     /// World coordinates over the box, rounded: `(p − origin) · factor`.
     World { factor: [f64; 3], most: u32 },
 }
@@ -40,14 +40,15 @@ impl Cells {
         let greatest = axes.each_ref().map(|axis| axis.iter().step_by(every).copied().max().unwrap_or(0));
         let extent: [u32; 3] = std::array::from_fn(|a| greatest[a].abs_diff(least[a]));
         let origin = lattice.world(least.map(i64::from));
-        let is_small = extent.iter().all(|e| *e <= NARROW);
-        if is_small || !may_round {
-            return Self { is_wide: !is_small, origin, step: lattice.scale, rule: Rule::Exact { least } };
+        let fits = |most: u32| extent.iter().all(|e| *e <= most);
+        if fits(NARROW) || (!may_round && fits(WIDE)) {
+            return Self { is_wide: !fits(NARROW), origin, step: lattice.scale, rule: Rule::Exact { least } };
         }
-        let cells = f64::from(NARROW);
+        let most = if may_round { NARROW } else { WIDE };
+        let cells = f64::from(most);
         let step = std::array::from_fn(|a| f64::from(extent[a]) * lattice.scale[a] / cells);
         let factor = extent.map(|e| if e == 0 { 0.0 } else { cells / f64::from(e) });
-        Self { is_wide: false, origin, step, rule: Rule::Lattice { least, factor } }
+        Self { is_wide: most == WIDE, origin, step, rule: Rule::Lattice { least, factor, most } }
     }
 
     fn of_world(axes: &[Vec<f64>; 3], every: usize, most: u32) -> Self {
@@ -72,9 +73,9 @@ impl Cells {
             (Positions::Quantized(axes), Rule::Exact { least }) => {
                 std::array::from_fn(|a| axes[a].get(index).map_or(0, |q| q.abs_diff(least[a])))
             }
-            (Positions::Quantized(axes), Rule::Lattice { least, factor }) => std::array::from_fn(|a| {
+            (Positions::Quantized(axes), Rule::Lattice { least, factor, most }) => std::array::from_fn(|a| {
                 let above = axes[a].get(index).map_or(0, |q| q.abs_diff(least[a]));
-                ((f64::from(above) * factor[a]).round() as u32).min(NARROW)
+                ((f64::from(above) * factor[a]).round() as u32).min(most)
             }),
             // `as` makes 0 of what is no number
             (Positions::World(axes), Rule::World { factor, most }) => std::array::from_fn(|a| {
@@ -109,6 +110,32 @@ mod tests {
         assert_eq!((rounded.is_wide, rounded.step), (false, [0.02; 3]));
         let all = Cells::of_lattice(&[vec![i32::MIN, i32::MAX], vec![0, 0], vec![0, 0]], &LATTICE, 1, false);
         assert!(all.is_wide);
+        let ends = Positions::Quantized([vec![i32::MIN, i32::MAX], vec![0, 0], vec![0, 0]]);
+        assert_eq!([all.of(&ends, 0), all.of(&ends, 1)], [[0; 3], [WIDE, 0, 0]], "no integer has 32 bits");
+    }
+
+    /// Half a step of the box, which is more than one of the lattice.
+    #[test]
+    fn integers_are_below_2_to_the_31() {
+        let axes = [vec![i32::MIN, i32::MAX, 1], vec![i32::MIN + 1, 0, -7], vec![0, 0, 9]];
+        let lattice = Cells::of_lattice(&axes, &LATTICE, 1, false);
+        assert_eq!(
+            (lattice.is_wide, lattice.rule == Rule::Exact { least: [i32::MIN, i32::MIN + 1, 0] }),
+            (true, false)
+        );
+        let world: [Vec<f64>; 3] = axes.each_ref().map(|axis| axis.iter().map(|q| f64::from(*q)).collect());
+        let cells = Cells::of_world(&world, 1, WIDE);
+        for (cells, positions, scale) in
+            [(lattice, Positions::Quantized(axes), LATTICE.scale[0]), (cells, Positions::World(world.clone()), 1.0)]
+        {
+            for (i, a) in (0..3).flat_map(|i| (0..3).map(move |a| (i, a))) {
+                let integer = cells.of(&positions, i)[a];
+                assert!(integer <= i32::MAX as u32, "{integer}");
+                let found = f64::from(integer) * cells.step[a];
+                let meant = (world[a][i] - world[a].iter().copied().fold(f64::INFINITY, f64::min)) * scale;
+                assert!((found - meant).abs() <= 0.5 * cells.step[a] * (1.0 + 1e-6), "{found}, not {meant}");
+            }
+        }
     }
 
     /// Half a step, and the rounding of sums and products in double precision.
@@ -147,5 +174,6 @@ mod tests {
         assert_eq!(cells.origin, [0.0, 7.0, -1e308]);
         assert_eq!((cells.step[0], cells.step[1]), (0.0, 0.0));
         assert!(cells.step.iter().all(|s| s.is_finite()));
+        assert_eq!(cells.of(&Positions::World(axes), 1)[2], i32::MAX as u32, "what a shader takes for positive");
     }
 }

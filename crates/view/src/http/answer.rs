@@ -3,7 +3,7 @@
 use http_body_util::combinators::UnsyncBoxBody;
 use http_body_util::{BodyExt as _, Full};
 use hyper::body::Bytes;
-use hyper::header::{ALLOW, CACHE_CONTROL, CONTENT_TYPE, HeaderName, HeaderValue};
+use hyper::header::{ALLOW, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue};
 use hyper::{Response, StatusCode};
 use serde_json::{Value, json};
 use tokio::sync::OwnedSemaphorePermit;
@@ -17,8 +17,16 @@ const JSON: &str = "application/json";
 const HTML: &str = "text/html; charset=utf-8";
 const BYTES: &str = "application/octet-stream";
 
+/// What the page may do: run what is in it, ask this server, save a picture; and no other page may frame it. Its modules are
+/// `data:` addresses in an import map.
+const PAGE_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; \
+     img-src data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// The page.
 pub(super) fn html(text: String) -> Answer {
-    answer(StatusCode::OK, HTML, text.into())
+    let mut answer = answer(StatusCode::OK, HTML, text.into());
+    answer.headers_mut().insert(CONTENT_SECURITY_POLICY, HeaderValue::from_static(PAGE_POLICY));
+    answer
 }
 
 pub(super) fn json(value: &Value) -> Answer {
@@ -37,11 +45,12 @@ pub(super) fn nothing() -> Answer {
     answer
 }
 
-pub(super) fn refusal(refusal: &Refusal) -> Answer {
+/// `allowed`: the methods that the address answers.
+pub(super) fn refusal(refusal: &Refusal, allowed: &'static str) -> Answer {
     let status = StatusCode::from_u16(refusal.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     let mut answer = answer(status, JSON, json!({ "error": refusal.line }).to_string().into());
     if status == StatusCode::METHOD_NOT_ALLOWED {
-        answer.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
+        answer.headers_mut().insert(ALLOW, HeaderValue::from_static(allowed));
     }
     answer
 }

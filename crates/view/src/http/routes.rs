@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use hyper::Request;
+use hyper::{Method, Request};
 
 use super::answer::{self, Answer};
 use super::files;
@@ -23,13 +23,21 @@ pub(super) async fn answer<B>(state: Arc<State>, request: Request<B>) -> Answer 
         if refusal.status >= 500 {
             state.failed(&refusal.line);
         }
-        answer::refusal(&refusal)
+        answer::refusal(&refusal, if is_api(&request) { "GET" } else { "GET, HEAD" })
     });
     answer::with_usual_headers(answer)
 }
 
+fn is_api<B>(request: &Request<B>) -> bool {
+    request.uri().path().starts_with("/api/")
+}
+
 async fn route<B>(state: &Arc<State>, request: &Request<B>) -> Result<Answer, Refusal> {
     let absent = || Refusal::absent("there is nothing at this address");
+    if is_api(request) && request.method() == Method::HEAD {
+        // its points would be decoded to count their bytes
+        return Err(Refusal { status: 405, line: "HEAD is for the page and for raw files".to_owned() });
+    }
     let path = request.uri().path();
     let mut segments = path.strip_prefix('/').ok_or_else(absent)?.split('/');
     match segments.next() {

@@ -46,6 +46,13 @@ fn an_octree_that_is_cut_or_removed_is_an_error_of_the_request() {
         served.bytes("/api/0/nodes?of=r");
     }
     let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pages.copc.laz");
+    fs::copy(fixture("copc/pages.copc.laz"), &path).unwrap();
+    let served = serve(&[&path]);
+    served.bytes("/api/0/points?units=r");
+    cut(&path, 700);
+    fails(&served, "/api/0/points?units=r", "pages.copc.laz");
+    let folder = tempfile::tempdir().unwrap();
     copy("potree1/words", folder.path());
     let served = serve(&[folder.path()]);
     fs::remove_dir_all(folder.path()).unwrap();
@@ -54,7 +61,15 @@ fn an_octree_that_is_cut_or_removed_is_an_error_of_the_request() {
 }
 
 #[test]
-fn a_leaf_that_is_gone_is_an_error_of_the_request() {
+fn a_leaf_that_is_gone_or_cut_is_an_error_of_the_request() {
+    let folder = tempfile::tempdir().unwrap();
+    copy("bintree/packed", folder.path());
+    let served = serve(&[folder.path()]);
+    let leaf = pointmill_format::bintree::Bintree::open(folder.path()).unwrap().leaves().last().unwrap();
+    let target = format!("/api/0/points?units={leaf}");
+    served.bytes(&target);
+    cut(&folder.path().join("leaves.bin"), 20);
+    fails(&served, &target, "leaves.bin");
     let folder = tempfile::tempdir().unwrap();
     copy("bintree/files", folder.path());
     let served = serve(&[folder.path()]);
@@ -63,6 +78,29 @@ fn a_leaf_that_is_gone_is_an_error_of_the_request() {
     let name = tree.leaf_name(leaf);
     fs::remove_file(folder.path().join(&name)).unwrap();
     fails(&served, &format!("/api/0/points?units={leaf}"), &name);
+}
+
+/// A map of the file would end the process, whatever was checked before.
+#[test]
+fn batches_may_be_cut_while_they_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = three_batches(&folder, true);
+    let (bytes, served) = (fs::read(&path).unwrap(), serve(&[&path]));
+    let statuses: Vec<u16> = std::thread::scope(|scope| {
+        let cutter = scope.spawn(|| {
+            for _ in 0..300 {
+                cut(&path, 4096);
+                fs::write(&path, &bytes).unwrap();
+            }
+        });
+        let mut statuses = Vec::new();
+        while !cutter.is_finished() {
+            statuses.push(served.get("/api/0/batches?units=0,1,2&planes=3").status);
+        }
+        statuses
+    });
+    assert!(statuses.iter().all(|status| [200, 500].contains(status)), "{statuses:?}");
+    served.bytes("/api/0/batches?units=0,1,2&planes=3");
 }
 
 #[test]

@@ -120,6 +120,8 @@ pub(crate) fn points(header: &Header, body: &[u8]) -> Vec<Point> {
     let integer = |at: usize| if is_wide { u32_at(body, at) } else { u16_at(body, at).into() };
     let point = |i: usize| {
         let word = |axis: usize| integer((4 * i + axis) * size);
+        // a shader takes them as numbers with a sign
+        assert!((0..3).all(|axis| word(axis) < 1 << 31), "{header:?}: point {i}");
         let colour = 4 * n * size + 4 * i;
         Point {
             world: std::array::from_fn(|a| header.origin[a] + f64::from(word(a)) * header.step[a]),

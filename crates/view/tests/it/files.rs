@@ -119,6 +119,8 @@ fn the_page_is_served_with_the_datasets() {
     let served = serve(&[&fixture("potree2/default"), &fixture("bintree/files")]);
     let page = served.get("/");
     assert_eq!(page.header("content-type"), Some("text/html; charset=utf-8"));
+    let policy = page.header("content-security-policy").unwrap();
+    assert!(policy.contains("frame-ancestors 'none'") && policy.contains("connect-src 'self'"), "{policy}");
     let text = String::from_utf8(page.body).unwrap();
     assert!(text.contains(r#""scenes":["api/0","api/1"]"#) && text.contains(pointmill_view::GENERATOR), "{text}");
     assert_eq!(served.get("/favicon.ico").status, 204);
@@ -133,7 +135,11 @@ fn other_hosts_and_other_methods_are_refused() {
         assert_eq!(Answer::parse(&served.raw(request.as_bytes())).refusal().0, 403, "{head}");
     }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "BREW"] {
-        let answer = served.request(method, "/api/0/scene", "");
-        assert_eq!((answer.status, answer.header("allow")), (405, Some("GET, HEAD")), "{method}");
+        for (target, allowed) in [("/", "GET, HEAD"), ("/api/0/scene", "GET")] {
+            let answer = served.request(method, target, "");
+            assert_eq!((answer.status, answer.header("allow")), (405, Some(allowed)), "{method} {target}");
+        }
     }
+    assert_eq!(served.request("HEAD", "/", "").status, 200);
+    assert_eq!(served.request("HEAD", "/api/0/points?units=r", "").status, 405, "nothing is decoded for a head");
 }

@@ -71,6 +71,11 @@ impl StagedFolder {
         self.hidden.path()
     }
 
+    /// The folder that becomes the output.
+    pub(crate) fn path_of_new(&self) -> PathBuf {
+        self.hidden.path_of_new()
+    }
+
     /// The place of a dataset: the folder itself if it is the only one, else a folder in it.
     pub(crate) fn dataset(&self, kind: DatasetKind, is_only_one: bool) -> Result<StagedDataset, ConvertError> {
         let mut dataset = self.whole();
