@@ -75,9 +75,7 @@ mod tests {
         assert_eq!(points.len(), count);
         let (classes, intensities) = (points.column::<f32>("classification"), points.column::<u16>("intensity"));
         let (classes, intensities) = (classes.unwrap(), intensities.unwrap());
-        for i in 0..count {
-            assert_eq!(points.world(i), Some(world(i)));
-            assert_eq!((classes[i], intensities[i]), ((i % 7) as f32, 3 * i as u16));
-        }
+        let expected = |i: usize| (Some(world(i)), (i % 7) as f32, 3 * i as u16);
+        assert!((0..count).all(|i| (points.world(i), classes[i], intensities[i]) == expected(i)));
     }
 }

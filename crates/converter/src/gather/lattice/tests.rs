@@ -223,37 +223,6 @@ fn scans_are_read_again_for_steps_that_are_much_finer_or_that_were_lost() {
     let mut precise = sources(vec![world([Fineness::Double; 3], [0.0; 3], [1000.0; 3])]);
     precise.tolerance = Some(Tolerance { total: [0.01; 3], lattice: [0.01; 3] });
     assert_eq!([0.02, 0.021].map(|step| again(&precise, step, 9)), [None, Some(0.02)]);
-    precise.tolerance = Some(Tolerance { total: [0.0105; 3], lattice: [0.0105; 3] });
-    assert_eq!([0.021, 0.022].map(|step| again(&precise, step, 9)), [None, Some(0.02)]);
-    // the most steps there are
-    let whole = sources(vec![with_lattice(lattice(1.0, [0.0; 3]), None)]);
-    let most = (1 << 31) - 2;
-    assert_eq!([again(&whole, 1.0, most), again(&whole, 1.0, most + 1)], [None, Some(2.0)]);
-}
-
-#[test]
-fn scans_are_not_read_again_for_what_no_source_lost_or_what_is_no_finer() {
-    let auto = plan(ScaleChoice::Auto);
-    let bounds = JobBounds { min: JobPoint([0; 3]), max: JobPoint([9; 3]) };
-    // one grid that holds those of both is finer than either
-    let two = sources([0.01, 0.025].map(|step| with_lattice(lattice(step, [0.0; 3]), None)).into());
-    let again = |step| {
-        let present = JobLattice { lattice: lattice(step, [0.0; 3]), ..from_headers(&auto, &two).unwrap() };
-        let mut seen = stats(bounds, &present.lattice, [false; 3]);
-        seen.sources.push(SourceStats { bounds: seen.sources[0].bounds, ..SourceStats::default() });
-        settled(&auto, &two, &present, &seen).map(|j| j.lattice.scale[0])
-    };
-    assert_eq!([again(0.01), again(0.02)], [None, Some(0.005)]);
-    let own = sources(vec![with_lattice(lattice(0.01, [0.0; 3]), None)]);
-    let present = from_headers(&auto, &own).unwrap();
-    assert_eq!(settled(&auto, &own, &present, &stats(bounds, &present.lattice, [true; 3])), None, "the same again");
-}
-
-#[test]
-fn an_axis_that_asks_for_nothing_has_the_finest_step_of_the_others() {
-    let flat = |first, second| chosen(vec![world([first, second, Fineness::Single], [0.0; 3], [10.0, 10.0, 0.0])]);
-    assert_eq!(flat(grid(0.001), grid(1e-8)).lattice.scale, [0.001, 1e-8, 1e-8]);
-    assert_eq!(flat(grid(1e-8), grid(0.001)).lattice.scale, [1e-8, 0.001, 1e-8]);
 }
 
 #[test]
