@@ -259,4 +259,40 @@ mod tests {
         assert_eq!((e.rms, e.mean), ([4097.0, 0.0, 4097.0], [0.0; 3]));
         assert_eq!(e.rms_3d, 33_570_818f64.sqrt());
     }
+
+    #[test]
+    fn figures_in_other_units_are_bounds_of_the_length() {
+        let e = PositionErrors::measured(&of(&[[3.0, 0.0, 0.0], [-1.0, 4.0, 0.0]])).scaled([2.0, 0.5, 3.0]);
+        assert_eq!((e.max, e.mean, e.how), ([6.0, 2.0, 0.0], [2.0, 1.0, 0.0], How::Bound));
+        assert_eq!(e.rms, [2.0 * 5f64.sqrt(), 0.5 * 8f64.sqrt(), 0.0]);
+        assert_eq!((e.max_3d, e.rms_3d), (above(40f64.sqrt()), length(e.rms)));
+        let rounding = PositionErrors::rounding([1e-9, 0.0, 0.0]).scaled([8.0; 3]);
+        assert_eq!((rounding.max, rounding.how), ([8e-9, 0.0, 0.0], How::Rounding));
+        assert_eq!(PositionErrors::default().scaled([2.0; 3]), PositionErrors::default());
+    }
+
+    #[test]
+    fn lengths_are_exact_on_an_axis_and_a_little_more_elsewhere() {
+        assert_eq!([length([0.0; 3]), length([0.0, 3.0, 0.0]), length([0.1, 0.0, 0.0])], [0.0, 3.0, 0.1]);
+        assert_eq!((above(1.0), length([0.0, 3.0, 4.0])), (1.0 + 2f64.powi(-50), above(5.0)));
+        assert_eq!(length([2.0, 3.0, 6.0]), above(7.0));
+    }
+
+    #[test]
+    fn sums_of_rounding_are_rounding_and_all_others_are_bounds() {
+        let (rounding, bound) = (PositionErrors::rounding([1e-9; 3]), PositionErrors::bound([1e-3; 3]));
+        let measured = PositionErrors::measured(&of(&[[-0.5, 0.25, 0.0]]));
+        let how = |a: PositionErrors, b: PositionErrors| a.after(&b).how;
+        assert_eq!(how(rounding, rounding), How::Rounding);
+        assert_eq!([how(rounding, bound), how(bound, rounding), how(measured, rounding)], [How::Bound; 3]);
+        // of a measured mean and a bound the sizes add up, whatever the signs
+        let mean = PositionErrors::bound([0.125; 3]).after(&measured).mean;
+        assert_eq!(mean, [-above(0.625), above(0.375), above(0.125)]);
+        assert_eq!(measured.after(&PositionErrors::bound([0.125; 3])).mean, [above(0.625), above(0.375), above(0.125)]);
+        assert_eq!((rounding.as_rounding().how, bound.as_rounding().how), (How::Rounding, How::Rounding));
+        assert_eq!(PositionErrors::default().as_rounding(), PositionErrors::default());
+        // the length of the largest by axis where that is less than the sum of the lengths
+        let across = PositionErrors::bound([3.0, 0.0, 0.0]).after(&PositionErrors::bound([0.0, 4.0, 0.0]));
+        assert_eq!(across.max_3d, length([above(3.0), above(4.0), 0.0]));
+    }
 }

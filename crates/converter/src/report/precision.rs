@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use pointmill_format::DatasetKind;
+use pointmill_format::{DatasetKind, Lattice};
 use serde::{Serialize, Serializer};
 
 use super::accuracy::{Accuracy, PositionErrors};
-use crate::cloud::{Change, Cloud};
+use crate::cloud::{Change, Cloud, Cube, JobBounds};
 use crate::error::{ConvertError, Unsupported};
 
 /// Operations of doubles between the coordinate of a scan and the one that is decoded, and between both and their
@@ -127,17 +127,18 @@ fn first_above(errors: &PositionErrors, allowed: [f64; 3], rounding: [f64; 3]) -
 
 /// By axis, how far apart doubles may be that stand for one coordinate of the cloud.
 fn rounding(cloud: &Cloud<'_>) -> [f64; 3] {
-    let (bounds, lattice) = (&cloud.stats.bounds, &cloud.lattice.lattice);
-    let offsets = |a: usize| {
-        let own = cloud.sources.all.iter().filter_map(move |s| s.stored.lattice.map(|l| l.offset[a]));
-        own.chain([lattice.offset[a]]).fold(0.0, |most: f64, offset| most.max(offset.abs()))
-    };
+    let offsets: Vec<[f64; 3]> = cloud.sources.all.iter().filter_map(|s| s.stored.lattice.map(|l| l.offset)).collect();
+    rounding_of(&cloud.stats.bounds, &cloud.lattice.lattice, &offsets, &cloud.frame.cube)
+}
+
+/// The same, from the largest number that a coordinate is computed with. `offsets`: those of the sources.
+fn rounding_of(bounds: &JobBounds, lattice: &Lattice, offsets: &[[f64; 3]], cube: &Cube) -> [f64; 3] {
     // octrees count from the corner of their cube, which may be far from the points where their steps are few
-    let cube = &cloud.frame.cube;
     let corner = cube.offset(lattice);
     std::array::from_fn(|a| {
         let world = |q: i64| (q as f64 * lattice.scale[a]).abs() + lattice.offset[a].abs();
-        let largest = world(bounds.min[a]).max(world(bounds.max[a])).max(offsets(a)).max(corner[a].abs() + cube.side);
+        let ends = [world(bounds.min[a]), world(bounds.max[a]), corner[a].abs() + cube.side];
+        let largest = offsets.iter().map(|offset| offset[a].abs()).chain(ends).fold(0.0, f64::max);
         ROUNDINGS * f64::EPSILON / 2.0 * largest
     })
 }
@@ -165,5 +166,20 @@ mod tests {
         assert_eq!(all.map(SavedBytes::bytes), [Some(0), Some(0), Some(80), None]);
         let json = serde_json::to_value(SavedBytes::Compressed).unwrap();
         assert!(json["bytes"].is_null() && json["what"].as_str().unwrap().contains("not counted"));
+    }
+
+    #[test]
+    fn doubles_are_rounded_by_the_largest_number_that_a_coordinate_is_computed_with() {
+        // x: 0 to 5 by way of 100; y: the offset of a source; z: the cube, whose side is 129 steps
+        let lattice = Lattice { scale: [0.5; 3], offset: [100.0, 0.0, 0.0] };
+        let bounds = JobBounds::new([-200, 0, 0], [-190, 0, 0]);
+        let cube = Cube::around(&bounds, &lattice).unwrap();
+        let corner = cube.offset(&lattice)[2];
+        assert!(cube.side == 64.5 && corner < -1.0, "{cube:?}");
+        let unit = ROUNDINGS * 2f64.powi(-53);
+        let found = rounding_of(&bounds, &lattice, &[[7.0, 512.0, 1.0], [7.0, -1024.0, 1.0]], &cube);
+        assert_eq!(found, [200.0 * unit, 1024.0 * unit, (64.5 - corner) * unit]);
+        let other_end = JobBounds::new([-190, 0, 0], [200, 0, 0]);
+        assert_eq!(rounding_of(&other_end, &lattice, &[], &cube)[0], 200.0 * unit);
     }
 }

@@ -191,6 +191,8 @@ mod tests {
     fn positions_from_the_origin_are_doubles() {
         let g = grid([5_400_000.062_5, -1.5, 0.0], [5_400_001.0, 3.0, 0.25], 0.25);
         assert_eq!(g.relative([5_400_000.562_5, -1.25, 0.25]), [0.5625, 0.75, 0.25]);
+        let fine = 0.25 - 2f64.powi(-30); // more bits than single precision has
+        assert_eq!(g.relative([5_400_000.562_5, -1.25, fine]), [0.5625, 0.75, fine]);
         assert_eq!(g.cells([0.5625, 0.75, 0.25]), [2.25, 3.0, 1.0]);
     }
 

@@ -46,3 +46,36 @@ pub(super) fn core(record: &[u8]) -> Option<([f32; 3], f32)> {
     let &[x, y, z, class] = words else { return None };
     Some(([x, y, z].map(f32::from_le_bytes), f32::from_le_bytes(class)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Attribute;
+    use crate::bintree::LeafEncoder;
+
+    #[test]
+    fn what_was_encoded_comes_back_by_column() {
+        let layout = RecordLayout::new([Attribute::new("intensity", AttributeType::UInt16, 1)]).unwrap();
+        let (center, count) = ([100.0, -8.0, 0.5], 2 * BLOCK_POINTS + 3);
+        let world = |i: usize| std::array::from_fn(|a| center[a] + (i + a) as f64 / 8.0);
+        let mut points = NodePoints::default();
+        for _ in 0..2 {
+            reset(&mut points, &layout);
+            assert_eq!((points.len(), points.stored.len()), (0, 0), "what was there before is gone");
+            let mut leaf = LeafEncoder::new(&layout, center, &mut points.stored);
+            for i in 0..count {
+                let rest = leaf.push(world(i), (i % 7) as f64);
+                rest[..2].copy_from_slice(&(3 * i as u16).to_le_bytes());
+            }
+            fill(&mut points, &layout, center);
+        }
+        assert_eq!(core(&points.stored), Some(([0.0, 0.125, 0.25], 0.0)));
+        assert_eq!(core(&points.stored[layout.stride() * 5..]), Some(([0.625, 0.75, 0.875], 5.0)));
+        assert_eq!(core(&points.stored[..CORE_BYTES - 1]), None);
+        assert_eq!(points.len(), count);
+        let (classes, intensities) = (points.column::<f32>("classification"), points.column::<u16>("intensity"));
+        let (classes, intensities) = (classes.unwrap(), intensities.unwrap());
+        let expected = |i: usize| (Some(world(i)), (i % 7) as f32, 3 * i as u16);
+        assert!((0..count).all(|i| (points.world(i), classes[i], intensities[i]) == expected(i)));
+    }
+}

@@ -161,4 +161,16 @@ mod tests {
         // so many units that doubles do not count them
         assert!(!AxisGrid { step: 1e-15, offset: 0.0 }.holds(&AxisGrid { step: 1.0, offset: 0.0 }));
     }
+
+    #[test]
+    fn tolerances_are_last_bits_of_the_numbers_that_are_divided() {
+        let ulps = |v: f64, n: i32| v + f64::from(n) * (v.next_up() - v);
+        let ones = AxisGrid { step: 1.0, offset: 0.0 };
+        let is_held = |step| ones.holds(&AxisGrid { step, offset: 0.0 });
+        assert!(is_held(ulps(1000.0, 3)) && !is_held(ulps(1000.0, 9)));
+        // offsets on both sides of 0 are farther apart than either is from it
+        let far = AxisGrid { step: 1.0, offset: -1e10 };
+        let to = |offset| far.holds(&AxisGrid { step: 1.0, offset });
+        assert!(to(ulps(1e10, 6)) && !to(ulps(1e10, 12)));
+    }
 }

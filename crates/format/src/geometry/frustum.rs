@@ -119,6 +119,17 @@ mod tests {
     }
 
     #[test]
+    fn a_camera_along_any_axis_whose_up_is_parallel_sees_ahead() {
+        for axis in 0..3 {
+            let ahead: [f64; 3] = std::array::from_fn(|a| if a == axis { 10.0 } else { 0.0 });
+            let f = Frustum::perspective([0.0; 3], ahead, ahead, 90f64.to_radians(), 1.0, [1.0, 50.0]);
+            let corner = |side: f64| std::array::from_fn(|a| if a == axis { 10.0 } else { side });
+            assert!(f.contains(ahead) && f.contains(corner(9.9)) && f.contains(corner(-9.9)), "{f:?}");
+            assert!(!f.contains(corner(10.1)) && !f.contains(corner(-10.1)), "{f:?}");
+        }
+    }
+
+    #[test]
     fn a_perspective_camera_sees_ahead_and_not_aside() {
         let f = Frustum::perspective(
             [100.0, 0.0, 0.0],
@@ -135,6 +146,8 @@ mod tests {
         }
         for outside in
             [[100.0, 0.5, 0.0], [100.0, 51.0, 0.0], [100.0, 10.0, 10.1], [120.1, 10.0, 0.0], [100.0, -10.0, 0.0]]
+                .into_iter()
+                .chain([[79.9, 10.0, 0.0], [100.0, 10.0, -10.1]])
         {
             assert!(!f.contains(outside), "{outside:?}");
         }
@@ -142,5 +155,7 @@ mod tests {
         assert!(f.may_see(&around([100.0, 10.0, 10.5])) && !f.may_see(&around([100.0, 10.0, 12.5])));
         assert_eq!(f.cut(&around([100.0, 20.0, 0.0]), Frustum::ALL), Some(0));
         assert_eq!(f.cut(&around([100.0, 50.0, 0.0]), Frustum::ALL), Some(0b10_0000));
+        let at_near = Aabb { min: [99.5, 1.0, -0.5], max: [100.5, 3.0, 0.5] };
+        assert_eq!(f.cut(&at_near, Frustum::ALL), Some(0), "a plane that a box touches does not cut it");
     }
 }

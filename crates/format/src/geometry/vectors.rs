@@ -21,3 +21,15 @@ pub(crate) fn unit(v: [f64; 3]) -> [f64; 3] {
     let length = length(v);
     v.map(|c| c / length)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_those_of_the_textbook() {
+        let (a, b) = ([2.0, 3.0, 5.0], [7.0, 11.0, 13.0]);
+        assert_eq!((dot(a, b), cross(a, b), minus(a, b)), (112.0, [-16.0, 9.0, 1.0], [-5.0, -8.0, -8.0]));
+        assert_eq!((length([2.0, -3.0, 6.0]), unit([0.0, -8.0, 0.0])), (7.0, [0.0, -1.0, 0.0]));
+    }
+}

@@ -195,3 +195,101 @@ fn parts_of(step: f64, wanted: f64) -> f64 {
     }
     parts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(step: f64, origin: GridOrigin) -> Need {
+        Need::Grid { grid: AxisGrid { step, offset: 0.0 }, origin }
+    }
+
+    const ALL: Room = Room { wished: 0.0, certain: 0.0, doubles: 0.0 };
+
+    #[test]
+    fn parts_are_the_most_powers_of_ten_that_are_asked_for() {
+        let cases = [(0.001, 0.0001), (0.001, 0.000_11), (0.001, 0.001), (0.3, 0.03), (0.3, 0.003), (1.0, 2e-5)];
+        assert_eq!(cases.map(|(step, wanted)| parts_of(step, wanted)), [10.0, 1.0, 1.0, 10.0, 100.0, 1e4]);
+        assert_eq!([parts_of(1.0, 1e-9), parts_of(1.0, 1e-10), parts_of(1.0, 0.0)], [1e9, 1e9, 1.0]);
+    }
+
+    #[test]
+    fn room_is_what_integers_and_doubles_leave() {
+        let reach = |extent, farthest| Reach { extent, farthest };
+        let by_extent = Room::new(reach(4.0 * MOST_STEPS, 8.0), reach(MOST_STEPS, 1.0));
+        assert_eq!(by_extent, Room { wished: 4.0, certain: 1.0, doubles: 2f64.powi(-51) });
+        let by_doubles = Room::new(reach(1.0, 2f64.powi(60)), reach(1.0, 2f64.powi(53)));
+        assert_eq!(by_doubles, Room { wished: 512.0, certain: 4.0, doubles: 4.0 });
+        let of = |min, max| Reach::of(&Aabb { min: [min; 3], max: [max; 3] }, 1);
+        assert_eq!([of(-3.0, 1.0), of(-1.0, 3.0), of(2.0, 1.0)], [reach(4.0, 3.0), reach(4.0, 3.0), reach(0.0, 0.0)]);
+    }
+
+    #[test]
+    fn grids_give_their_step_and_the_reason() {
+        let chosen = |needs: &[Need], room| {
+            let c = choose(needs, room);
+            (c.grid.step, c.reason.basis, [c.is_prescribed, c.is_free, c.holds_all])
+        };
+        let origins = [
+            (GridOrigin::Lattice, LatticeBasis::Sources, [true, false, true]),
+            (GridOrigin::Divisor, LatticeBasis::Divisor, [true, false, false]),
+            (GridOrigin::Stated, LatticeBasis::StoredStep, [false; 3]),
+            (GridOrigin::Decimals, LatticeBasis::Decimals, [false; 3]),
+        ];
+        for (origin, basis, flags) in origins {
+            assert_eq!(chosen(&[of(0.01, origin)], ALL), (0.01, basis, flags));
+        }
+        let [lattice, decimals] = [GridOrigin::Lattice, GridOrigin::Decimals];
+        let two = [of(0.01, lattice), of(0.001, lattice)];
+        assert_eq!(chosen(&two, ALL), (0.001, LatticeBasis::Common, [true, false, true]));
+        let kinds = [of(0.01, lattice), of(0.01, decimals)];
+        assert_eq!(chosen(&kinds, ALL), (0.01, LatticeBasis::Common, [true, false, false]));
+        let none = [of(0.1, lattice), of(1.0 / 3.0, lattice)];
+        assert_eq!(chosen(&none, ALL), (0.1, LatticeBasis::FinestOfSources, [true, false, false]));
+        // one that is common to both is finer than either: there must be room for it
+        let between = [of(0.01, lattice), of(0.025, lattice)];
+        assert_eq!(chosen(&between, ALL).0, 0.005);
+        assert_eq!(chosen(&between, Room { wished: 0.005, ..ALL }).0, 0.005);
+        assert_eq!(chosen(&between, Room { wished: 0.006, ..ALL }).0, 0.01);
+    }
+
+    #[test]
+    fn others_that_resolve_more_make_it_a_part_and_extents_make_it_coarser() {
+        let own = of(0.01, GridOrigin::Lattice);
+        let step = |others: &[Need], room| choose(&[&[own], others].concat(), room).grid.step;
+        assert_eq!(step(&[Need::Step(0.001)], ALL), 0.001);
+        assert_eq!(step(&[Need::Step(0.1)], ALL), 0.01);
+        assert_eq!(step(&[Need::Finest], Room { wished: 2e-6, ..ALL }), 0.01 / 1000.0);
+        assert_eq!(step(&[Need::Finest, Need::Step(0.1)], Room { wished: 2e-6, ..ALL }), 0.01 / 1000.0);
+        assert_eq!(step(&[Need::Single { step: 0.0001, farthest: 1.0 }], Room { wished: 2e-6, ..ALL }), 0.0001);
+        let part = choose(&[own, Need::Step(0.001)], ALL);
+        assert_eq!((part.reason.basis, part.holds_all), (LatticeBasis::PartOfFinest, false));
+        let coarser = |certain, doubles| {
+            let c = choose(&[own], Room { certain, doubles, ..ALL });
+            (c.grid.step, c.reason.coarser.map(|c| (c.factor, c.cause)), c.holds_all)
+        };
+        assert_eq!(coarser(0.01, 0.01), (0.01, None, true));
+        assert_eq!(coarser(0.015, 0.01), (0.02, Some((2.0, CoarserCause::Extent)), false));
+        assert_eq!(coarser(0.04, 0.04), (0.05, Some((5.0, CoarserCause::Doubles)), false));
+    }
+
+    #[test]
+    fn without_grids_steps_are_what_is_resolved_or_what_there_is_room_for() {
+        let chosen = |needs: &[Need], wished| {
+            let c = choose(needs, Room { wished, ..ALL });
+            (c.grid.step, c.reason.basis, c.is_free)
+        };
+        let single = Need::Single { step: 2f64.powi(-10), farthest: 5000.0 };
+        let basis = LatticeBasis::SinglePrecision { farthest: 5000.0 };
+        assert_eq!(chosen(&[single, Need::Nothing], 0.0), (2f64.powi(-10), basis, false));
+        assert_eq!(chosen(&[single], 2f64.powi(-10)), (2f64.powi(-10), basis, false));
+        assert_eq!(chosen(&[single], 0.3), (0.5, LatticeBasis::PowerOfTwo, false));
+        assert_eq!(chosen(&[single, Need::Step(0.25)], 0.0), (2f64.powi(-10), LatticeBasis::StoredStep, false));
+        assert_eq!(chosen(&[Need::Step(0.25)], 0.25), (0.25, LatticeBasis::StoredStep, false));
+        assert_eq!(chosen(&[Need::Step(0.25)], 0.3), (0.5, LatticeBasis::Decimal, false));
+        assert_eq!(chosen(&[Need::Finest], 3e-7), (5e-7, LatticeBasis::Decimal, false));
+        assert_eq!(chosen(&[Need::Finest], 0.0), (USUAL_STEP, LatticeBasis::Usual, false));
+        assert_eq!([0.0, 3e-7, 3.0].map(|wished| chosen(&[], wished).0), [USUAL_STEP, 5e-7, USUAL_STEP]);
+        assert_eq!(chosen(&[Need::Nothing], 0.0), (USUAL_STEP, LatticeBasis::Usual, true));
+    }
+}

@@ -2,7 +2,7 @@ use pointmill_format::{Aabb, AxisGrid, Lattice};
 
 use super::*;
 use crate::cloud::{JobBounds, JobPoint, SourceStats};
-use crate::sources::{Fineness, Schema, Source, Stored};
+use crate::sources::{Fineness, Schema, Source, Stored, Tolerance};
 
 fn grid(step: f64) -> Fineness {
     Fineness::Grid { grid: AxisGrid { step, offset: 0.0 }, is_claim: true }
@@ -38,6 +38,16 @@ fn chosen(all: Vec<Source>) -> JobLattice {
 
 fn lattice(step: f64, offset: [f64; 3]) -> Lattice {
     Lattice { scale: [step; 3], offset }
+}
+
+/// Points of one source that were read with `lattice`.
+fn stats(bounds: JobBounds, lattice: &Lattice, off_grid: [bool; 3]) -> Stats {
+    let mut stats = Stats::new(&Schema::new(Vec::new()));
+    stats.sources = vec![SourceStats::default()];
+    stats.bounds = bounds;
+    stats.sources[0].bounds = Aabb { min: lattice.world(bounds.min.0), max: lattice.world(bounds.max.0) };
+    stats.sources[0].off_grid = off_grid;
+    stats
 }
 
 #[test]
@@ -126,14 +136,6 @@ fn a_step_is_at_least_two_distances_of_doubles() {
 #[test]
 fn points_that_were_read_make_it_coarser_or_finer() {
     let auto = plan(ScaleChoice::Auto);
-    let stats = |bounds: JobBounds, lattice: &Lattice, off_grid| {
-        let mut stats = Stats::new(&Schema::new(Vec::new()));
-        stats.sources = vec![SourceStats::default()];
-        stats.bounds = bounds;
-        stats.sources[0].bounds = Aabb { min: lattice.world(bounds.min.0), max: lattice.world(bounds.max.0) };
-        stats.sources[0].off_grid = off_grid;
-        stats
-    };
     let wide = JobBounds { min: JobPoint([0; 3]), max: JobPoint([3_000_000_000, 5, 5]) };
     let own = sources(vec![with_lattice(lattice(0.001, [0.0; 3]), None)]);
     let present = from_headers(&auto, &own).unwrap();
@@ -162,4 +164,88 @@ fn reasons_are_one_line_however_many_axes_differ() {
     let text = far.reason.to_string();
     assert!(text.contains("x: that of the sources; made 5 times coarser, because doubles"), "{text}");
     assert!(text.ends_with("z: that of the sources"), "{text}");
+}
+
+#[test]
+fn headers_say_whether_the_step_is_coarser_than_that_of_sources() {
+    let is = |scale, sources: &Sources| is_coarse(&plan(scale), sources).unwrap();
+    let own = sources(vec![with_lattice(lattice(0.01, [0.0; 3]), None)]);
+    assert_eq!([0.005, 0.01, 0.02].map(|step| is(ScaleChoice::Fixed(step), &own)), [false, false, true]);
+    assert!(!is(ScaleChoice::Auto, &own));
+    let flat = Lattice { scale: [0.01, 0.01, 0.001], offset: [0.0; 3] };
+    assert!(is(ScaleChoice::Fixed(0.01), &sources(vec![with_lattice(flat, None)])), "one axis is enough");
+    let mut doubles = sources(vec![world([Fineness::Double; 3], [0.0; 3], [1000.0; 3])]);
+    assert!(!is(ScaleChoice::Auto, &doubles) && is(ScaleChoice::Fixed(1e-9), &doubles));
+    doubles.tolerance = Some(Tolerance { total: [0.001; 3], lattice: [0.001; 3] });
+    assert!(is(ScaleChoice::Auto, &doubles), "no more than is requested");
+}
+
+#[test]
+fn a_loss_is_a_step_more_than_twice_that_of_the_sources_that_was_not_requested() {
+    let bounds = JobBounds { min: JobPoint([0; 3]), max: JobPoint([100; 3]) };
+    let lost = |sources: &Sources, scale: ScaleChoice, step: f64| {
+        let plan = plan(scale);
+        let present = from_headers(&plan, sources).unwrap();
+        let made = JobLattice { lattice: lattice(step, [0.0; 3]), ..present };
+        losses(&plan, sources, &present, &made, &stats(bounds, &present.lattice, [false; 3]))
+    };
+    let own = sources(vec![with_lattice(lattice(0.01, [0.0; 3]), None)]);
+    assert_eq!(lost(&own, ScaleChoice::Auto, 0.02), [Loss::Nothing; 3]);
+    assert_eq!(lost(&own, ScaleChoice::Auto, 0.05), [Loss::Of(0.01); 3]);
+    assert_eq!(lost(&own, ScaleChoice::Fixed(0.05), 0.05), [Loss::Nothing; 3], "requested");
+    let far = sources(vec![with_lattice(lattice(1e-7, [1e9; 3]), None)]);
+    assert_eq!(
+        lost(&far, ScaleChoice::Fixed(1e-7), 5e-7),
+        [Loss::Of(1e-7); 3],
+        "requested, and doubles do not hold it"
+    );
+    let mut doubles = sources(vec![world([Fineness::Double; 3], [0.0; 3], [1000.0; 3])]);
+    assert_eq!(lost(&doubles, ScaleChoice::Auto, 0.01), [Loss::Unknown; 3]);
+    doubles.tolerance = Some(Tolerance { total: [0.001; 3], lattice: [0.001; 3] });
+    assert_eq!(lost(&doubles, ScaleChoice::Auto, 0.01), [Loss::Nothing; 3], "as coarse as was requested");
+}
+
+#[test]
+fn scans_are_read_again_for_steps_that_are_much_finer_or_that_were_lost() {
+    let auto = plan(ScaleChoice::Auto);
+    let again = |sources: &Sources, present: f64, side: i64| {
+        let present = JobLattice { lattice: lattice(present, [0.0; 3]), ..from_headers(&auto, sources).unwrap() };
+        let bounds = JobBounds { min: JobPoint([0; 3]), max: JobPoint([side; 3]) };
+        settled(&auto, sources, &present, &stats(bounds, &present.lattice, [false; 3])).map(|j| j.lattice.scale[0])
+    };
+    let own = sources(vec![with_lattice(lattice(0.01, [0.0; 3]), None)]);
+    assert_eq!([0.01, 0.013, 0.015, 0.02].map(|step| again(&own, step, 9)), [None, None, Some(0.01), Some(0.01)]);
+    // nobody knows how fine doubles are: for a hundredth
+    let doubles = sources(vec![world([Fineness::Double; 3], [0.0; 3], [1e6; 3])]);
+    let finer = |side: i64| again(&doubles, 0.001, side);
+    assert_eq!([finer(2_000_000_000), finer(40_000_000), finer(20_000_000)], [None, None, Some(1e-5)]);
+    assert_eq!(finer(3_000_000_000), Some(0.002), "integers do not hold them");
+    let mut precise = sources(vec![world([Fineness::Double; 3], [0.0; 3], [1000.0; 3])]);
+    precise.tolerance = Some(Tolerance { total: [0.01; 3], lattice: [0.01; 3] });
+    assert_eq!([0.02, 0.021].map(|step| again(&precise, step, 9)), [None, Some(0.02)]);
+}
+
+#[test]
+fn requested_steps_become_coarser_where_doubles_or_integers_do_not_hold_them() {
+    let made = |step, sources: Vec<Source>| {
+        let made = from_headers(&plan(ScaleChoice::Fixed(step)), &self::sources(sources)).unwrap();
+        (made.lattice.scale[0], made.reason.axes[0].coarser.map(|c| (c.factor, c.cause)))
+    };
+    let doubles = |side: f64| vec![world([Fineness::Double; 3], [0.0; 3], [side; 3])];
+    assert_eq!(made(0.001, doubles(2e6)), (0.001, None));
+    assert_eq!(made(0.001, doubles(4e6)), (0.002, Some((2.0, CoarserCause::Extent))));
+    let far = vec![with_lattice(lattice(1e-7, [1e9; 3]), None)];
+    assert_eq!(made(1e-7, far), (5e-7, Some((5.0, CoarserCause::Doubles))));
+}
+
+#[test]
+fn offsets_of_requested_steps_are_0_or_the_least_of_the_sources() {
+    let offset = |offsets: [f64; 2], step| {
+        let all = offsets.map(|o| with_lattice(lattice(0.001, [o; 3]), None));
+        fixed_offset(&sources(all.into()), 1, step)
+    };
+    assert_eq!([offset([0.5, 2.0], 0.5), offset([0.5, 2.0], 0.25), offset([-1.5, 0.5], 0.5)], [0.0; 3]);
+    assert_eq!([offset([0.5, 2.0], 1.0), offset([3.25, -0.5], 1.0)], [0.5, -0.5]);
+    assert_eq!(offset([1.000_000_5, 2.0], 1.0), 0.0, "within a millionth of a step");
+    assert_eq!(offset([1.000_002, 2.0], 1.0), 1.000_002);
 }

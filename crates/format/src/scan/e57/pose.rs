@@ -208,4 +208,35 @@ mod tests {
             assert_eq!(moved(&pose(q, [0.0; 3]).0, [1.0, 2.0, 3.0]), turned, "half a turn about axis {axis}");
         }
     }
+
+    #[test]
+    fn a_grid_that_is_moved_stays_one_and_one_that_is_turned_becomes_its_step() {
+        let grid = |step, offset| Resolution::Grid(AxisGrid { step, offset });
+        let own = [grid(0.5, 2.0), Resolution::Step(0.25), grid(0.125, -1.0)];
+        let (shifted, _) = pose([1.0, 0.0, 0.0, 0.0], [10.0, 20.0, 0.5]);
+        assert_eq!(shifted.resolution(own), [grid(0.5, 12.0), Resolution::Step(0.25), grid(0.125, -0.5)]);
+        assert_eq!(shifted.parts(), ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [10.0, 20.0, 0.5]));
+        let (turned, _) = pose([0.5; 4], [1.0, 2.0, 3.0]);
+        assert_eq!(turned.resolution(own), [Resolution::Step(0.125); 3], "the finest of all");
+        for fine in [Resolution::Single, Resolution::Double] {
+            assert_eq!(turned.resolution([own[0], fine, own[1]]), [Resolution::Double; 3]);
+            assert_eq!(shifted.resolution([fine; 3]), [fine; 3]);
+        }
+        assert_eq!(turned.parts(), ([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [1.0, 2.0, 3.0]));
+    }
+
+    #[test]
+    fn bounds_without_an_end_are_none() {
+        let declared =
+            |bounds, range_max| Pose::new(None).0.bounds_declared(&Cloud { bounds, range_max, ..Cloud::default() });
+        let sides = |min: f64, max: f64| Some([[min, max]; 3]);
+        assert_eq!(declared(sides(-1.0, 2.0), None), Some(Aabb { min: [-1.0; 3], max: [2.0; 3] }));
+        assert_eq!(declared(sides(3.0, 3.0), None), Some(Aabb { min: [3.0; 3], max: [3.0; 3] }));
+        assert_eq!(declared(None, Some(5.0)), Some(Aabb { min: [-5.0; 3], max: [5.0; 3] }));
+        assert_eq!(declared(None, Some(0.0)), Some(Aabb { min: [0.0; 3], max: [0.0; 3] }));
+        for none in [sides(2.0, 1.0), sides(0.0, 1e100), sides(f64::NAN, 1.0), None] {
+            assert_eq!(declared(none, None), None, "{none:?}");
+        }
+        assert_eq!([declared(None, Some(-1.0)), declared(None, Some(1e100))], [None; 2]);
+    }
 }
