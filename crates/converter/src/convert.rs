@@ -22,7 +22,7 @@ use crate::warning::Warning;
 /// # Errors
 /// See [`ConvertError`]; the output folder is then as it was before.
 pub fn convert(plan: &Plan, targets: &[Target], events: &dyn Events) -> Result<Report, ConvertError> {
-    run(Arc::new(SystemDisk), plan, targets, events, &|_| Ok(()))
+    run(&system_disk(), plan, targets, events, &|_| Ok(()))
 }
 
 /// Looks at the folder that is about to become the output, complete but for its name, and refuses it with an error.
@@ -38,24 +38,29 @@ pub fn convert_verified(
     events: &dyn Events,
     verify: &Verify<'_>,
 ) -> Result<Report, ConvertError> {
-    run(Arc::new(SystemDisk), plan, targets, events, verify)
+    run(&system_disk(), plan, targets, events, verify)
 }
 
 /// [`convert`] on another disk, such as one that fails.
 ///
 /// # Errors
 /// As [`convert`].
+#[expect(clippy::needless_pass_by_value, reason = "callers make one for the run")]
 pub fn convert_on(
     disk: Arc<dyn Disk>,
     plan: &Plan,
     targets: &[Target],
     events: &dyn Events,
 ) -> Result<Report, ConvertError> {
-    run(disk, plan, targets, events, &|_| Ok(()))
+    run(&disk, plan, targets, events, &|_| Ok(()))
+}
+
+fn system_disk() -> Arc<dyn Disk> {
+    Arc::new(SystemDisk)
 }
 
 fn run(
-    disk: Arc<dyn Disk>,
+    disk: &Arc<dyn Disk>,
     plan: &Plan,
     targets: &[Target],
     events: &dyn Events,
@@ -64,7 +69,7 @@ fn run(
     let mut clock = Clock::start(events);
     clock.begin(Phase::Probe, plan.inputs.len() as u64);
     outputs::check(plan, targets)?;
-    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?;
+    let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(disk), events)?;
     staged.warnings.iter().for_each(|w| events.warning(w));
     events.works_in(staged.path());
     let mut job = None;
@@ -100,7 +105,7 @@ fn write(
     targets: &[Target],
     events: &dyn Events,
     staged: &StagedFolder,
-    disk: Arc<dyn Disk>,
+    disk: &Arc<dyn Disk>,
     job: &mut Option<Job>,
     clock: &mut Clock<'_>,
 ) -> Result<Report, ConvertError> {
@@ -114,13 +119,11 @@ fn write(
     let budget = Budget::new(plan, intake.schema.stride, least)?;
     resolve_crs_of_all(plan, &sources.all, &mut Vec::new())?; // a name that makes no sense must fail now, not after the read
     let temp_dir = plan.temp_dir.clone().unwrap_or_else(|| staged.parent());
-    let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, Arc::clone(&disk)), events)?;
+    let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, Arc::clone(disk)), events)?;
     let expected_bytes = sources.points_declared.saturating_mul(intake.schema.stride as u64);
     let is_large = expected_bytes > rt.budget.record_bytes(sources.points_declared);
-    let job = match Job::of(plan, is_large, &sources, settings(plan, targets), staged.output(), &disk)? {
-        Some(begun) => Some(&*job.insert(begun)),
-        None => None,
-    };
+    *job = Job::of(plan, is_large, &sources, settings(plan, targets), staged.output(), disk)?;
+    let job = job.as_ref();
     if let Some(warning) = (plan.resume && job.is_some_and(Job::is_new)).then_some(Warning::BeginsAnew) {
         events.warning(&warning);
         warnings.push(warning);

@@ -125,7 +125,8 @@ mod tests {
         let scans = [(1000, 10), (0, 0), (50, 1), (10_000, 4)];
         let sources = Sources::with_pairs(scans.map(|(points, pieces)| Source::of_pieces(points, pieces)).into());
         assert_eq!(units(&sources, 400), [0..2, 2..4, 4..7, 7..8]);
-        assert_eq!(units(&sources, u64::MAX), [0..8]);
+        let all = 0..8;
+        assert_eq!(units(&sources, u64::MAX), [all]);
         assert_eq!(units(&Sources::with_pairs(Vec::new()), 400), []);
     }
 }
