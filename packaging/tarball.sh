@@ -2,7 +2,7 @@
 # A tarball that unpacks and runs: program, manual pages, completions, licences; at target/pointmill-VERSION-SYSTEM.tar.gz.
 #
 #   packaging/tarball.sh              runs with the C library (glibc) of the machine that builds it, or a newer one: it says which
-#   packaging/tarball.sh --static     has the C library (musl) in it, and runs on any Linux of this architecture; needs
+#   packaging/tarball.sh static       has the C library (musl) in it, and runs on any Linux of this architecture; needs
 #                                     `rustup target add ARCHITECTURE-unknown-linux-musl` and musl-gcc (Debian: musl-tools)
 #
 # POINTMILL: see files.sh.
@@ -10,8 +10,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 case "${1:-}" in
     "") target="" ;;
-    --static) target="$(uname -m)-unknown-linux-musl" ;;
-    *) echo "usage: packaging/tarball.sh [--static]" >&2 && exit 2 ;;
+    static) target="$(uname -m)-unknown-linux-musl" ;;
+    *) echo "usage: packaging/tarball.sh [static]" >&2 && exit 2 ;;
 esac
 packaging/files.sh ${target:+"$target"}
 version=$(target/package/pointmill --version | cut -d' ' -f2)

@@ -80,6 +80,7 @@ async function compare({ png, shift }) {
   const app = window.pointmill;
   app.change({ size: 1, isAdaptive: false, edl: 0, least: 1, most: 1, boxes: false });
   app.setBudget(1e7);
+  app.each("batches", { clod: 0, bits: 30 });
   await app.idle();
   app.frame();
   const { gl } = app;
@@ -193,32 +194,34 @@ async function behindTheProgram(context, path, out, report, count) {
   lines.push(...(await messages(page)));
   await page.close();
   count(report(`the page, four datasets: picture after ${Math.round(stats.firstPicture)} ms, ${stats.requests} requests, ${(stats.bytes / 1e6).toFixed(1)} MB`, lines));
-  const single = await start(path("potree2"));
-  const of = [];
-  page = await open(context, single.url, of);
-  count(report(...(await samePicture(page, path("potree2"), out, of))));
-  await page.close();
-  of.splice(0, of.length, ...(await single.stop()));
-  count(report("the page: the program with one dataset ends", of));
+  for (const kind of ["potree2", "batches", "bintree"]) {
+    const single = await start(path(kind));
+    const of = [];
+    page = await open(context, single.url, of);
+    count(report(...(await samePicture(page, kind, path(kind), out, of))));
+    await page.close();
+    of.splice(0, of.length, ...(await single.stop()));
+    count(report(`the page: the program with ${kind} alone ends`, of));
+  }
   return { table, url, stop };
 }
 
 /** The picture of the page and that of `pointmill preview` from the same camera; and points under the cursor. */
-async function samePicture(page, dataset, out, lines) {
+async function samePicture(page, kind, dataset, out, lines) {
   const far = await page.evaluate(picks);
   // nine pixels around the cursor are searched, corners included
   if (far.length < 3 || far.some((pixels) => pixels > 6.5)) lines.push(`picked points are ${far} pixels from the cursor`);
   const { eye, target, fov } = await page.evaluate(() => window.pointmill.camera);
-  const png = join(out, "pictures", "page-preview.png");
+  const png = join(out, "pictures", `page-${kind}-preview.png`);
   const camera = [...eye, ...target, 0, 0, 1, fov].join(",");
-  pointmill("preview", dataset, "-o", png, "--overwrite", "--quiet", "--shading", "plain", "--size", `${SIZE.width}x${SIZE.height}`, `--camera=${camera}`, "--budget", "10000000");
+  pointmill("preview", dataset, "-o", png, "--overwrite", "--quiet", "--shading", "plain", "--size", `${SIZE.width}x${SIZE.height}`, `--camera=${camera}`, "--budget", "10000000", ...(kind === "batches" ? ["--bits", "30"] : []));
   const found = await page.evaluate(compare, { png: readFileSync(png).toString("base64"), shift: SHIFT });
-  await page.screenshot({ path: join(out, "pictures", "page-potree2.png") });
+  await page.screenshot({ path: join(out, "pictures", `page-${kind}.png`) });
   if (found.width !== SIZE.width || found.height !== SIZE.height) lines.push(`the picture has ${found.width} x ${found.height} pixels`);
   if (found.covered < 10_000) lines.push(`only ${found.covered} pixels are covered`);
   if (!(found.different <= MOST_DIFFERENT)) lines.push(`${(100 * found.different).toFixed(2)} % of the pixels differ from preview: ${JSON.stringify(found)}`);
   if (!(found.shifted > 10 * MOST_DIFFERENT)) lines.push(`a picture that is moved by ${SHIFT} pixels differs by ${found.shifted} only: the comparison finds nothing`);
-  return [`the page and preview: ${(100 * found.different).toFixed(2)} % of ${found.covered} pixels differ`, lines];
+  return [`the page and preview, ${kind}: ${(100 * found.different).toFixed(2)} % of ${found.covered} pixels differ`, lines];
 }
 
 /** Pages beside datasets decode as the format crate does. */

@@ -133,16 +133,18 @@ impl<'a> Pass<'a> {
             None => std::iter::once(0..sources.pairs()).collect(),
         };
         let mut stats = Stats::new(&self.context.intake.schema);
-        stats.sources = vec![SourceStats::default(); sources.all.len()];
+        // what a job keeps is taken from the threads unit by unit
+        let mut seen = vec![SourceStats::default(); self.job.map_or(0, |_| sources.all.len())];
         let mut collected = Collected::default();
         let mut room = Reservation::new(&self.rt.memory, Consumer::Cells);
         for (number, pairs) in units.into_iter().enumerate() {
             let unit = self.unit(number as u64, pairs)?;
             stats.merge(&unit.stats);
-            unit.seen.iter().for_each(|(source, seen)| stats.sources[*source as usize].merge(seen));
+            unit.seen.iter().for_each(|(source, more)| seen[*source as usize].merge(more));
             collected.merge(unit.collected);
             room.merge(unit.room);
         }
+        stats.sources = if self.job.is_some() { seen } else { self.context.take_seen()? };
         Ok((stats, collected, room))
     }
 
@@ -157,6 +159,7 @@ impl<'a> Pass<'a> {
         }
         let first_block = self.context.store.next_block()?;
         let mut unit = self.read_pairs(&pairs)?;
+        unit.seen = self.context.take_touched()?;
         read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit)?;
         self.rt.events().checkpoint(job.folder());
         Ok(unit)
@@ -186,9 +189,7 @@ impl<'a> Pass<'a> {
             collected.merge(more);
             room.merge(taken);
         }
-        let nothing = SourceStats::default();
-        let seen = (0..).zip(self.context.take_seen()?).filter(|(_, seen)| *seen != nothing).collect();
-        Ok(Unit { stats, collected, room, seen })
+        Ok(Unit { stats, collected, room, seen: Vec::new() })
     }
 
     /// Decodes one piece; what a broken piece held is counted or is an error, by policy.

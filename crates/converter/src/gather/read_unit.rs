@@ -16,7 +16,7 @@ pub(super) struct Unit {
     pub(super) stats: Stats,
     pub(super) collected: Collected,
     pub(super) room: Reservation,
-    /// By source, those that were read.
+    /// By source, those that were read; empty without a job.
     pub(super) seen: Vec<(u32, SourceStats)>,
 }
 

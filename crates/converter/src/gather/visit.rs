@@ -41,7 +41,15 @@ impl<'a> Reading<'a> {
     /// By source, what was seen of it.
     pub(crate) fn take_seen(&self) -> Result<Vec<SourceStats>, ConvertError> {
         let mut seen = self.seen.lock().map_err(|_| ConvertError::Internal("a worker thread failed".into()))?;
-        Ok(std::mem::replace(&mut seen, vec![SourceStats::default(); self.sources.all.len()]))
+        Ok(std::mem::take(&mut seen))
+    }
+
+    /// Takes what was seen of the sources that were read since this was asked last, and their numbers.
+    pub(super) fn take_touched(&self) -> Result<Vec<(u32, SourceStats)>, ConvertError> {
+        let nothing = SourceStats::default();
+        let mut seen = self.seen.lock().map_err(|_| ConvertError::Internal("a worker thread failed".into()))?;
+        let touched = (0..).zip(seen.iter_mut()).filter(|(_, seen)| **seen != nothing);
+        Ok(touched.map(|(source, seen)| (source, std::mem::take(seen))).collect())
     }
 }
 

@@ -22,6 +22,7 @@ const SPAN: [f64; 2] = [0.02, 0.98];
 
 /// Attributes by their names in datasets and scans.
 const RGB: &str = "rgb";
+const RGBA: &str = "rgba"; // of binary trees; the fourth byte is not looked at
 const WORDS: &str = "colour"; // of quantised batches: red, green, blue and level of detail
 const INTENSITY: &str = "intensity";
 const CLASS: &str = "classification";
@@ -51,8 +52,8 @@ impl Paint {
     /// The attributes that may be needed.
     pub(crate) fn wanted(colour: Colour) -> &'static [&'static str] {
         match colour {
-            Colour::Auto => &[RGB, INTENSITY],
-            Colour::Rgb => &[RGB],
+            Colour::Auto => &[RGB, RGBA, INTENSITY],
+            Colour::Rgb => &[RGB, RGBA],
             Colour::Intensity => &[INTENSITY],
             Colour::Class => &[CLASS],
             Colour::Normal => &NORMALS,
@@ -99,7 +100,7 @@ impl Paint {
         match self.colour {
             Colour::Rgb | Colour::Auto => match column(WORDS) {
                 Some((Column::UInt32(words), _)) => out.extend(words.iter().map(|w| word(rgb_of(*w)))),
-                _ => self.rgb(column(RGB).map(|(column, _)| column), out),
+                _ => self.rgb(column(RGB).or_else(|| column(RGBA)), out),
             },
             Colour::Intensity => {
                 if let Some((column, attribute)) = column(INTENSITY) {
@@ -128,13 +129,16 @@ impl Paint {
         out.resize(points.len(), word([200; 3]));
     }
 
-    fn rgb(&self, column: Option<&Column>, out: &mut Vec<u32>) {
-        match column {
-            Some(Column::UInt8(values)) => out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(*rgb))),
-            Some(Column::UInt16(values)) if self.is_16_bit => {
+    fn rgb(&self, column: Option<(&Column, &Attribute)>, out: &mut Vec<u32>) {
+        match column.map(|(column, attribute)| (column, attribute.elements)) {
+            Some((Column::UInt8(values), 4)) => {
+                out.extend(values.as_chunks::<4>().0.iter().map(|[r, g, b, _]| word([*r, *g, *b])));
+            }
+            Some((Column::UInt8(values), _)) => out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(*rgb))),
+            Some((Column::UInt16(values), _)) if self.is_16_bit => {
                 out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(rgb.map(eight_bit))));
             }
-            Some(Column::UInt16(values)) => {
+            Some((Column::UInt16(values), _)) => {
                 out.extend(values.as_chunks::<3>().0.iter().map(|rgb| word(rgb.map(|c| c.min(255) as u8))));
             }
             _ => {}
@@ -202,7 +206,7 @@ impl Sample {
     fn know(&mut self, attributes: &[Attribute]) {
         let is_there = |name: &str| attributes.iter().any(|a| a.name == name);
         let found = [
-            is_there(RGB) || is_there(WORDS),
+            is_there(RGB) || is_there(RGBA) || is_there(WORDS),
             is_there(INTENSITY),
             is_there(CLASS),
             normal_columns(attributes).is_some(),
@@ -229,6 +233,9 @@ impl Sample {
             match attribute.name.as_str() {
                 INTENSITY => values::each(column, attribute.elements, 0, |v| every(&mut self.intensities, v)),
                 RGB => values::each(column, 1, 0, |v| self.brightest = self.brightest.max(v)),
+                RGBA => {
+                    (0..3).for_each(|e| values::each(column, 4, e, |v| self.brightest = self.brightest.max(v)));
+                }
                 WORDS => self.brightest = 255.0,
                 _ => {}
             }
@@ -262,6 +269,7 @@ mod tests {
         let deep = Paint { is_16_bit: true, ..PLAIN };
         assert_eq!(of(PLAIN, Column::UInt8(vec![1, 2, 255])), [0x0102ff]);
         assert_eq!(of(PLAIN, Column::UInt16(vec![1, 2, 255])), [0x0102ff]);
+        assert_eq!(paint(&PLAIN, RGBA, 4, Column::UInt8(vec![1, 2, 255, 9, 0, 0, 3, 255])), [0x0102ff, 0x000003]);
         // rounded: 128 is nearer to 0, 129 to 257
         assert_eq!(of(deep, Column::UInt16(vec![257, 514, 65535, 128, 129, 0])), [0x0102ff, 0x000100]);
         let words = Column::UInt32(vec![1 | 2 << 8 | 255 << 16 | 3 << 24]);
