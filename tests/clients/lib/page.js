@@ -208,6 +208,7 @@ async function behindTheProgram(context, path, out, report, count) {
 
 /** The picture of the page and that of `pointmill preview` from the same camera; and points under the cursor. */
 async function samePicture(page, kind, dataset, out, lines) {
+  await page.evaluate(() => window.pointmill.idle()); // what comes first has few points
   const far = await page.evaluate(picks);
   // nine pixels around the cursor are searched, corners included
   if (far.length < 3 || far.some((pixels) => pixels > 6.5)) lines.push(`picked points are ${far} pixels from the cursor`);
