@@ -116,7 +116,7 @@ fn a_run_that_ends_at_any_operation_is_gone_on_with_to_the_same_bytes() {
         assert!(dataset(&bench.plan.output) == expected && !bench.job().exists(), "{name}");
         fs::remove_dir_all(&bench.plan.output).unwrap();
         let (mut most, mut least) = (0, u64::MAX);
-        for at in (0..operations).step_by((operations / 16).max(1) as usize) {
+        for at in (0..operations).step_by((operations / 10).max(1) as usize) {
             let (_, ended) = bench.end_at(&bench.plan, &targets, at);
             if ended.is_ok() {
                 fs::remove_dir_all(&bench.plan.output).unwrap(); // what was refused was the name of something temporary
