@@ -158,9 +158,9 @@ pub(crate) struct ConvertArgs {
     /// again
     #[arg(long, help_heading = "Resources")]
     pub(crate) resume: bool,
-    /// Whether a run that is ended leaves OUT.job for --resume: always, never, or auto: if the points are not expected to fit into
+    /// Whether a run that is ended leaves OUT.job for --resume: never, always, or auto: if the points are not expected to fit into
     /// memory. A number of points: always, and what was read is safe each time that so many more are
-    #[arg(long, value_name = "WHEN|POINTS", default_value = "auto", value_parser = parse_checkpoint,
+    #[arg(long, value_name = "WHEN|POINTS", default_value = "never", value_parser = parse_checkpoint,
           allow_negative_numbers = true, help_heading = "Resources")]
     pub(crate) checkpoint: CheckpointArg,
 

@@ -355,7 +355,6 @@ mod tests {
         assert_eq!(format!("{:?}", targets(&args).unwrap()), format!("{:?}", [octree]));
         let mut usual = Plan::new(files, "out".into());
         usual.name = "a".to_owned();
-        usual.checkpoint = Checkpoint::Auto; // a library leaves a folder only if it is asked to
         usual.filter.every = 1; // 0 and 1 both keep every point
         usual.memory_bytes = given.memory_bytes; // memory in use changes between two calls
         assert_eq!(format!("{given:?}"), format!("{usual:?}"));

@@ -152,6 +152,10 @@ impl Collected {
 
     /// Adds what another thread has collected.
     pub(super) fn merge(&mut self, other: Self) {
+        if self.cells.is_empty() && self.loose.is_empty() {
+            *self = other; // its table is not made twice
+            return;
+        }
         other.cells.into_iter().for_each(|(cell, part)| self.cells.entry(cell).or_default().merge(part));
         self.loose.append(other.loose);
         self.census.merge(other.census);
