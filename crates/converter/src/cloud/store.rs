@@ -20,6 +20,8 @@ pub(crate) struct Store {
     memory: Arc<Pool>,
     in_memory: AtomicU64,
     blocks: Mutex<Vec<Block>>,
+    /// By block, if the file outlives the run.
+    kept: Mutex<Vec<Kept>>,
     /// Buffers of blocks that were taken to be put back in another order: they hold the next ones, so that their memory is
     /// touched once. They count as records in memory.
     spare: Mutex<Vec<Vec<u8>>>,
@@ -43,14 +45,19 @@ pub(crate) struct SafeBlock {
 
 struct Block {
     source: u32,
-    bytes: u64,
-    /// CRC-32C, if the file outlives the run.
-    sum: u32,
-    /// Where else it is while it is in memory.
-    copy: Option<u64>,
     /// Records that were not taken yet, once for each use.
     remaining: u64,
     place: Place,
+}
+
+/// What is known of a block whose file outlives the run. Apart, as there may be a block for each of very many scans.
+#[derive(Debug, Clone, Copy, Default)]
+struct Kept {
+    bytes: u64,
+    /// CRC-32C.
+    sum: u32,
+    /// Where else it is while it is in memory.
+    copy: Option<u64>,
 }
 
 #[derive(Clone)]
@@ -84,6 +91,7 @@ impl Store {
             memory: Arc::clone(memory),
             in_memory: AtomicU64::new(0),
             blocks: Mutex::default(),
+            kept: Mutex::default(),
             spare: Mutex::default(),
             temp,
             is_kept: file.is_some(),
@@ -106,15 +114,17 @@ impl Store {
                 Place::Memory(records) => Some(self.write(records)?),
                 Place::Disk { .. } | Place::Gone => None,
             };
-            let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
-            let block = &mut blocks[index as usize];
-            block.copy = block.copy.or(written);
+            let blocks = self.blocks.lock().map_err(|_| poisoned())?;
+            let Block { source, place, .. } = &blocks[index as usize];
+            let mut all = self.kept.lock().map_err(|_| poisoned())?;
+            let kept = &mut all[index as usize];
+            kept.copy = kept.copy.or(written);
             // it may have left memory meanwhile
-            let offset = match block.place {
-                Place::Disk { offset } => offset,
-                _ => block.copy.unwrap_or(0),
+            let offset = match place {
+                Place::Disk { offset } => *offset,
+                _ => kept.copy.unwrap_or(0),
             };
-            safe.push(SafeBlock { source: block.source, offset, bytes: block.bytes, sum: block.sum });
+            safe.push(SafeBlock { source: *source, offset, bytes: kept.bytes, sum: kept.sum });
         }
         self.spill_file()?.sync("syncing the records")?;
         Ok(safe)
@@ -126,7 +136,8 @@ impl Store {
         let first = blocks.len() as u32;
         for &SafeBlock { source, offset, bytes, sum } in safe {
             let remaining = bytes / self.stride as u64 * u64::from(self.uses);
-            blocks.push(Block { source, bytes, sum, copy: None, remaining, place: Place::Disk { offset } });
+            self.kept.lock().map_err(|_| poisoned())?.push(Kept { bytes, sum, copy: None });
+            blocks.push(Block { source, remaining, place: Place::Disk { offset } });
             self.spilled.fetch_max(offset + bytes, Ordering::Relaxed);
         }
         Ok(first)
@@ -151,7 +162,10 @@ impl Store {
     /// The index that the next block will have; it must be added with [`Self::fill`].
     pub(crate) fn open(&self, source: u32) -> Result<u32, ConvertError> {
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
-        blocks.push(Block { source, bytes: 0, sum: 0, copy: None, remaining: 0, place: Place::Gone });
+        if self.is_kept {
+            self.kept.lock().map_err(|_| poisoned())?.push(Kept::default());
+        }
+        blocks.push(Block { source, remaining: 0, place: Place::Gone });
         Ok((blocks.len() - 1) as u32)
     }
 
@@ -181,8 +195,11 @@ impl Store {
         records.clear();
         let remaining = bytes / self.stride as u64 * u64::from(uses);
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        if self.is_kept {
+            self.kept.lock().map_err(|_| poisoned())?[block as usize] = Kept { bytes, sum, copy: None };
+        }
         let slot = &mut blocks[block as usize];
-        *slot = Block { source: slot.source, bytes, sum, copy: None, remaining, place };
+        (slot.remaining, slot.place) = (remaining, place);
         Ok(())
     }
 
@@ -322,7 +339,7 @@ impl Evict for Store {
             };
             let Some((index, records)) = found else { break };
             next = index;
-            let copy = self.blocks.lock().map_err(|_| poisoned())?[index].copy;
+            let copy = self.kept.lock().map_err(|_| poisoned())?.get(index).and_then(|kept| kept.copy);
             let place = match copy {
                 Some(offset) => Place::Disk { offset },
                 None => self.spill(&records)?,

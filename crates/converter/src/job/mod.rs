@@ -236,13 +236,14 @@ fn is_ours(name: &str) -> bool {
     name == LOCK || name == JOURNAL || name.starts_with(RECORDS)
 }
 
-/// Removes our files, and the folder if nothing else is in it. The journal goes last but for the lock: without it nothing goes on.
+/// Removes our files, and the folder if nothing else is in it. The journal goes first: without it no run
+/// looks for the rest.
 fn remove_files(folder: &Path) -> Result<(), ConvertError> {
     let remove = || {
         let mut names: Vec<String> =
             fs::read_dir(folder)?.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
         names.retain(|name| is_ours(name));
-        names.sort_by_key(|name| (name == LOCK, name == JOURNAL));
+        names.sort_by_key(|name| (name == LOCK, name != JOURNAL));
         names.iter().try_for_each(|name| fs::remove_file(folder.join(name)))?;
         fs::remove_dir(folder)
     };
