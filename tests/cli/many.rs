@@ -51,7 +51,9 @@ fn a_scan_of_one_point_takes_at_most_a_kibibyte_of_memory() {
         dir.succeed(["convert", name, "-o", out, "--threads", "1", "--memory", "512MiB"]);
         dir.report(out)["peak_memory_bytes"].as_u64().unwrap()
     };
-    let (many, one) = (peak("many", "b"), peak("one.las", "a"));
+    // what the allocator keeps varies by 2 % from run to run, and is not of the scans
+    let least = |name: &str| ["a", "b", "c"].map(|out| peak(name, &format!("{name}-{out}"))).into_iter().min().unwrap();
+    let (many, one) = (least("many"), least("one.las"));
     let each = many.saturating_sub(one) / MANY as u64;
     assert!(each <= 1024, "{each} bytes per input: {one} in one file, {many} in {MANY}");
 }
