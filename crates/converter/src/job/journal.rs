@@ -8,9 +8,8 @@
 //! All little-endian. What a run was writing when it ended is cut off: a record that goes beyond the end of the file, or the last
 //! one with another checksum. Anything else that does not fit is damage, and refused.
 
-use std::fs::{self, File};
-use std::io;
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::{ConvertError, JobFault};
@@ -143,12 +142,6 @@ fn is_zero(file: &DiskFile, mut at: u64, length: u64) -> Result<bool, ConvertErr
 
 fn damaged(path: &Path, byte: u64) -> ConvertError {
     ConvertError::Job(JobFault::Damaged { file: path.to_path_buf(), byte })
-}
-
-/// Waits until the name of a new file in a folder is safe.
-pub(super) fn sync_name(folder: &Path) -> Result<(), ConvertError> {
-    let sync = || -> io::Result<()> { if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) } };
-    sync().map_err(|e| ConvertError::io(PathBuf::from(folder), "syncing the job folder", e))
 }
 
 #[cfg(test)]

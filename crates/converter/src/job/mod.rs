@@ -13,11 +13,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use identity::Identity;
-use journal::{Entry, Journal, sync_name};
+use journal::{Entry, Journal};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{ConvertError, JobFault};
 use crate::plan::{Checkpoint, Plan};
+use crate::runtime::disk::{create_folder, sync_folder};
 use crate::runtime::os_files::{FileLock, Locked};
 use crate::runtime::{Disk, DiskFile, TempFiles};
 use crate::sources::Sources;
@@ -94,12 +95,11 @@ impl Job {
         if folder.exists() {
             remove(&folder)?;
         }
-        let make = || fs::create_dir(&folder);
-        make().map_err(|e| ConvertError::io(&folder, "making the job folder", e))?;
+        create_folder(&**disk, &folder).map_err(|e| ConvertError::io(&folder, "making the job folder", e))?;
         let lock = lock(&folder, FileLock::create)?;
         let mut journal = Journal::create(&folder.join(JOURNAL), disk)?;
         journal.append(&encode(identity)?)?;
-        sync_name(&folder)?;
+        sync_folder(&**disk, &folder).map_err(|e| ConvertError::io(&folder, "syncing the job folder", e))?;
         let state = Mutex::new(State { journal, units: HashMap::new() });
         Ok(Self { folder, _lock: lock, state, is_new: true, recalled: AtomicU64::new(0) })
     }
@@ -158,9 +158,7 @@ impl Job {
                 _ => {}
             }
         }
-        let file = temp.keep(&self.records_path(pass))?;
-        sync_name(&self.folder)?;
-        Ok(file)
+        temp.keep(&self.records_path(pass))
     }
 
     fn records_path(&self, pass: u32) -> PathBuf {

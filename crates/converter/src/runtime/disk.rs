@@ -170,11 +170,13 @@ impl TempFiles {
 }
 
 impl TempFiles {
-    /// A file with a name, made or opened as it is: it outlives the run.
+    /// A file with a name that is safe, made or opened as it is: it outlives the run.
     pub(crate) fn keep(&self, path: &Path) -> Result<DiskFile, ConvertError> {
         let open = || {
             self.disk.permit(DiskOperation::Create)?;
-            File::options().read(true).write(true).create(true).truncate(false).open(path)
+            let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
+            path.parent().map_or(Ok(()), |folder| sync_folder(&*self.disk, folder))?;
+            Ok(file)
         };
         let file = open().map_err(|e| ConvertError::io(path, "opening the file for records", e).temporary())?;
         let written = Some(Arc::clone(&self.written));

@@ -3,7 +3,7 @@
 
 import { Heap, distances, sub } from "pm/math.js";
 import { batchBlock } from "pm/clouds/block.js";
-import { named, together } from "pm/clouds/loader.js";
+import { pending, together } from "pm/clouds/loader.js";
 import { drop, isCurrent, put, renew } from "pm/clouds/units.js";
 
 const REQUEST_POINTS = 150_000;
@@ -108,18 +108,7 @@ export class BatchesCloud {
           if (attribute === "classification" && attribute === this.attribute) this.#meet(points.extra);
         });
       };
-      loader.run(parts, () => this.#pending(request));
-    }
-  }
-
-  async #pending(work) {
-    this.pending++;
-    try {
-      await work();
-    } catch (error) {
-      throw named(this.scene, error);
-    } finally {
-      this.pending--;
+      loader.run(parts, () => pending(this, request));
     }
   }
 

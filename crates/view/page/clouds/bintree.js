@@ -2,9 +2,8 @@
 // are thinned where the budget is short.
 
 import { Heap, distances } from "pm/math.js";
-import { pointBlock } from "pm/clouds/block.js";
-import { named, together } from "pm/clouds/loader.js";
-import { drop, isCurrent, put, renew } from "pm/clouds/units.js";
+import { pending, together } from "pm/clouds/loader.js";
+import { drop, isCurrent, putPoints, renew } from "pm/clouds/units.js";
 
 /** Every how manyth point: what comes first, what it is refined to. Of large trees even fewer come first. */
 const STEPS = [16, 4, 1];
@@ -97,23 +96,11 @@ export class BintreeCloud {
       const request = async () => {
         const all = await this.source.points(units.map((leaf) => leaf.unit), { attribute, every: this.steps[to] });
         all.forEach((points, i) => {
-          put(units[i], pointBlock(this.gl, points), attribute, this.attribute);
-          units[i].block.classes.forEach((number) => this.classes.add(number));
+          putPoints(this, units[i], points, attribute);
           units[i].at = to;
         });
       };
-      loader.run(units, () => this.#pending(request));
-    }
-  }
-
-  async #pending(work) {
-    this.pending++;
-    try {
-      await work();
-    } catch (error) {
-      throw named(this.scene, error);
-    } finally {
-      this.pending--;
+      loader.run(units, () => pending(this, request));
     }
   }
 

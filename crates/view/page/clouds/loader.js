@@ -5,9 +5,16 @@ const MOST_REQUESTS = 3;
 /** Milliseconds until a connection that is gone is tried again: the first and the longest pause. */
 const PAUSES = [1000, 30_000];
 
-/** An error of a dataset. */
-export function named(scene, error) {
-  return Object.assign(new Error(`${scene.name}: ${error.message}`), { isTransient: error.isTransient });
+/** Work of a cloud that waits for an answer; errors name its dataset. */
+export async function pending(cloud, work) {
+  cloud.pending++;
+  try {
+    await work();
+  } catch (error) {
+    throw Object.assign(new Error(`${cloud.scene.name}: ${error.message}`), { isTransient: error.isTransient });
+  } finally {
+    cloud.pending--;
+  }
 }
 
 export class Loader {

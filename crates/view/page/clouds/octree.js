@@ -1,9 +1,8 @@
 // An octree with additive levels of detail: a node is drawn with all its ancestors.
 
 import { Heap, scale, sub } from "pm/math.js";
-import { pointBlock } from "pm/clouds/block.js";
-import { named, together } from "pm/clouds/loader.js";
-import { drop, put, renew } from "pm/clouds/units.js";
+import { pending, together } from "pm/clouds/loader.js";
+import { drop, putPoints, renew } from "pm/clouds/units.js";
 
 /** Nodes of smaller radius, in pixels, are not drawn. */
 const LEAST_PIXELS = 40;
@@ -93,7 +92,7 @@ export class OctreeCloud {
   #load(proxies, loader) {
     for (const node of proxies) {
       if (node.chunk.state !== "new") continue;
-      const isRunning = loader.run([node.chunk], () => this.#pending(async () => this.#insert(await this.source.chunk(node.name))));
+      const isRunning = loader.run([node.chunk], () => pending(this, async () => this.#insert(await this.source.chunk(node.name))));
       if (!isRunning) return;
     }
     while (this.wanted.length > 0 && !loader.isFull) {
@@ -103,23 +102,9 @@ export class OctreeCloud {
       const attribute = this.attribute;
       const request = async () => {
         const all = await this.source.points(units.map((node) => node.name), { attribute });
-        all.forEach((points, i) => {
-          put(units[i], pointBlock(this.gl, points), attribute, this.attribute);
-          units[i].block.classes.forEach((number) => this.classes.add(number));
-        });
+        all.forEach((points, i) => putPoints(this, units[i], points, attribute));
       };
-      loader.run(units, () => this.#pending(request));
-    }
-  }
-
-  async #pending(work) {
-    this.pending++;
-    try {
-      await work();
-    } catch (error) {
-      throw named(this.scene, error);
-    } finally {
-      this.pending--;
+      loader.run(units, () => pending(this, request));
     }
   }
 

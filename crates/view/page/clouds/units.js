@@ -1,5 +1,7 @@
 // What all kinds of clouds do with the units that they load.
 
+import { pointBlock } from "pm/clouds/block.js";
+
 /** The points of a unit have the values that the colouring needs. */
 export const isCurrent = ({ block }, attribute) => attribute === undefined || block?.attribute === attribute;
 
@@ -12,6 +14,12 @@ export function put(unit, block, requested, attribute) {
   // another colouring was chosen meanwhile
   block.dropExtra();
   unit.state = "new";
+}
+
+/** `put`, for kinds whose points have classes of their own. */
+export function putPoints(cloud, unit, points, requested) {
+  put(unit, pointBlock(cloud.gl, points), requested, cloud.attribute);
+  unit.block.classes.forEach((number) => cloud.classes.add(number));
 }
 
 /** Another attribute is wanted: points have to come again, and stay without one until then. */
