@@ -23,12 +23,13 @@ mod profiles;
 mod scan_choice;
 mod text_choice;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use args::{Args, Command, mistake};
 use clap::Parser as _;
 use clap::error::ErrorKind;
-use commands::{convert, export, extract, info, manual, measure, preview, validate, view};
+use commands::{convert, export, extract, info, job, manual, measure, preview, validate, view};
 use exit::Failure;
 
 fn main() -> ExitCode {
@@ -50,19 +51,24 @@ fn main() -> ExitCode {
 
 /// The command line; help and version are printed here, and end the process.
 fn args() -> Result<Args, Failure> {
-    let typed: Vec<_> = std::env::args_os().collect();
-    let args = Args::try_parse_from(&typed).map_err(|error| {
+    parse(&std::env::args_os().collect::<Vec<_>>())
+}
+
+/// A command line, the name of the program first.
+fn parse(typed: &[OsString]) -> Result<Args, Failure> {
+    let args = Args::try_parse_from(typed).map_err(|error| {
         if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
             error.exit();
         }
-        Failure::Usage(mistake::line(&error, &typed))
+        Failure::Usage(mistake::line(&error, typed))
     })?;
-    profiles::apply(args, &typed)
+    profiles::apply(args, typed)
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Convert(convert) => convert::run(convert),
+        Command::Job(job) => job::run(job),
         Command::Export(export) => export::run(export),
         Command::Measure(measure) => measure::run(measure),
         Command::Validate(validate) => validate::run(validate),

@@ -23,7 +23,8 @@ use crate::human::progress::Progress;
 use crate::inputs::Inputs;
 use crate::interrupt::{kept, no_more_checks, stop_flag};
 
-pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+/// What is to be made, and how, as the options say.
+pub(super) fn planned(args: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure> {
     let targets = targets(args)?;
     let inputs = args.inputs.expand(&args.output)?;
     if args.unreadable == FaultArg::Fail
@@ -37,7 +38,11 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     if args.page {
         PageFile::check_formats(args)?;
     }
-    let plan = plan(args, inputs)?;
+    Ok((plan(args, inputs)?, targets))
+}
+
+pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+    let (plan, targets) = planned(args)?;
     if args.dry_run {
         let estimate = pointmill_converter::estimate(&plan, &targets)?;
         return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
@@ -56,7 +61,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     no_more_checks();
     let for_people = progress.end();
     let report = result.map_err(|error| with_kept(error.into()))?;
-    tell(args, report_file.as_ref(), &report).map_err(|failure| after_all(failure, &plan.output))?;
+    tell(args.json, report_file.as_ref(), &report).map_err(|failure| after_all(failure, &plan.output))?;
     let page = page_file.map(|file| file.write(&plan.name)).transpose();
     let page = page.map_err(|failure| after_all(failure, &plan.output))?;
     if for_people {
@@ -69,13 +74,13 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
 }
 
 /// The report where it was asked for.
-fn tell(args: &ConvertArgs, file: Option<&ReportFile>, report: &Report) -> Result<(), Failure> {
-    if file.is_none() && !args.json {
+pub(super) fn tell(is_json: bool, file: Option<&ReportFile>, report: &Report) -> Result<(), Failure> {
+    if file.is_none() && !is_json {
         return Ok(());
     }
     let text = to_json(report)?;
     file.map_or(Ok(()), |file| file.write(&text))?;
-    if args.json { emit(&text) } else { Ok(()) }
+    if is_json { emit(&text) } else { Ok(()) }
 }
 
 /// What failed, and what of it is not lost.
@@ -91,7 +96,7 @@ fn with_kept(failure: Failure) -> Failure {
 }
 
 /// What fails once the dataset is in place must not read as if there were none.
-fn after_all(failure: Failure, output: &Path) -> Failure {
+pub(super) fn after_all(failure: Failure, output: &Path) -> Failure {
     match failure {
         Failure::Io(line) => Failure::Io(format!("{line}; the output {} is complete", output.display())),
         other => other,
@@ -318,7 +323,7 @@ pub(super) fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
 }
 
 /// What is being read is never replaced, nor is anything put into a dataset that is. What else may be, the converter judges.
-fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
+pub(super) fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
     // an output that cannot be found is an error of the run
     let Ok(output) = resolve_path(&plan.output) else { return Ok(()) };
     let clash = plan.inputs.iter().find_map(|input| {

@@ -47,6 +47,7 @@ mod plan;
 mod reason;
 mod report;
 mod runtime;
+mod shared_job;
 mod sources;
 mod warning;
 
@@ -55,6 +56,7 @@ pub use convert::{Verify, convert, convert_on, convert_verified};
 pub use error::{ConvertError, InputFault, JobFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
 pub use export::{ExportReport, ExportedAttribute, ExportedPoints, PositionChange, export, export_on};
+pub use job::{JobUnit, JobUnits, UnitName};
 pub use octree::Sampling;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
@@ -73,5 +75,6 @@ pub use report::{
     PlannedChoice, PointsReport, PositionErrors, PrecisionReport, Report, SavedBytes, SharedPlaceReport, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
+pub use shared_job::{finish_job, job_units, plan_job, run_units};
 pub use sources::{ResolvedCrs, resolve_crs};
 pub use warning::{ColourNote, CrsNote, NameFault, Proj4Fault, RenamedAttribute, ViewerNote, Warning};

@@ -18,7 +18,7 @@ const RESOURCES: [&str; 2] = ["memory", "threads"];
 
 /// What a job was begun for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Identity {
+pub(crate) struct Identity {
     version: String,
     /// Everything that shapes the output, by name.
     settings: Vec<(String, String)>,
@@ -37,7 +37,7 @@ struct Fingerprint {
 
 impl Identity {
     /// Of a run. `settings`: those of the report, which shape the datasets.
-    pub(super) fn of(
+    pub(crate) fn of(
         plan: &Plan,
         sources: &Sources,
         settings: serde_json::Map<String, serde_json::Value>,

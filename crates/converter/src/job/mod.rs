@@ -5,6 +5,10 @@
 
 mod identity;
 mod journal;
+mod keeper;
+mod names;
+mod shared;
+mod unit_file;
 
 use std::collections::HashMap;
 use std::fs;
@@ -12,9 +16,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use identity::Identity;
+pub(crate) use identity::Identity;
 use journal::{Entry, Journal};
+pub(crate) use keeper::{GroupUnits, Keeper};
+pub(crate) use names::Stage;
+pub use names::{JobUnit, JobUnits, UnitName};
 use serde::{Deserialize, Serialize};
+pub(crate) use shared::{SharedJob, Task};
+pub(crate) use unit_file::{UnitReader, UnitWriter};
 
 use crate::error::{ConvertError, JobFault};
 use crate::plan::{Checkpoint, Plan};
@@ -27,11 +36,13 @@ use crate::warning::Warning;
 const LOCK: &str = "lock";
 const JOURNAL: &str = "journal";
 const RECORDS: &str = "records-";
+const BUILT: &str = "build-";
 
 /// What a run leaves for another one.
 #[derive(Debug)]
 pub(crate) struct Job {
     folder: PathBuf,
+    disk: Arc<dyn Disk>,
     /// Until the end of the run.
     _lock: Option<FileLock>,
     state: Mutex<State>,
@@ -101,7 +112,7 @@ impl Job {
         journal.append(&encode(identity)?)?;
         sync_folder(&**disk, &folder).map_err(|e| ConvertError::io(&folder, "syncing the job folder", e))?;
         let state = Mutex::new(State { journal, units: HashMap::new() });
-        Ok(Self { folder, _lock: lock, state, is_new: true, recalled: AtomicU64::new(0) })
+        Ok(Self { folder, disk: Arc::clone(disk), _lock: lock, state, is_new: true, recalled: AtomicU64::new(0) })
     }
 
     /// Goes on with a job; `None`: there is none, or its run ended before it had one.
@@ -127,7 +138,7 @@ impl Job {
             units.insert((head.pass, head.unit), body);
         }
         let state = Mutex::new(State { journal, units });
-        Ok(Some(Self { folder, _lock: lock, state, is_new: false, recalled: AtomicU64::new(0) }))
+        Ok(Some(Self { folder, disk: Arc::clone(disk), _lock: lock, state, is_new: false, recalled: AtomicU64::new(0) }))
     }
 
     /// What a unit that is done has left.
@@ -170,6 +181,11 @@ impl Job {
         JobFault::Damaged { file: self.records_path(pass), byte }.into()
     }
 
+    /// Where a unit leaves what it has built.
+    fn built_path(&self, unit: UnitName) -> PathBuf {
+        self.folder.join(unit.to_string())
+    }
+
     /// The folder.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
@@ -203,8 +219,22 @@ impl Job {
     }
 }
 
-fn encode(value: &impl Serialize) -> Result<Vec<u8>, ConvertError> {
-    postcard::to_stdvec(value).map_err(|e| ConvertError::Internal(format!("writing the journal: {e}")))
+/// A part of a name that no other process makes.
+fn unique() -> String {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let time = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+    // processes of two machines may have the same number, but hardly begin in the same nanosecond
+    format!("{:x}-{time:x}-{:x}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+}
+
+/// Bytes for a file of a job.
+pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, ConvertError> {
+    postcard::to_stdvec(value).map_err(|e| ConvertError::Internal(format!("writing a job: {e}")))
+}
+
+/// What [`encode`] made; fails where it was not that.
+pub(crate) fn decode<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Result<T, ConvertError> {
+    postcard::from_bytes(bytes).map_err(|e| ConvertError::Internal(format!("reading a job: {e}")))
 }
 
 fn lock(folder: &Path, take: impl FnOnce(&Path) -> std::io::Result<Locked>) -> Result<Option<FileLock>, ConvertError> {
@@ -231,7 +261,7 @@ fn remove(folder: &Path) -> Result<(), ConvertError> {
 }
 
 fn is_ours(name: &str) -> bool {
-    name == LOCK || name == JOURNAL || name.starts_with(RECORDS)
+    name == LOCK || name == JOURNAL || name.starts_with(RECORDS) || name.starts_with(BUILT)
 }
 
 /// Removes our files, and the folder if nothing else is in it. The journal goes first: without it no run

@@ -30,6 +30,7 @@ use super::recovery::Recovery;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
+use crate::job::GroupUnits;
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, ScaleChoice, Setting};
 use crate::report::{self, ChoiceReason, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -118,7 +119,13 @@ impl Output for BatchesSettings {
         SavedBytes::NoPlane // the finished file tells
     }
 
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+    fn write(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        to: &StagedDataset,
+        _units: Option<GroupUnits<'_>>,
+    ) -> Result<OutputReport, ConvertError> {
         let (points, per_point) = (cloud.points(), bytes_per_point(cloud.frame.stride));
         let most = rt.budget.task_points(per_point, MAX_TASK_POINTS);
         let task_points = (points / (rt.threads as u64 * TASKS_PER_THREAD)).max(MIN_TASK_POINTS).min(most);

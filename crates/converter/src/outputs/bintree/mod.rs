@@ -42,6 +42,7 @@ use super::recovery::Lost;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
+use crate::job::GroupUnits;
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, FormatErrors, OutputReport, PlannedChoice};
 use crate::runtime::{Consumer, Reservation, Runtime, Sequential};
@@ -115,7 +116,13 @@ impl Output for BintreeSettings {
         ]
     }
 
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+    fn write(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        to: &StagedDataset,
+        _units: Option<GroupUnits<'_>>,
+    ) -> Result<OutputReport, ConvertError> {
         let columns = Columns::choose(cloud)?;
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);

@@ -1,0 +1,97 @@
+//! Where units leave what they have made: a job of one run, or one that several processes share.
+
+use super::names::{JobUnit, Stage, UnitName};
+use super::shared::SharedJob;
+use super::unit_file::{UnitReader, UnitWriter};
+use super::Job;
+use crate::error::{ConvertError, JobFault};
+use crate::runtime::DiskFile;
+
+/// A job of either kind.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Keeper<'a> {
+    /// Of one run, on one machine.
+    Own(&'a Job),
+    Shared(&'a SharedJob),
+}
+
+impl<'a> Keeper<'a> {
+    /// The job, if it is one that several processes share.
+    pub(crate) fn shared(self) -> Option<&'a SharedJob> {
+        match self {
+            Self::Shared(job) => Some(job),
+            Self::Own(_) => None,
+        }
+    }
+}
+
+/// The units that build the outputs of a group.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GroupUnits<'a> {
+    pub(crate) keeper: Keeper<'a>,
+    pub(crate) group: u32,
+}
+
+impl<'a> GroupUnits<'a> {
+    /// The name of a unit.
+    pub(crate) fn name(&self, number: usize) -> UnitName {
+        UnitName { stage: Stage::Build { group: self.group }, number: number as u64 }
+    }
+
+    /// The job, if several processes share it and this one does not finish it: its units are done one by one.
+    pub(crate) fn in_parts(&self) -> Option<&'a SharedJob> {
+        self.keeper.shared().filter(|job| !matches!(job.task(), super::Task::Finish))
+    }
+
+    /// The name under which settling keeps how the group is divided.
+    pub(crate) fn division(&self) -> String {
+        format!("division {}", self.group)
+    }
+
+    /// A unit as it is listed.
+    pub(crate) fn listed(&self, job: &SharedJob, number: usize, points: u64, needs: Vec<usize>) -> JobUnit {
+        job.listed(self.name(number), points, needs.into_iter().map(|n| self.name(n)).collect())
+    }
+
+    /// Hands what a unit has left to `take`; `None`: it is not done.
+    ///
+    /// # Errors
+    /// All units should be done, and this one is not.
+    pub(crate) fn recall<T>(
+        &self,
+        number: usize,
+        take: impl FnOnce(&UnitReader) -> Result<T, ConvertError>,
+    ) -> Result<Option<T>, ConvertError> {
+        let unit = self.name(number);
+        let job = match self.keeper {
+            Keeper::Shared(job) => return job.recall(unit, take),
+            Keeper::Own(job) => job,
+        };
+        let path = job.built_path(unit);
+        let Ok(meta) = std::fs::metadata(&path) else { return Ok(None) };
+        let file = DiskFile::open(&path, path.clone(), &job.disk)?;
+        match UnitReader::open(&path, file, meta.len()).and_then(|reader| take(&reader)) {
+            Ok(value) => Ok(Some(value)),
+            // it was not safe when the power failed
+            Err(ConvertError::Job(JobFault::Damaged { .. })) => Ok(None),
+            Err(other) => Err(other),
+        }
+    }
+
+    /// Writes what a unit leaves: `fill` puts it into the file.
+    pub(crate) fn keep(
+        &self,
+        number: usize,
+        fill: impl FnOnce(&mut UnitWriter) -> Result<(), ConvertError>,
+    ) -> Result<(), ConvertError> {
+        let unit = self.name(number);
+        match self.keeper {
+            Keeper::Shared(job) => job.keep(unit, fill),
+            Keeper::Own(job) => {
+                let mut file = UnitWriter::create(&job.built_path(unit), &job.disk)?;
+                fill(&mut file)?;
+                file.finish(false) // what the disk loses is found out by its sums, and made again
+            }
+        }
+    }
+}
