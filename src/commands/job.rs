@@ -78,9 +78,9 @@ fn typed_for_convert() -> Result<Vec<String>, Failure> {
     let mut words = std::env::args_os().skip_while(|word| word != "plan").skip(1);
     let mut arguments = Vec::new();
     while let Some(word) = words.next() {
-        let text = word.into_string().map_err(|word| {
-            Failure::Usage(format!("{}: a job needs names in UTF-8", word.to_string_lossy()))
-        })?;
+        let text = word
+            .into_string()
+            .map_err(|word| Failure::Usage(format!("{}: a job needs names in UTF-8", word.to_string_lossy())))?;
         match text.as_str() {
             "--job" => drop(words.next()),
             with_value if with_value.starts_with("--job=") => {}
@@ -111,7 +111,8 @@ fn open(folder: &Path) -> Result<Job, Failure> {
 }
 
 fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
-    let here = || Failure::Io(format!("{}: the folder that the job was planned in is not there", planned.folder.display()));
+    let here =
+        || Failure::Io(format!("{}: the folder that the job was planned in is not there", planned.folder.display()));
     let folder = if folder.is_absolute() { folder } else { planned.folder.join(folder) };
     std::env::set_current_dir(&planned.folder).map_err(|_| here())?;
     let words = ["pointmill", "convert"].into_iter().chain(planned.arguments.iter().map(String::as_str));
@@ -219,7 +220,11 @@ fn describe(units: &JobUnits) -> String {
         return "all units are done; 'pointmill job finish' puts them together".to_owned();
     }
     let each = counts(units).into_iter().map(|(kind, done, all)| {
-        format!("{done} of {all} unit{} to {kind} {} done", if all == 1 { "" } else { "s" }, if all == 1 { "is" } else { "are" })
+        format!(
+            "{done} of {all} unit{} to {kind} {} done",
+            if all == 1 { "" } else { "s" },
+            if all == 1 { "is" } else { "are" }
+        )
     });
     each.collect::<Vec<_>>().join(", ")
 }
@@ -232,7 +237,9 @@ fn run_some(args: &JobRunArgs) -> Result<(), Failure> {
         None => run_units(&job.plan, &job.targets, &job.folder, &args.units, false, &progress).map_err(Into::into),
     };
     no_more_checks();
-    if progress.end() && let Ok(units) = &done {
+    if progress.end()
+        && let Ok(units) = &done
+    {
         print_line(&describe(units));
     }
     done.map(drop)

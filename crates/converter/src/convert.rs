@@ -161,7 +161,9 @@ pub(crate) fn make(
             Ok(report)
         }
         Err(error) => {
-            events.phase(Phase::CleanUp, 0); // removing many files takes its time
+            if !matches!(error, ConvertError::Job(JobFault::Unfinished { .. })) {
+                events.phase(Phase::CleanUp, 0); // removing many files takes its time
+            }
             drop(staged);
             Err(error)
         }

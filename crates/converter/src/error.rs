@@ -299,7 +299,8 @@ impl fmt::Display for JobFault {
             Self::NoUnit { unit } => write!(f, "{unit}: the job has no such unit, or not yet"),
             Self::Unfinished { units } => {
                 let open = units.iter().filter(|unit| !unit.done);
-                let first = open.clone().next().map_or_else(String::new, |unit| format!("; the first is {}", unit.name));
+                let first =
+                    open.clone().next().map_or_else(String::new, |unit| format!("; the first is {}", unit.name));
                 write!(f, "{} of {} known units are not done{first}", open.count(), units.len())
             }
             Self::Damaged { file, byte } => {

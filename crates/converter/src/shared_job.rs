@@ -19,12 +19,7 @@ use crate::runtime::{Disk, Events, SystemDisk};
 ///
 /// # Errors
 /// Inputs or settings that cannot be converted, an output that must not be replaced, a folder in use.
-pub fn plan_job(
-    plan: &Plan,
-    targets: &[Target],
-    folder: &Path,
-    events: &dyn Events,
-) -> Result<JobUnits, ConvertError> {
+pub fn plan_job(plan: &Plan, targets: &[Target], folder: &Path, events: &dyn Events) -> Result<JobUnits, ConvertError> {
     let disk = disk();
     // what is in the way of the output is better known now than when all is done
     outputs::check(plan, targets)?;

@@ -118,7 +118,9 @@ impl<'a> Pass<'a> {
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
         }
-        let Self { context: Context { partition, store, misled, reading, wants_moments, pass, .. }, lattice, rt, .. } = self;
+        let Self {
+            context: Context { partition, store, misled, reading, wants_moments, pass, .. }, lattice, rt, ..
+        } = self;
         let intake = reading.intake;
         let cube = match Cube::around(&bounds, &lattice.lattice) {
             Ok(cube) if !misled.into_inner() && partition.holds(&bounds) => cube,

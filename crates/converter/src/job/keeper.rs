@@ -1,9 +1,9 @@
 //! Where units leave what they have made: a job of one run, or one that several processes share.
 
+use super::Job;
 use super::names::{JobUnit, Stage, UnitName};
 use super::shared::SharedJob;
 use super::unit_file::{UnitReader, UnitWriter};
-use super::Job;
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::DiskFile;
 
@@ -53,10 +53,26 @@ impl<'a> GroupUnits<'a> {
         job.listed(self.name(number), points, needs.into_iter().map(|n| self.name(n)).collect())
     }
 
+    /// True if a unit has left something.
+    pub(crate) fn is_done(&self, number: usize) -> bool {
+        let unit = self.name(number);
+        match self.keeper {
+            Keeper::Shared(job) => job.is_done(unit),
+            Keeper::Own(job) => job.built_path(unit).is_file(),
+        }
+    }
+
+    /// The error for a unit that is not whole any more, though it was done.
+    pub(crate) fn gone(&self, number: usize) -> ConvertError {
+        JobFault::NoUnit { unit: self.name(number).to_string() }.into()
+    }
+
+    /// The job, if how the group is divided is kept.
+    pub(crate) fn shared(&self) -> Option<&'a SharedJob> {
+        self.keeper.shared()
+    }
+
     /// Hands what a unit has left to `take`; `None`: it is not done.
-    ///
-    /// # Errors
-    /// All units should be done, and this one is not.
     pub(crate) fn recall<T>(
         &self,
         number: usize,

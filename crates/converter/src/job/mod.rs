@@ -8,6 +8,7 @@ mod journal;
 mod keeper;
 mod names;
 mod shared;
+mod tasks;
 mod unit_file;
 
 use std::collections::HashMap;
@@ -23,6 +24,7 @@ pub(crate) use names::Stage;
 pub use names::{JobUnit, JobUnits, UnitName};
 use serde::{Deserialize, Serialize};
 pub(crate) use shared::{SharedJob, Task};
+pub(crate) use tasks::{UnitLog, make_units, put_back};
 pub(crate) use unit_file::{UnitReader, UnitWriter};
 
 use crate::error::{ConvertError, JobFault};
@@ -138,7 +140,14 @@ impl Job {
             units.insert((head.pass, head.unit), body);
         }
         let state = Mutex::new(State { journal, units });
-        Ok(Some(Self { folder, disk: Arc::clone(disk), _lock: lock, state, is_new: false, recalled: AtomicU64::new(0) }))
+        Ok(Some(Self {
+            folder,
+            disk: Arc::clone(disk),
+            _lock: lock,
+            state,
+            is_new: false,
+            recalled: AtomicU64::new(0),
+        }))
     }
 
     /// What a unit that is done has left.

@@ -50,7 +50,8 @@ impl FromStr for UnitName {
 
     fn from_str(text: &str) -> Result<Self, ()> {
         let mut parts = text.split('-');
-        let (Some(kind), Some(of), Some(number), None) = (parts.next(), parts.next(), parts.next(), parts.next()) else {
+        let (Some(kind), Some(of), Some(number), None) = (parts.next(), parts.next(), parts.next(), parts.next())
+        else {
             return Err(());
         };
         let of = of.parse().map_err(|_| ())?;
@@ -118,7 +119,8 @@ mod tests {
         for text in ["read-1-0", "settle-5-0", "build-0-18446744073709551615"] {
             assert_eq!(text.parse::<UnitName>().unwrap().to_string(), text);
         }
-        for text in ["", "read", "read-1", "read-1-2-3", "read-01-2", "read-1-+2", "Read-1-2", "build-1-x", "read--1-2"] {
+        for text in ["", "read", "read-1", "read-1-2-3", "read-01-2", "read-1-+2", "Read-1-2", "build-1-x", "read--1-2"]
+        {
             assert!(text.parse::<UnitName>().is_err(), "{text}");
         }
     }
@@ -128,8 +130,7 @@ mod tests {
         let name = |number| UnitName { stage: Stage::Build { group: 0 }, number };
         let unit = |n, needs: &[u64], done| JobUnit::new(name(n), 1, needs.iter().map(|n| name(*n)).collect(), done);
         let units = vec![unit(0, &[], true), unit(1, &[0], false), unit(2, &[0, 1], false), unit(3, &[], false)];
-        let ready: Vec<u64> =
-            JobUnits { units, complete: false }.ready().map(|u| u.name.number).collect();
+        let ready: Vec<u64> = JobUnits { units, complete: false }.ready().map(|u| u.name.number).collect();
         assert_eq!(ready, [1, 3]);
     }
 }

@@ -56,7 +56,7 @@ struct Settling {
     pass: u32,
     /// This process does it.
     is_running: bool,
-    /// File of the records, in the folder of units.
+    /// File of the records, in the folder of units; of the process that settles.
     records: Option<String>,
     results: Vec<(String, Vec<u8>)>,
 }
@@ -187,6 +187,12 @@ impl SharedJob {
         Ok(Some(file))
     }
 
+    /// A file for other records of the pass that is settled here, and its name.
+    pub(crate) fn more_records(&self, temp: &TempFiles) -> Result<Option<(DiskFile, String)>, ConvertError> {
+        let pass = self.settling().pass;
+        self.settles().then(|| self.new_records(settle(pass), temp)).transpose()
+    }
+
     /// Begins to settle a pass, or takes what another process has come to.
     ///
     /// # Errors
@@ -198,9 +204,9 @@ impl SharedJob {
             (settling.pass, settling.is_running) = (pass, true);
             return Ok(());
         }
-        match self.recall(unit, |file| Ok((file.get(0)?, file.get(1)?)))? {
-            Some((records, results)) => {
-                *self.settling() = Settling { pass, is_running: false, records, results };
+        match self.recall(unit, |file| file.get(0))? {
+            Some(results) => {
+                *self.settling() = Settling { pass, is_running: false, records: None, results };
                 Ok(())
             }
             None => Err(JobFault::Unfinished { units: vec![self.listed(unit, points, Vec::new())] }.into()),
@@ -219,11 +225,23 @@ impl SharedJob {
         store: &Store,
         make: impl FnOnce() -> Result<T, ConvertError>,
     ) -> Result<T, ConvertError> {
+        self.settled_in(name, store, None, make)
+    }
+
+    /// [`Self::settled`] with another store than that of the pass, whose file for records is `records` if this process settles.
+    pub(crate) fn settled_in<T: Serialize + DeserializeOwned>(
+        &self,
+        name: &str,
+        store: &Store,
+        records: Option<String>,
+        make: impl FnOnce() -> Result<T, ConvertError>,
+    ) -> Result<T, ConvertError> {
         let first = store.next_block()?;
         if self.settles() {
             let value = make()?;
             let blocks = store.secure(first)?;
-            let result = super::encode(&(&value, first, blocks))?;
+            let records = records.or_else(|| self.settling().records.clone());
+            let result = super::encode(&(&value, first, records, blocks))?;
             self.settling().results.push((name.to_owned(), result));
             return Ok(value);
         }
@@ -231,13 +249,15 @@ impl SharedJob {
         let unit = settle(settling.pass);
         let damaged = || ConvertError::Job(JobFault::Damaged { file: self.path(unit), byte: 0 });
         let (_, result) = settling.results.iter().find(|(known, _)| known == name).ok_or_else(damaged)?;
-        let (value, was_first, blocks) =
-            postcard::from_bytes::<(T, u32, Vec<SafeBlock>)>(result).map_err(|_| damaged())?;
+        let (value, was_first, records, blocks) =
+            postcard::from_bytes::<(T, u32, Option<String>, Vec<SafeBlock>)>(result).map_err(|_| damaged())?;
         if was_first != first {
-            return Err(ConvertError::Internal(format!("{name}: {first} blocks before it, {was_first} when it was made")));
+            return Err(ConvertError::Internal(format!(
+                "{name}: {first} blocks before it, {was_first} when it was made"
+            )));
         }
-        if let (Some(records), false) = (&settling.records, blocks.is_empty()) {
-            store.adopt_from(self.records(records), &blocks)?;
+        if let (Some(records), false) = (records, blocks.is_empty()) {
+            store.adopt_from(self.records(&records), &blocks)?;
         }
         Ok(value)
     }
@@ -248,10 +268,7 @@ impl SharedJob {
         if !settling.is_running {
             return Ok(());
         }
-        self.keep(settle(settling.pass), |file| {
-            file.put(&settling.records)?;
-            file.put(&settling.results)
-        })
+        self.keep(settle(settling.pass), |file| file.put(&settling.results))
     }
 
     /// Removes the job, and what else its processes have left in its folders. Files of others stay.

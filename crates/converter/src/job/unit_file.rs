@@ -219,7 +219,11 @@ impl UnitReader {
             sum = crc32c::crc32c_append(sum, &buffer[..part]);
             at += part as u64;
         }
-        if sum == section.sum { Ok((Arc::clone(&self.file), section.offset)) } else { Err(self.damaged(section.offset)) }
+        if sum == section.sum {
+            Ok((Arc::clone(&self.file), section.offset))
+        } else {
+            Err(self.damaged(section.offset))
+        }
     }
 
     fn section(&self, index: usize) -> Result<Section, ConvertError> {

@@ -50,7 +50,7 @@ pub(super) fn divide(
     units: Option<GroupUnits<'_>>,
 ) -> Result<Division, ConvertError> {
     let mut room = Reservation::new(&rt.memory, Consumer::Cells);
-    let (subtrees, chunk_points) = match units.and_then(|units| Some((units, units.keeper.shared()?))) {
+    let (subtrees, chunk_points) = match units.and_then(|units| Some((units, units.shared()?))) {
         Some((units, job)) => job.settled(&units.division(), &cloud.store, || {
             Ok((divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points))
         })?,

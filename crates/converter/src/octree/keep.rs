@@ -159,12 +159,7 @@ fn read_pending(file: &UnitReader, root: KeptNode, lists: &Lists) -> Result<Pend
     if at - start == file.len(PENDING) { Ok(node) } else { Err(file.damaged(at)) }
 }
 
-fn pending(
-    node: KeptNode,
-    file: &Arc<DiskFile>,
-    at: &mut u64,
-    lists: &Lists,
-) -> Result<Pending<List>, ConvertError> {
+fn pending(node: KeptNode, file: &Arc<DiskFile>, at: &mut u64, lists: &Lists) -> Result<Pending<List>, ConvertError> {
     let (start, bytes) = (*at, node.points * lists.stride as u64);
     *at += bytes;
     let points = if bytes > LARGE_BYTES || node.is_one_place {

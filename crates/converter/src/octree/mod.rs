@@ -126,11 +126,14 @@ fn build_for<S: Sinks>(
             let Some(buffers) = committer.admit(index) else { return Ok(()) };
             rt.check_stop()?; // it may have waited long
             let wait = || committer.wait_for(index, unit.class_start);
-            let recalled = kept.map(|of| of.recall(index, |file| keep::read(file, &shared.lists))).transpose()?.flatten();
+            let recalled =
+                kept.map(|of| of.recall(index, |file| keep::read(file, &shared.lists))).transpose()?.flatten();
             let is_recalled = recalled.is_some();
             let built = match (recalled, &unit.work) {
                 (Some(built), Work::Subtree(_)) => Some(built),
-                (Some(built), Work::Above(children)) => wait().then(|| committer.take(children).map(|_| built)).transpose()?,
+                (Some(built), Work::Above(children)) => {
+                    wait().then(|| committer.take(children).map(|_| built)).transpose()?
+                }
                 (None, Work::Subtree(chunks)) => builder.subtree(unit.key, chunks, buffers, wait)?,
                 (None, Work::Above(children)) => match wait() {
                     true => Some(builder.above(unit.key, committer.take(children)?, buffers)?),

@@ -29,7 +29,8 @@ pub(super) fn share<S: Sinks>(
     sampling: Sampling,
 ) -> Result<(), ConvertError> {
     let needs = needs(units, sampling == Sampling::Poisson);
-    let mut open: Vec<usize> = (0..units.len()).filter(|i| job.wants(of.name(*i)) && !job.is_done(of.name(*i))).collect();
+    let mut open: Vec<usize> =
+        (0..units.len()).filter(|i| job.wants(of.name(*i)) && !job.is_done(of.name(*i))).collect();
     loop {
         let is_ready = |i: &usize| needs[*i].iter().all(|need| job.is_done(of.name(*need)));
         let (ready, others): (Vec<usize>, Vec<usize>) = open.iter().partition(|i| is_ready(i));
@@ -150,6 +151,7 @@ fn around(key: NodeKey, level: u8) -> impl Iterator<Item = NodeKey> {
         (low.max(0)..=high.min(side - 1)).map(|c| c as u32)
     };
     let own = key.ancestor(level);
-    range(key.x).flat_map(move |x| range(key.y).flat_map(move |y| range(key.z).map(move |z| NodeKey { level, x, y, z })))
+    range(key.x)
+        .flat_map(move |x| range(key.y).flat_map(move |y| range(key.z).map(move |z| NodeKey { level, x, y, z })))
         .filter(move |node| Some(*node) != own)
 }

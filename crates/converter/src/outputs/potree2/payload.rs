@@ -52,7 +52,17 @@ impl<'a> PayloadEncoder<'a> {
         let mut attributes = vec![Attribute::new("position", AttributeType::Int32, 3)];
         attributes.extend(layout.attributes.iter().cloned());
         let (tile, plain, scratch) = (Vec::new(), Vec::new(), BrotliScratch::default());
-        Self { events, layout, encoding, attributes: attributes.into(), watch: None, seen: Seen::default(), tile, plain, scratch }
+        Self {
+            events,
+            layout,
+            encoding,
+            attributes: attributes.into(),
+            watch: None,
+            seen: Seen::default(),
+            tile,
+            plain,
+            scratch,
+        }
     }
 
     /// Looks for values that viewers do not show as they are meant.
