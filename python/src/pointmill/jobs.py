@@ -151,7 +151,7 @@ def status(job: AnyPath) -> dict[str, Any]:
     return known
 
 
-def batches(listed: Iterable[Unit], slots: int, per_slot: int = 4, least_points: int = 1_000_000) -> list[Batch]:
+def batches(listed: Iterable[Unit], slots: int, per_slot: int = 4, least_points: int = 4_000_000) -> list[Batch]:
     """Shares out the units that are not done, for ``slots`` processes that run at a time.
 
     The batches come in layers: what needs nothing, what needs units of that alone, and so on. A layer is cut into at
