@@ -154,8 +154,8 @@ pub(crate) struct ConvertArgs {
           help_heading = "Output")]
     pub(crate) verify: Option<VerifyArg>,
 
-    /// Goes on where a run with the same inputs and options was ended, if it has left OUT.job: what it has read is not read
-    /// again
+    /// Goes on where a run with the same inputs and options was ended, if it has left OUT.job: what it has read and built is not
+    /// read and built again
     #[arg(long, help_heading = "Resources")]
     pub(crate) resume: bool,
     /// Whether a run that is ended leaves OUT.job for --resume: never, always, or auto: if the points are not expected to fit into

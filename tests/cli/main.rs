@@ -19,6 +19,7 @@ mod from_datasets_places;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod jobs;
 mod manual;
 mod many;
 mod measure;

@@ -28,11 +28,23 @@ impl<'a> Keeper<'a> {
 /// The units that build the outputs of a group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroupUnits<'a> {
-    pub(crate) keeper: Keeper<'a>,
-    pub(crate) group: u32,
+    keeper: Keeper<'a>,
+    group: u32,
+    /// Tells divisions apart: another run may divide the group otherwise.
+    mark: u32,
 }
 
 impl<'a> GroupUnits<'a> {
+    /// Those of a group, by its number.
+    pub(crate) fn new(keeper: Keeper<'a>, group: u32) -> Self {
+        Self { keeper, group, mark: 0 }
+    }
+
+    /// The same, of a group that is divided into these: what a run has kept that divided it otherwise is not found.
+    pub(crate) fn divided(self, units: &impl serde::Serialize) -> Result<Self, ConvertError> {
+        Ok(Self { mark: crc32c::crc32c(&super::encode(units)?), ..self })
+    }
+
     /// The name of a unit.
     pub(crate) fn name(&self, number: usize) -> UnitName {
         UnitName { stage: Stage::Build { group: self.group }, number: number as u64 }
@@ -58,13 +70,21 @@ impl<'a> GroupUnits<'a> {
         let unit = self.name(number);
         match self.keeper {
             Keeper::Shared(job) => job.is_done(unit),
-            Keeper::Own(job) => job.built_path(unit).is_file(),
+            Keeper::Own(job) => job.built_path(unit, self.mark).is_file(),
         }
     }
 
     /// The error for a unit that is not whole any more, though it was done.
     pub(crate) fn gone(&self, number: usize) -> ConvertError {
-        JobFault::NoUnit { unit: self.name(number).to_string() }.into()
+        let unit = JobUnit::new(self.name(number), 0, Vec::new(), false);
+        JobFault::Unfinished { units: vec![unit] }.into()
+    }
+
+    /// Fails if several processes share the job and one of so many units is not done.
+    pub(crate) fn all_done(&self, units: usize) -> Result<(), ConvertError> {
+        let open = (0..units).filter(|i| self.shared().is_some() && !self.is_done(*i));
+        let open: Vec<JobUnit> = open.map(|i| JobUnit::new(self.name(i), 0, Vec::new(), false)).collect();
+        if open.is_empty() { Ok(()) } else { Err(JobFault::Unfinished { units: open }.into()) }
     }
 
     /// The job, if how the group is divided is kept.
@@ -83,7 +103,7 @@ impl<'a> GroupUnits<'a> {
             Keeper::Shared(job) => return job.recall(unit, take),
             Keeper::Own(job) => job,
         };
-        let path = job.built_path(unit);
+        let path = job.built_path(unit, self.mark);
         let Ok(meta) = std::fs::metadata(&path) else { return Ok(None) };
         let file = DiskFile::open(&path, path.clone(), &job.disk)?;
         match UnitReader::open(&path, file, meta.len()).and_then(|reader| take(&reader)) {
@@ -91,6 +111,13 @@ impl<'a> GroupUnits<'a> {
             // it was not safe when the power failed
             Err(ConvertError::Job(JobFault::Damaged { .. })) => Ok(None),
             Err(other) => Err(other),
+        }
+    }
+
+    /// Notes units that another run has built.
+    pub(crate) fn count_recalled(&self, units: usize) {
+        if let Keeper::Own(job) = self.keeper {
+            job.count_recalled_units(units as u64);
         }
     }
 
@@ -104,7 +131,7 @@ impl<'a> GroupUnits<'a> {
         match self.keeper {
             Keeper::Shared(job) => job.keep(unit, fill),
             Keeper::Own(job) => {
-                let mut file = UnitWriter::create(&job.built_path(unit), &job.disk)?;
+                let mut file = UnitWriter::create(&job.built_path(unit, self.mark), &job.disk)?;
                 fill(&mut file)?;
                 file.finish(false) // what the disk loses is found out by its sums, and made again
             }

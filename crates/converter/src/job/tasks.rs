@@ -89,10 +89,10 @@ pub(crate) fn make_units<S>(
         Some(job) => all.filter(|i| job.wants(of.name(*i)) && !job.is_done(of.name(*i))).collect(),
         None => all.filter(|i| !of.is_done(*i)).collect(),
     };
-    if let (Some(job), true) = (of.keeper.shared(), of.in_parts().is_none() && !wanted.is_empty()) {
-        let listed = points.iter().enumerate().map(|(i, points)| of.listed(job, i, *points, Vec::new()));
-        return Err(JobFault::Unfinished { units: listed.collect() }.into());
+    if of.in_parts().is_none() {
+        of.all_done(points.len())?;
     }
+    of.count_recalled(points.len() - wanted.len());
     rt.in_parallel(
         wanted.len(),
         state,
