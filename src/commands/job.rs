@@ -59,7 +59,7 @@ fn plan(args: &JobPlanArgs) -> Result<(), Failure> {
     let folder = std::env::current_dir().map_err(|e| Failure::Io(format!("the working folder: {e}")))?;
     let planned = Planned { version: env!("CARGO_PKG_VERSION").to_owned(), folder, arguments: typed_for_convert()? };
     let job = job_of(&planned, args.job.clone())?;
-    protect_inputs(&job.plan)?;
+    protect_inputs(&job.plan, false)?;
     let progress = Progress::new(&job.convert.talk, Some(stop_flag()));
     let units = plan_job(&job.plan, &job.targets, &job.folder, &progress);
     no_more_checks();
@@ -123,6 +123,7 @@ fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
     let useless = [
         ("--dry-run", convert.dry_run),
         ("--resume", convert.resume),
+        ("--append", convert.append),
         ("--page", convert.page),
         ("--json", convert.json),
         ("--checkpoint auto", matches!(convert.checkpoint, CheckpointArg::Auto)),
@@ -268,7 +269,7 @@ fn run_share(job: &Job, share: Share, progress: &Progress) -> Result<JobUnits, F
 
 fn finish(args: &JobFinishArgs) -> Result<(), Failure> {
     let job = open(&args.job)?.with(&args.resources)?;
-    protect_inputs(&job.plan)?;
+    protect_inputs(&job.plan, false)?;
     let report_file = job.convert.report.as_ref().map(|file| {
         let sources = job.plan.inputs.iter().chain(&job.convert.inputs.files_from);
         ReportFile::new(file, &job.plan.output, sources)
