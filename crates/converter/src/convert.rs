@@ -121,7 +121,7 @@ impl JobOf<'_> {
                 Ok(plan.resume && job.as_ref().is_some_and(Job::is_new))
             }
             Self::Shared(job) => {
-                job.identify(&Identity::of(plan, sources, settings)?)?;
+                job.identify(&Identity::of(plan, sources, settings, !job.is_in_parts())?)?;
                 Ok(false)
             }
         }

@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::context::{Collected, Context};
 use crate::cloud::{SafeBlock, SourceStats, Stats};
 use crate::error::ConvertError;
-use crate::job::{Job, SharedJob, Stage, UnitName};
+use crate::job::{Job, SharedJob};
 use crate::runtime::{Consumer, Reservation, Runtime};
 use crate::sources::Sources;
+use crate::unit_name::{Stage, UnitName};
 
 /// What the threads have made of a unit.
 pub(super) struct Unit {

@@ -1,11 +1,11 @@
 //! Where units leave what they have made: a job of one run, or one that several processes share.
 
 use super::Job;
-use super::names::{JobUnit, Stage, UnitName};
 use super::shared::SharedJob;
 use super::unit_file::{UnitReader, UnitWriter};
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::DiskFile;
+use crate::unit_name::{JobUnit, Stage, UnitName};
 
 /// A job of either kind.
 #[derive(Debug, Clone, Copy)]
@@ -65,12 +65,11 @@ impl<'a> GroupUnits<'a> {
         job.listed(self.name(number), points, needs.into_iter().map(|n| self.name(n)).collect())
     }
 
-    /// True if a unit has left something.
-    pub(crate) fn is_done(&self, number: usize) -> bool {
-        let unit = self.name(number);
+    /// True if a unit is done: of a job that several processes share, if its file is there; else if that is whole, too.
+    pub(crate) fn is_done(&self, number: usize) -> Result<bool, ConvertError> {
         match self.keeper {
-            Keeper::Shared(job) => job.is_done(unit),
-            Keeper::Own(job) => job.built_path(unit, self.mark).is_file(),
+            Keeper::Shared(job) => Ok(job.is_done(self.name(number))),
+            Keeper::Own(_) => Ok(self.recall(number, UnitReader::check)?.is_some()),
         }
     }
 
@@ -82,7 +81,8 @@ impl<'a> GroupUnits<'a> {
 
     /// Fails if several processes share the job and one of so many units is not done.
     pub(crate) fn all_done(&self, units: usize) -> Result<(), ConvertError> {
-        let open = (0..units).filter(|i| self.shared().is_some() && !self.is_done(*i));
+        let Some(job) = self.shared() else { return Ok(()) };
+        let open = (0..units).filter(|i| !job.is_done(self.name(*i)));
         let open: Vec<JobUnit> = open.map(|i| JobUnit::new(self.name(i), 0, Vec::new(), false)).collect();
         if open.is_empty() { Ok(()) } else { Err(JobFault::Unfinished { units: open }.into()) }
     }
@@ -99,11 +99,15 @@ impl<'a> GroupUnits<'a> {
         take: impl FnOnce(&UnitReader) -> Result<T, ConvertError>,
     ) -> Result<Option<T>, ConvertError> {
         let unit = self.name(number);
+        let take = |file: &UnitReader| match file.get::<u32>(file.sections().saturating_sub(1))? == self.mark {
+            true => take(file),
+            false => Err(file.damaged(0)), // of another division, or of no unit at all
+        };
         let job = match self.keeper {
             Keeper::Shared(job) => return job.recall(unit, take),
             Keeper::Own(job) => job,
         };
-        let path = job.built_path(unit, self.mark);
+        let path = job.built_path(unit);
         let Ok(meta) = std::fs::metadata(&path) else { return Ok(None) };
         let file = DiskFile::open(&path, path.clone(), &job.disk)?;
         match UnitReader::open(&path, file, meta.len()).and_then(|reader| take(&reader)) {
@@ -128,10 +132,14 @@ impl<'a> GroupUnits<'a> {
         fill: impl FnOnce(&mut UnitWriter) -> Result<(), ConvertError>,
     ) -> Result<(), ConvertError> {
         let unit = self.name(number);
+        let fill = |file: &mut UnitWriter| {
+            fill(file)?;
+            file.put(&self.mark)
+        };
         match self.keeper {
             Keeper::Shared(job) => job.keep(unit, fill),
             Keeper::Own(job) => {
-                let mut file = UnitWriter::create(&job.built_path(unit, self.mark), &job.disk)?;
+                let mut file = UnitWriter::create(&job.built_path(unit), &job.disk)?;
                 fill(&mut file)?;
                 file.finish(false) // what the disk loses is found out by its sums, and made again
             }

@@ -6,7 +6,6 @@
 mod identity;
 mod journal;
 mod keeper;
-mod names;
 mod shared;
 mod tasks;
 mod unit_file;
@@ -20,8 +19,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(crate) use identity::Identity;
 use journal::{Entry, Journal};
 pub(crate) use keeper::{GroupUnits, Keeper};
-pub(crate) use names::Stage;
-pub use names::{JobUnit, JobUnits, UnitName};
 use serde::{Deserialize, Serialize};
 pub(crate) use shared::{SharedJob, Task};
 pub(crate) use tasks::{UnitLog, make_units, put_back};
@@ -33,6 +30,7 @@ use crate::runtime::disk::{create_folder, sync_folder};
 use crate::runtime::os_files::{FileLock, Locked};
 use crate::runtime::{Disk, DiskFile, TempFiles};
 use crate::sources::Sources;
+use crate::unit_name::UnitName;
 use crate::warning::Warning;
 
 const LOCK: &str = "lock";
@@ -103,7 +101,7 @@ impl Job {
             return Ok(None);
         }
         let folder = folder_of(output, plan.temp_dir.as_deref());
-        let identity = Identity::of(plan, sources, settings)?;
+        let identity = Identity::of(plan, sources, settings, true)?;
         let resumed = if plan.resume { Self::resume(folder.clone(), &identity, disk)? } else { None };
         resumed.map_or_else(|| Self::begin(folder, &identity, disk), Ok).map(Some)
     }
@@ -229,8 +227,8 @@ impl Job {
     }
 
     /// Where a unit leaves what it has built.
-    fn built_path(&self, unit: UnitName, mark: u32) -> PathBuf {
-        self.folder.join(format!("{unit}-{mark:08x}"))
+    fn built_path(&self, unit: UnitName) -> PathBuf {
+        self.folder.join(unit.to_string())
     }
 
     /// The folder.

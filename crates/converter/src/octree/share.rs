@@ -29,8 +29,7 @@ pub(super) fn share<S: Sinks>(
     sampling: Sampling,
 ) -> Result<(), ConvertError> {
     let needs = needs(units, sampling == Sampling::Poisson);
-    let mut open: Vec<usize> =
-        (0..units.len()).filter(|i| job.wants(of.name(*i)) && !job.is_done(of.name(*i))).collect();
+    let mut open: Vec<usize> = (0..units.len()).filter(|i| job.wants(of.name(*i))).collect();
     loop {
         let is_ready = |i: &usize| needs[*i].iter().all(|need| job.is_done(of.name(*need)));
         let (ready, others): (Vec<usize>, Vec<usize>) = open.iter().partition(|i| is_ready(i));
