@@ -20,12 +20,7 @@ fn stage(options: &[&str]) -> Dir {
 #[test]
 fn a_dataset_that_was_added_to_has_the_bytes_of_all_scans() {
     let all = "intensity,classification,gps-time";
-    for options in [
-        &[][..],
-        &["--to", "bintree", "--attributes", all],
-        &["--to", "batches", "--attributes", all],
-        &["--to", "potree1", "--potree1-version", "1.8"],
-    ] {
+    for options in [&[][..], &["--to", "bintree", "--attributes", all], &["--to", "batches", "--attributes", all]] {
         let dir = stage(options);
         dir.succeed([&["convert", "b.las", "-o", "city", "-q", "--append"][..], options].concat());
         assert_same_dataset(&dataset(&dir.path("city")), &dataset(&dir.path("both")), &format!("{options:?}"));
@@ -34,11 +29,13 @@ fn a_dataset_that_was_added_to_has_the_bytes_of_all_scans() {
 }
 
 #[test]
-fn a_copc_file_that_was_added_to_holds_all_points() {
-    // it has fields that the scans did not have, so that its description differs
-    let dir = stage(&["--to", "copc"]);
-    dir.succeed(["convert", "b.las", "-o", "city", "-q", "--append", "--to", "copc"]);
-    dir.validate("city", &["a.las", "b.las"]);
+fn formats_with_other_fields_than_the_scans_hold_all_points_too() {
+    // COPC has more fields, so that its description differs; Potree 1 has 8 bits of a colour, so that points of one place have another order
+    for options in [&["--to", "copc"][..], &["--to", "potree1", "--potree1-version", "1.8"]] {
+        let dir = stage(options);
+        dir.succeed([&["convert", "b.las", "-o", "city", "-q", "--append"][..], options].concat());
+        dir.validate("city", &["a.las", "b.las"]);
+    }
 }
 
 #[test]
