@@ -84,4 +84,21 @@ mod tests {
         assert_eq!(a, take(1));
         assert_ne!(a, take(2));
     }
+
+    #[test]
+    fn hashes_are_the_published_ones() {
+        // the first numbers of SplitMix64 from 0 (Steele, Lea and Flood 2014): the finalizer of multiples of its step
+        let step = 0x9e37_79b9_7f4a_7c15u64;
+        let expected = [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4, 0x06c4_5d18_8009_454f];
+        assert_eq!([1, 2, 3].map(|n| mix(step.wrapping_mul(n))), expected);
+    }
+
+    #[test]
+    fn the_most_central_of_three_axes_is_taken() {
+        // cells of 8 units whose middle is at 3.5; the last two are as far from it, and the first of them wins
+        let points = [[8, 0, 0], [15, 1, 3], [10, 2, 6], [13, 5, 1]].map(TreePoint);
+        let mut accepted = [false; 4];
+        nearest_to_center(&Candidates { points: &points, are_free: &[true; 4], shift: 3 }, &mut accepted);
+        assert_eq!(accepted, [false, false, true, false]);
+    }
 }
