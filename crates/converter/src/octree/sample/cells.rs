@@ -101,4 +101,21 @@ mod tests {
         nearest_to_center(&Candidates { points: &points, are_free: &[true; 4], shift: 3 }, &mut accepted);
         assert_eq!(accepted, [false, false, true, false]);
     }
+
+    #[test]
+    fn the_same_seed_and_level_take_the_same_points() {
+        // eight cells of 16 points; worked out by another program from the definition: the least of
+        // mix(mix(salt ^ (x << 32 | y)) ^ z) with salt = mix(seed ^ mix(level + 1))
+        let points: Vec<TreePoint> = (0..128).map(|i| TreePoint([i, i * 7 % 16, i * 5 % 16])).collect();
+        let candidates = Candidates { points: &points, are_free: &[true; 128], shift: 4 };
+        let take = |seed, level| {
+            let mut accepted = vec![false; points.len()];
+            random(NodeKey { level, x: 0, y: 0, z: 0 }, seed, &candidates, &mut accepted);
+            let taken: Vec<usize> = accepted.iter().enumerate().filter(|(_, a)| **a).map(|(i, _)| i % 16).collect();
+            taken
+        };
+        assert_eq!(take(1, 20), [3, 13, 13, 2, 4, 9, 3, 15]);
+        assert_eq!(take(1, 3), [15, 15, 4, 12, 3, 6, 13, 9]);
+        assert_eq!(take((1 << 63) + 5, 20), [4, 11, 8, 15, 8, 12, 11, 8]);
+    }
 }

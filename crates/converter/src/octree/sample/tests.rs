@@ -120,6 +120,7 @@ fn cells_give_one_free_point_each() {
             let twice = |a: usize| 2 * (i64::from(p[a]) - (i64::from(cell[a]) << shift)) - ((1 << shift) - 1);
             (0..3).map(|a| i128::from(twice(a)).pow(2)).sum::<i128>()
         };
+        let mut by_method = Vec::new();
         for sampling in [Sampling::Grid, Sampling::Random { seed: 7 }] {
             let mut sampler = Sampler::new(sampling, spacing);
             let accepted = choose(&mut sampler, &scene, usize::MAX);
@@ -134,7 +135,9 @@ fn cells_give_one_free_point_each() {
             }
             assert_border(&sampler, &scene, &taken);
             assert_eq!(choose(&mut sampler, &scene, 300), accepted, "in parts");
+            by_method.push(accepted);
         }
+        assert_ne!(by_method[0], by_method[1], "{divisor}");
     }
 }
 
