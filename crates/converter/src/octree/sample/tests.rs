@@ -137,7 +137,10 @@ fn cells_give_one_free_point_each() {
             assert_eq!(choose(&mut sampler, &scene, 300), accepted, "in parts");
             by_method.push(accepted);
         }
-        assert_ne!(by_method[0], by_method[1], "{divisor}");
+        // where cells have several free points in different places
+        if !thin && shift > 0 {
+            assert_ne!(by_method[0], by_method[1], "{divisor}");
+        }
     }
 }
 
