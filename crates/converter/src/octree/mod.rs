@@ -35,6 +35,8 @@ mod units;
 pub(crate) use commit::Octree;
 #[cfg(feature = "bench")]
 pub(crate) use order::{OrderScratch, Point, order};
+#[cfg(feature = "bench")]
+pub(crate) use sample::Sampler;
 pub use sample::Sampling;
 pub(crate) use sample::Spacing;
 pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
