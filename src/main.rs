@@ -23,12 +23,9 @@ mod profiles;
 mod scan_choice;
 mod text_choice;
 
-use std::ffi::OsString;
 use std::process::ExitCode;
 
-use args::{Args, Command, mistake};
-use clap::Parser as _;
-use clap::error::ErrorKind;
+use args::{Args, Command};
 use commands::{convert, export, extract, info, job, manual, measure, preview, validate, view};
 use exit::Failure;
 
@@ -36,7 +33,8 @@ fn main() -> ExitCode {
     allocator::give_back_early();
     exit::remember_panics();
     interrupt::watch();
-    let result = std::panic::catch_unwind(|| run(&args()?)).unwrap_or_else(|_| Err(exit::last_panic()));
+    let result = std::panic::catch_unwind(|| run(&profiles::command_line(&std::env::args_os().collect::<Vec<_>>())?))
+        .unwrap_or_else(|_| Err(exit::last_panic()));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -47,22 +45,6 @@ fn main() -> ExitCode {
             ExitCode::from(failure.code())
         }
     }
-}
-
-/// The command line; help and version are printed here, and end the process.
-fn args() -> Result<Args, Failure> {
-    parse(&std::env::args_os().collect::<Vec<_>>())
-}
-
-/// A command line, the name of the program first.
-fn parse(typed: &[OsString]) -> Result<Args, Failure> {
-    let args = Args::try_parse_from(typed).map_err(|error| {
-        if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
-            error.exit();
-        }
-        Failure::Usage(mistake::line(&error, typed))
-    })?;
-    profiles::apply(args, typed)
 }
 
 fn run(args: &Args) -> Result<(), Failure> {

@@ -20,7 +20,8 @@ pub(crate) struct JobArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobCommand {
-    /// Begins a conversion that several processes do together: takes the options of convert, reads headers alone
+    /// Begins a conversion that several processes do together: takes the options of convert, reads headers alone; --checkpoint
+    /// POINTS is the size of a unit of reading
     Plan(Box<JobPlanArgs>),
     /// Prints the units that are known: names of those that are ready, or all as JSON
     Units(JobUnitsArgs),

@@ -17,6 +17,7 @@ use crate::args::{
     EncodingArg, FaultArg, LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg,
     SplitArg, TargetArg,
 };
+use crate::datasets;
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
 use crate::human::progress::Progress;
@@ -26,7 +27,7 @@ use crate::interrupt::{kept, no_more_checks, stop_flag};
 /// What is to be made, and how, as the options say.
 pub(super) fn planned(args: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure> {
     let targets = targets(args)?;
-    let inputs = args.inputs.expand(&args.output)?;
+    let mut inputs = args.inputs.expand(&args.output)?;
     if args.unreadable == FaultArg::Fail
         && let Some(failure) = inputs.unread_failure("; pass --unreadable skip to convert the rest")
     {
@@ -38,7 +39,35 @@ pub(super) fn planned(args: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure
     if args.page {
         PageFile::check_formats(args)?;
     }
-    Ok((plan(args, inputs)?, targets))
+    if args.append {
+        inputs.files.push(appendable(args, &inputs)?);
+    }
+    let mut plan = plan(args, inputs)?;
+    plan.overwrite |= args.append;
+    if args.append && args.name.is_none() {
+        plan.name = name_from(&[], std::slice::from_ref(&args.output));
+    }
+    Ok((plan, targets))
+}
+
+/// The dataset that others are added to, as one more input.
+fn appendable(args: &ConvertArgs, inputs: &Inputs) -> Result<PathBuf, Failure> {
+    let (output, shown) = (&args.output, args.output.display());
+    let [to] = args.to[..] else {
+        return Err(Failure::Usage("--append adds to one dataset; leave out all --to but one".to_owned()));
+    };
+    let Some(located) = datasets::named(output)? else {
+        return Err(Failure::Usage(format!("{shown}: there is no dataset to add to; leave out --append")));
+    };
+    if located.kind.name() != to.name() {
+        let kind = located.kind;
+        return Err(Failure::Usage(format!("{shown}: the dataset is {kind}; pass --to {}", kind.name())));
+    }
+    let same = |a: &Path, b: &Path| a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b);
+    if inputs.files.iter().any(|file| same(file, output) || same(file, &located.path)) {
+        return Err(Failure::Usage(format!("{shown}: it is an input already; leave it out")));
+    }
+    Ok(output.clone())
 }
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
@@ -47,7 +76,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         let estimate = pointmill_converter::estimate(&plan, &targets)?;
         return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
     }
-    protect_inputs(&plan)?;
+    protect_inputs(&plan, args.append)?;
     let page_file = PageFile::requested(args)?;
     let report_file = args.report.as_ref().map(|file| {
         let sources = plan.inputs.iter().chain(&args.inputs.files_from);
@@ -323,10 +352,11 @@ pub(super) fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
 }
 
 /// What is being read is never replaced, nor is anything put into a dataset that is. What else may be, the converter judges.
-pub(super) fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
+pub(super) fn protect_inputs(plan: &Plan, is_append: bool) -> Result<(), Failure> {
     // an output that cannot be found is an error of the run
     let Ok(output) = resolve_path(&plan.output) else { return Ok(()) };
-    let clash = plan.inputs.iter().find_map(|input| {
+    let others = plan.inputs.iter().filter(|input| !(is_append && **input == plan.output));
+    let clash = others.into_iter().find_map(|input| {
         let found = input.canonicalize().ok()?;
         let what = if found.starts_with(&output) {
             "would replace"

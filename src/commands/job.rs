@@ -9,7 +9,7 @@ use std::time::Duration;
 use pointmill_converter::{JobUnits, Plan, Report, Target, UnitName, finish_job, job_units, plan_job, run_units};
 use serde::{Deserialize, Serialize};
 
-use super::convert::{after_all, planned, protect_inputs, tell};
+use super::convert::{after_all, protect_inputs, tell};
 use super::report_file::ReportFile;
 use super::verify::verify;
 use crate::args::{
@@ -20,6 +20,7 @@ use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::interrupt::{no_more_checks, stop_flag};
+use crate::profiles::command_line;
 
 /// The command line of a job, in its folder.
 const PLAN: &str = "plan.json";
@@ -56,17 +57,19 @@ struct Job {
 }
 
 fn plan(args: &JobPlanArgs) -> Result<(), Failure> {
-    let folder = std::env::current_dir().map_err(|e| Failure::Io(format!("the working folder: {e}")))?;
+    let folder = std::env::current_dir().map_err(|e| Failure::io(Path::new("."), "looking where this is", &e))?;
     let planned = Planned { version: env!("CARGO_PKG_VERSION").to_owned(), folder, arguments: typed_for_convert()? };
     let job = job_of(&planned, args.job.clone())?;
-    protect_inputs(&job.plan)?;
+    protect_inputs(&job.plan, false)?;
     let progress = Progress::new(&job.convert.talk, Some(stop_flag()));
     let units = plan_job(&job.plan, &job.targets, &job.folder, &progress);
     no_more_checks();
     progress.end();
     let units = units?;
     let path = job.folder.join(PLAN);
-    fs::write(&path, to_json(&planned)?).map_err(|e| Failure::Io(format!("{}: {e}", path.display())))?;
+    let new = job.folder.join(format!("{PLAN}.new"));
+    let written = fs::write(&new, to_json(&planned)?).and_then(|()| fs::rename(&new, &path));
+    written.map_err(|e| Failure::io(&path, "writing the plan", &e))?;
     if !job.convert.talk.quiet {
         print_line(&format!("{}: {}", job.folder.display(), describe(&units)));
     }
@@ -92,14 +95,14 @@ fn typed_for_convert() -> Result<Vec<String>, Failure> {
 
 fn open(folder: &Path) -> Result<Job, Failure> {
     let path = folder.join(PLAN);
-    let folder = folder.canonicalize().map_err(|e| Failure::Io(format!("{}: {e}", folder.display())))?;
+    let folder = folder.canonicalize().map_err(|e| Failure::io(folder, "opening the job", &e))?;
     let text = match fs::read_to_string(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             let line = format!("{}: not the folder of a planned job; 'pointmill job plan' makes one", folder.display());
             return Err(Failure::Usage(line));
         }
-        Err(e) => return Err(Failure::Io(format!("{}: {e}", path.display()))),
+        Err(e) => return Err(Failure::io(&path, "reading the plan", &e)),
     };
     let broken = |e| Failure::Input(format!("{}: not as it was written ({e}); plan the job anew", path.display()));
     let planned: Planned = serde_json::from_str(&text).map_err(broken)?;
@@ -117,12 +120,13 @@ fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
     std::env::set_current_dir(&planned.folder).map_err(|_| here())?;
     let words = ["pointmill", "convert"].into_iter().chain(planned.arguments.iter().map(String::as_str));
     let typed: Vec<OsString> = words.map(OsString::from).collect();
-    let Command::Convert(convert) = crate::parse(&typed)?.command else {
+    let Command::Convert(convert) = command_line(&typed)?.command else {
         return Err(Failure::Internal("internal error: the command line of a job is none of convert".into()));
     };
     let useless = [
         ("--dry-run", convert.dry_run),
         ("--resume", convert.resume),
+        ("--append", convert.append),
         ("--page", convert.page),
         ("--json", convert.json),
         ("--checkpoint auto", matches!(convert.checkpoint, CheckpointArg::Auto)),
@@ -130,13 +134,9 @@ fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
     if let Some((option, _)) = useless.iter().find(|(_, given)| *given) {
         return Err(Failure::Usage(format!("{option} does not go with a job")));
     }
-    let (mut plan, targets) = planned_for(&convert)?;
+    let (mut plan, targets) = super::convert::planned(&convert)?;
     plan.output = std::path::absolute(&plan.output).unwrap_or(plan.output);
     Ok(Job { folder, convert: *convert, plan, targets })
-}
-
-fn planned_for(convert: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure> {
-    planned(convert)
 }
 
 impl Job {
@@ -268,7 +268,7 @@ fn run_share(job: &Job, share: Share, progress: &Progress) -> Result<JobUnits, F
 
 fn finish(args: &JobFinishArgs) -> Result<(), Failure> {
     let job = open(&args.job)?.with(&args.resources)?;
-    protect_inputs(&job.plan)?;
+    protect_inputs(&job.plan, false)?;
     let report_file = job.convert.report.as_ref().map(|file| {
         let sources = job.plan.inputs.iter().chain(&job.convert.inputs.files_from);
         ReportFile::new(file, &job.plan.output, sources)

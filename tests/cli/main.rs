@@ -1,6 +1,7 @@
 //! The program as a user meets it: commands, exit codes, what is written and, above all, what is left alone.
 
 mod accuracy;
+mod appending;
 mod arguments;
 mod attributes;
 mod bad_input;
@@ -19,6 +20,7 @@ mod from_datasets_places;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod jobs;
 mod manual;
 mod many;
 mod measure;

@@ -78,8 +78,10 @@ fn run(
             Ok(report)
         }
         Err(error) => {
-            if let Some(left) = job.filter(|job| !job.has_units()).and_then(Job::end) {
-                events.warning(&left);
+            match job {
+                Some(job) if job.has_units() => events.checkpoint(job.folder()),
+                Some(job) => job.end().iter().for_each(|left| events.warning(left)),
+                None => {}
             }
             Err(error)
         }
@@ -119,17 +121,17 @@ impl JobOf<'_> {
                 Ok(plan.resume && job.as_ref().is_some_and(Job::is_new))
             }
             Self::Shared(job) => {
-                job.identify(&Identity::of(plan, sources, settings)?)?;
+                job.identify(&Identity::of(plan, sources, settings, !job.is_in_parts())?)?;
                 Ok(false)
             }
         }
     }
 
-    /// Points that did not have to be read again.
-    fn recalled(&self) -> u64 {
+    /// Points that did not have to be read again, and units that did not have to be built again.
+    fn recalled(&self) -> (u64, u64) {
         match self {
-            Self::Own(job) => job.as_ref().map_or(0, Job::recalled),
-            Self::Shared(_) => 0,
+            Self::Own(job) => job.as_ref().map_or((0, 0), |job| (job.recalled(), job.recalled_units())),
+            Self::Shared(_) => (0, 0),
         }
     }
 }
@@ -210,7 +212,7 @@ fn write(
     for (number, group) in groups.into_iter().enumerate() {
         clock.begin(Phase::Build, cloud.points());
         let together: Vec<&Target> = group.iter().map(|i| &targets[*i]).collect();
-        let units = keeper.map(|keeper| GroupUnits { keeper, group: number as u32 });
+        let units = keeper.map(|keeper| GroupUnits::new(keeper, number as u32));
         match build(&together, &cloud, &rt, staged, targets.len() == 1, units) {
             Ok(built) => outputs.extend(group.into_iter().zip(built)),
             // those of the other groups are to be known, too
@@ -234,7 +236,8 @@ fn write(
         other_files: OtherFilesReport::new(&plan.other_files),
         outputs,
         temp_bytes: rt.temp.written_bytes(),
-        recalled_points: job.recalled(),
+        recalled_points: job.recalled().0,
+        recalled_units: job.recalled().1,
         phases: clock.finish(),
         seconds: clock.seconds(),
     };

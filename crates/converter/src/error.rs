@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use pointmill_format::{Aabb, DatasetKind, ReadError, system_reason};
 
 use crate::advice::Advice;
-use crate::job::JobUnit;
 use crate::plan::{ExportFormat, PlanError};
+use crate::unit_name::JobUnit;
 
 /// Why a run could not finish; the output is as it was before.
 ///

@@ -49,6 +49,7 @@ mod report;
 mod runtime;
 mod shared_job;
 mod sources;
+mod unit_name;
 mod warning;
 
 pub use advice::Advice;
@@ -56,7 +57,6 @@ pub use convert::{Verify, convert, convert_on, convert_verified};
 pub use error::{ConvertError, InputFault, JobFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
 pub use export::{ExportReport, ExportedAttribute, ExportedPoints, PositionChange, export, export_on};
-pub use job::{JobUnit, JobUnits, UnitName};
 pub use octree::Sampling;
 pub use outputs::batches::BatchesSettings;
 pub use outputs::bintree::BintreeSettings;
@@ -77,4 +77,5 @@ pub use report::{
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
 pub use shared_job::{finish_job, job_units, plan_job, run_units};
 pub use sources::{ResolvedCrs, resolve_crs};
+pub use unit_name::{JobUnit, JobUnits, UnitName};
 pub use warning::{ColourNote, CrsNote, NameFault, Proj4Fault, RenamedAttribute, ViewerNote, Warning};

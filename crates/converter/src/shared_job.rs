@@ -8,11 +8,12 @@ use std::sync::Arc;
 
 use crate::convert::{JobOf, Verify, make};
 use crate::error::{ConvertError, JobFault};
-use crate::job::{JobUnits, SharedJob, Stage, Task, UnitName};
+use crate::job::{SharedJob, Task};
 use crate::outputs::{self, StagedFolder, Target};
 use crate::plan::Plan;
 use crate::report::Report;
-use crate::runtime::{Disk, Events, SystemDisk};
+use crate::runtime::{Disk, Events, Phase, SystemDisk};
+use crate::unit_name::{JobUnits, Stage, UnitName};
 
 /// Plans a job in `folder`, which is not there, or empty. Reads headers alone. [`Plan::checkpoint_points`] is the size of a unit
 /// of reading.
@@ -25,7 +26,7 @@ pub fn plan_job(plan: &Plan, targets: &[Target], folder: &Path, events: &dyn Eve
     outputs::check(plan, targets)?;
     drop(StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?);
     let job = SharedJob::begin(folder, &disk)?;
-    in_parts(&job, plan, targets, folder, events, &disk).inspect_err(|_| {
+    in_parts(&job, plan, targets, events, &disk).inspect_err(|_| {
         let _ = job.end(); // what is left is named by the error of the next plan
     })
 }
@@ -41,7 +42,7 @@ pub fn job_units(
     events: &dyn Events,
 ) -> Result<JobUnits, ConvertError> {
     let disk = disk();
-    in_parts(&SharedJob::open(folder, Task::Look, &disk)?, plan, targets, folder, events, &disk)
+    in_parts(&SharedJob::open(folder, Task::Look, &disk)?, plan, targets, &Unwarned(events), &disk)
 }
 
 /// Does some units of a job; those that are done already are not done again. `waits`: for units that others do and these need.
@@ -60,7 +61,7 @@ pub fn run_units(
     let disk = disk();
     let task = Task::Run { units: units.iter().copied().collect(), waits };
     let job = SharedJob::open(folder, task, &disk)?;
-    let known = in_parts(&job, plan, targets, folder, events, &disk)?;
+    let known = in_parts(&job, plan, targets, &Unwarned(events), &disk)?;
     match units.iter().find(|unit| !job.is_done(**unit)) {
         Some(unit) => Err(JobFault::NoUnit { unit: unit.to_string() }.into()),
         None => Ok(known),
@@ -91,12 +92,10 @@ fn in_parts(
     job: &SharedJob,
     plan: &Plan,
     targets: &[Target],
-    folder: &Path,
     events: &dyn Events,
     disk: &Arc<dyn Disk>,
 ) -> Result<JobUnits, ConvertError> {
-    let fail = |e| ConvertError::io(folder, "making a folder to work in", e);
-    let work = tempfile::Builder::new().prefix("work-").tempdir_in(folder).map_err(fail)?;
+    let work = job.work()?;
     let plan = Plan { output: work.path().join("out"), overwrite: false, ..plan.clone() };
     match make(disk, &plan, targets, events, &|_| Ok(()), &mut JobOf::Shared(job)) {
         Err(ConvertError::Job(JobFault::Unfinished { units })) => {
@@ -106,6 +105,31 @@ fn in_parts(
         }
         Err(other) => Err(other),
         Ok(_) => Err(ConvertError::Internal("a part of a job made its output".into())),
+    }
+}
+
+/// Says what others say but for warnings, which the process that plans has told.
+struct Unwarned<'a>(&'a dyn Events);
+
+impl Events for Unwarned<'_> {
+    fn phase(&self, phase: Phase, total: u64) {
+        self.0.phase(phase, total);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.advance(steps);
+    }
+
+    fn works_in(&self, folder: &Path) {
+        self.0.works_in(folder);
+    }
+
+    fn settling(&self) {
+        self.0.settling();
+    }
+
+    fn stop_requested(&self) -> bool {
+        self.0.stop_requested()
     }
 }
 

@@ -124,27 +124,35 @@ impl Store {
 
     /// Writes the blocks from `first` on that are in memory alone, and waits until all of them are safe. They stay in memory, too.
     pub(crate) fn secure(&self, first: u32) -> Result<Vec<SafeBlock>, ConvertError> {
-        let mut safe = Vec::new();
-        for index in first..self.next_block()? {
-            let place = self.blocks.lock().map_err(|_| poisoned())?[index as usize].place.clone();
-            let written = match &place {
-                Place::Memory(records) => Some(self.write(records)?),
-                Place::Disk { .. } | Place::Gone => None,
-            };
-            let blocks = self.blocks.lock().map_err(|_| poisoned())?;
-            let Block { source, place, .. } = &blocks[index as usize];
-            let mut all = self.kept.lock().map_err(|_| poisoned())?;
-            let kept = &mut all[index as usize];
-            kept.copy = kept.copy.or(written);
-            // it may have left memory meanwhile
-            let offset = match place {
-                Place::Disk { offset } => *offset,
-                _ => kept.copy.unwrap_or(0),
-            };
-            safe.push(SafeBlock { source: *source, offset, bytes: kept.bytes, sum: kept.sum });
-        }
+        let safe = (first..self.next_block()?).map(|block| self.write_out(block)).collect::<Result<_, _>>()?;
         self.spill_file()?.sync("syncing the records")?;
         Ok(safe)
+    }
+
+    /// Writes a block that is in memory alone, and does not wait until it is safe: [`Self::file`] is synced for that. It stays in
+    /// memory, too.
+    pub(crate) fn write_out(&self, index: u32) -> Result<SafeBlock, ConvertError> {
+        let place = self.blocks.lock().map_err(|_| poisoned())?[index as usize].place.clone();
+        let written = match &place {
+            Place::Memory(records) => Some(self.write(records)?),
+            Place::Disk { .. } | Place::Gone => None,
+        };
+        let blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let Block { source, place, .. } = &blocks[index as usize];
+        let mut all = self.kept.lock().map_err(|_| poisoned())?;
+        let kept = &mut all[index as usize];
+        kept.copy = kept.copy.or(written);
+        // it may have left memory meanwhile
+        let offset = match place {
+            Place::Disk { offset } => *offset,
+            _ => kept.copy.unwrap_or(0),
+        };
+        Ok(SafeBlock { source: *source, offset, bytes: kept.bytes, sum: kept.sum })
+    }
+
+    /// The file that outlives the run.
+    pub(crate) fn file(&self) -> Result<Arc<DiskFile>, ConvertError> {
+        self.spill_file()
     }
 
     /// Takes blocks that another run has made safe in the store's own file; returns the number of the first.

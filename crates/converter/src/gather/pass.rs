@@ -196,8 +196,10 @@ impl<'a> Pass<'a> {
         let first_block = self.context.store.next_block()?;
         let mut unit = self.read_pairs(&pairs)?;
         unit.seen = self.context.take_touched()?;
-        read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit)?;
-        self.rt.events().checkpoint(job.folder());
+        read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit, self.rt)?;
+        if job.is_safe() {
+            self.rt.events().checkpoint(job.folder());
+        }
         Ok(unit)
     }
 

@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::context::{Collected, Context};
 use crate::cloud::{SafeBlock, SourceStats, Stats};
 use crate::error::ConvertError;
-use crate::job::{Job, SharedJob, Stage, UnitName};
+use crate::job::{Job, SharedJob};
 use crate::runtime::{Consumer, Reservation, Runtime};
 use crate::sources::Sources;
+use crate::unit_name::{Stage, UnitName};
 
 /// What the threads have made of a unit.
 pub(super) struct Unit {
@@ -59,7 +60,7 @@ pub(super) fn units(sources: &Sources, points: u64) -> Vec<Range<usize>> {
     units
 }
 
-/// Puts a unit into the job, once its records are safe.
+/// Puts a unit into the job as soon as its records are safe, which is not waited for.
 pub(super) fn keep(
     job: &Job,
     context: &Context<'_>,
@@ -67,8 +68,23 @@ pub(super) fn keep(
     pairs: Range<usize>,
     first_block: u32,
     unit: &mut Unit,
+    rt: &Runtime<'_>,
 ) -> Result<(), ConvertError> {
-    keep_by(context, pairs, first_block, unit, |kept| job.add(context.pass, number, kept))
+    let blocks: Vec<u32> = (first_block..context.store.next_block()?).collect();
+    let written = rt.in_parallel(
+        blocks.len(),
+        Vec::new,
+        |safe, i| {
+            safe.push((blocks[i], context.store.write_out(blocks[i])?));
+            Ok(())
+        },
+        |safe| safe,
+    )?;
+    let mut written: Vec<(u32, SafeBlock)> = written.into_iter().flatten().collect();
+    written.sort_unstable_by_key(|(block, _)| *block);
+    let blocks = written.into_iter().map(|(_, block)| block).collect();
+    let file = context.store.file()?;
+    keep_by(context, pairs, first_block, blocks, unit, |kept| job.add(context.pass, number, kept, file))
 }
 
 /// The same for a job that several processes share; the records are in the file `records`.
@@ -80,7 +96,8 @@ pub(super) fn keep_shared(
     records: &str,
     unit: &mut Unit,
 ) -> Result<(), ConvertError> {
-    keep_by(context, pairs, 0, unit, |kept| {
+    let blocks = context.store.secure(0)?;
+    keep_by(context, pairs, 0, blocks, unit, |kept| {
         job.keep(name(context.pass, number), |file| {
             file.put(&records)?;
             file.put(kept)
@@ -92,10 +109,10 @@ fn keep_by(
     context: &Context<'_>,
     pairs: Range<usize>,
     first_block: u32,
+    blocks: Vec<SafeBlock>,
     unit: &mut Unit,
     add: impl FnOnce(&Keeping<'_>) -> Result<(), ConvertError>,
 ) -> Result<(), ConvertError> {
-    let blocks = context.store.secure(first_block)?;
     unit.collected.shift_back(first_block);
     let (stats, collected, seen) = (&unit.stats, &unit.collected, &unit.seen[..]);
     let added = add(&Keeping { pairs, stats, collected, seen, blocks, misled: context.is_misled() });

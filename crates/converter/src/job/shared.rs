@@ -11,17 +11,19 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::identity::Identity;
-use super::names::{JobUnit, Stage, UnitName};
 use super::unit_file::{UnitReader, UnitWriter};
 use crate::cloud::{SafeBlock, Store};
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::disk::{create_folder, sync_folder};
 use crate::runtime::{Disk, DiskFile, TempFiles};
+use crate::unit_name::{JobUnit, Stage, UnitName};
 
 /// Says for what the job was made.
 const IDENTITY: &str = "identity";
 /// Units that are done, and the records that they have read or put in order.
 const UNITS: &str = "units";
+/// Where processes work.
+const WORK: &str = "work-";
 
 /// What this process does with the job.
 #[derive(Debug)]
@@ -94,6 +96,11 @@ impl SharedJob {
         Self { folder, task, disk, done: Mutex::new(done), settling: Mutex::default() }
     }
 
+    /// True if a process does a part of the work and leaves it to others to look at all inputs closely.
+    pub(crate) fn is_in_parts(&self) -> bool {
+        matches!(self.task, Task::Look | Task::Run { .. })
+    }
+
     /// Notes for what the job is made, or refuses to go on with another one.
     pub(crate) fn identify(&self, identity: &Identity) -> Result<(), ConvertError> {
         let path = self.folder.join(IDENTITY);
@@ -111,9 +118,12 @@ impl SharedJob {
         &self.task
     }
 
-    /// True if the unit is to be done here, now.
+    /// True if the unit is to be done here, now. What is settled here is divided for good once its file is there: nothing is built
+    /// before.
     pub(crate) fn wants(&self, unit: UnitName) -> bool {
-        matches!(&self.task, Task::Run { units, .. } if units.contains(&unit))
+        let is_asked = matches!(&self.task, Task::Run { units, .. } if units.contains(&unit));
+        let is_too_early = matches!(unit.stage, Stage::Build { .. }) && self.settles();
+        is_asked && !is_too_early && !self.is_done(unit)
     }
 
     /// True if units that others do are waited for.
@@ -274,10 +284,23 @@ impl SharedJob {
     /// Removes the job, and what else its processes have left in its folders. Files of others stay.
     pub(crate) fn end(&self) -> Result<(), ConvertError> {
         let fail = |e| ConvertError::io(&self.folder, "removing the job folder", e);
-        let units = self.folder.join(UNITS);
-        fs::remove_dir_all(&units).map_err(fail)?;
-        fs::remove_file(self.folder.join(IDENTITY)).map_err(fail)?;
+        for entry in fs::read_dir(&self.folder).map_err(fail)? {
+            let entry = entry.map_err(fail)?;
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if name == UNITS || name.starts_with(WORK) {
+                fs::remove_dir_all(entry.path()).map_err(fail)?;
+            } else if name.starts_with(IDENTITY) {
+                fs::remove_file(entry.path()).map_err(fail)?;
+            }
+        }
         sync_folder(&*self.disk, &self.folder).map_err(fail)
+    }
+
+    /// A folder to work in, which is removed when it is dropped.
+    pub(crate) fn work(&self) -> Result<tempfile::TempDir, ConvertError> {
+        let fail = |e| ConvertError::io(&self.folder, "making a folder to work in", e);
+        tempfile::Builder::new().prefix(WORK).tempdir_in(&self.folder).map_err(fail)
     }
 
     fn path(&self, unit: UnitName) -> PathBuf {

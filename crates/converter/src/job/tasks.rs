@@ -84,15 +84,16 @@ pub(crate) fn make_units<S>(
     state: impl Fn() -> S + Sync,
     make: impl Fn(&mut S, usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
 ) -> Result<(), ConvertError> {
-    let all = 0..points.len();
-    let wanted: Vec<usize> = match of.in_parts() {
-        Some(job) => all.filter(|i| job.wants(of.name(*i)) && !job.is_done(of.name(*i))).collect(),
-        None => all.filter(|i| !of.is_done(*i)).collect(),
-    };
-    if let (Some(job), true) = (of.keeper.shared(), of.in_parts().is_none() && !wanted.is_empty()) {
-        let listed = points.iter().enumerate().map(|(i, points)| of.listed(job, i, *points, Vec::new()));
-        return Err(JobFault::Unfinished { units: listed.collect() }.into());
+    let mut wanted = Vec::new();
+    for i in 0..points.len() {
+        if of.in_parts().is_none_or(|job| job.wants(of.name(i))) && !of.is_done(i)? {
+            wanted.push(i);
+        }
     }
+    if of.in_parts().is_none() {
+        of.all_done(points.len())?;
+    }
+    of.count_recalled(points.len() - wanted.len());
     rt.in_parallel(
         wanted.len(),
         state,

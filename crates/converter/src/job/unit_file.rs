@@ -190,6 +190,11 @@ impl UnitReader {
         Ok(Self { file: Arc::new(file), path: path.to_path_buf(), sections })
     }
 
+    /// Number of sections.
+    pub(crate) fn sections(&self) -> usize {
+        self.sections.len()
+    }
+
     /// Bytes of a section.
     pub(crate) fn len(&self, index: usize) -> u64 {
         self.sections.get(index).map_or(0, |section| section.bytes)
@@ -224,6 +229,11 @@ impl UnitReader {
         } else {
             Err(self.damaged(section.offset))
         }
+    }
+
+    /// Fails unless every section is whole.
+    pub(crate) fn check(&self) -> Result<(), ConvertError> {
+        (0..self.sections()).try_for_each(|index| self.place(index).map(drop))
     }
 
     fn section(&self, index: usize) -> Result<Section, ConvertError> {

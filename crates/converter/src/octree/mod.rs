@@ -21,6 +21,7 @@ mod finished;
 mod keep;
 mod list;
 mod lists;
+mod make;
 mod order;
 mod place;
 mod raise;
@@ -34,11 +35,13 @@ mod units;
 pub(crate) use commit::Octree;
 #[cfg(feature = "bench")]
 pub(crate) use order::{OrderScratch, Point, order};
+#[cfg(feature = "bench")]
+pub(crate) use sample::Sampler;
 pub use sample::Sampling;
-pub(crate) use sample::{Sampler, Spacing};
+pub(crate) use sample::Spacing;
 pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
 pub(crate) use sinks::AnySink;
-use sinks::{Encoders as _, Several, Sinks};
+use sinks::{Several, Sinks};
 
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
@@ -48,8 +51,8 @@ use borders::Borders;
 use chunk::ChunkPlan;
 use commit::Committer;
 use list::Lists;
-use unit::{Shared, UnitBuilder};
-use units::Work;
+use make::Making;
+use unit::Shared;
 
 /// How a tree is built.
 #[derive(Debug, Clone, Copy)]
@@ -99,6 +102,8 @@ fn build_for<S: Sinks>(
     let mut division = divide::divide(cloud, rt, unit_points, chunk_points, kept)?;
     let chunk_points = division.chunk_points;
     let units = units::in_order(std::mem::take(&mut division.subtrees));
+    let all: Vec<_> = units.iter().map(|unit| (unit.key, unit.points())).collect();
+    let kept = kept.map(|kept| kept.divided(&all)).transpose()?;
     let usual_points = chunk_points.min(cloud.points());
     let shared = Shared {
         plan: ChunkPlan {
@@ -118,47 +123,7 @@ fn build_for<S: Sinks>(
         share::share(&units, of, job, &shared, sinks, sampling)?;
     }
     let committer = Committer::new(units.len(), window, sinks, &shared.lists, rt);
-    rt.in_parallel_or(
-        units.len(),
-        || UnitBuilder::new(&shared, Sampler::new(sampling, spacing), sinks.encoders()),
-        |builder, index| {
-            let unit = &units[index];
-            let Some(buffers) = committer.admit(index) else { return Ok(()) };
-            rt.check_stop()?; // it may have waited long
-            let wait = || committer.wait_for(index, unit.class_start);
-            let recalled =
-                kept.map(|of| of.recall(index, |file| keep::read(file, &shared.lists))).transpose()?.flatten();
-            let is_recalled = recalled.is_some();
-            let built = match (recalled, &unit.work) {
-                (Some(built), Work::Subtree(_)) => Some(built),
-                (Some(built), Work::Above(children)) => {
-                    wait().then(|| committer.take(children).map(|_| built)).transpose()?
-                }
-                (None, Work::Subtree(chunks)) => builder.subtree(unit.key, chunks, buffers, wait)?,
-                (None, Work::Above(children)) => match wait() {
-                    true => Some(builder.above(unit.key, committer.take(children)?, buffers)?),
-                    false => None,
-                },
-            };
-            let Some(mut built) = built else { return Ok(()) };
-            if let Some(of) = kept {
-                if !is_recalled {
-                    built.take_notes(&mut builder.encoder)?;
-                    of.keep(index, |file| keep::write(&built, &shared.lists, file))?;
-                }
-                sinks.add_notes(&built.notes)?;
-            }
-            shared.borders.publish(std::mem::take(&mut built.outer))?;
-            committer.submit(index, built, &mut builder.encoder)?;
-            if kept.is_some() {
-                sinks.add_notes(&builder.encoder.take_notes()?)?; // of nodes that were encoded last
-            }
-            rt.advance(unit.points());
-            Ok(())
-        },
-        |_| (),
-        |index| committer.stop_above(index),
-    )?;
+    Making { units: &units, kept, shared: &shared, committer: &committer, sinks, sampling }.all()?;
     let trees = committer.finish()?;
     trees.iter().try_for_each(|tree| tree.ledger.check(&cloud.stats.checksum))?;
     Ok(trees)

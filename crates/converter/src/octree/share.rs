@@ -28,9 +28,8 @@ pub(super) fn share<S: Sinks>(
     sinks: &S,
     sampling: Sampling,
 ) -> Result<(), ConvertError> {
-    let needs = needs(units, sampling == Sampling::Poisson);
-    let mut open: Vec<usize> =
-        (0..units.len()).filter(|i| job.wants(of.name(*i)) && !job.is_done(of.name(*i))).collect();
+    let needs = needs(units);
+    let mut open: Vec<usize> = (0..units.len()).filter(|i| job.wants(of.name(*i))).collect();
     loop {
         let is_ready = |i: &usize| needs[*i].iter().all(|need| job.is_done(of.name(*need)));
         let (ready, others): (Vec<usize>, Vec<usize>) = open.iter().partition(|i| is_ready(i));
@@ -104,10 +103,10 @@ impl BuiltUnit {
 }
 
 /// For each unit those before it that it must see: the children of a node, and units that touch it and have nodes of the same
-/// levels, if `borders` matter.
-fn needs(units: &[Unit], borders: bool) -> Vec<Vec<usize>> {
+/// levels.
+fn needs(units: &[Unit]) -> Vec<Vec<usize>> {
     let by_key: HashMap<NodeKey, usize> = units.iter().enumerate().map(|(i, unit)| (unit.key, i)).collect();
-    let levels: BTreeSet<u8> = units.iter().filter(|_| borders).map(|unit| unit.key.level).collect();
+    let levels: BTreeSet<u8> = units.iter().map(|unit| unit.key.level).collect();
     let is_above = |i: usize| matches!(units[i].work, Work::Above(_));
     let mut needs = vec![Vec::new(); units.len()];
     for (i, unit) in units.iter().enumerate() {
@@ -154,4 +153,55 @@ fn around(key: NodeKey, level: u8) -> impl Iterator<Item = NodeKey> {
     range(key.x)
         .flat_map(move |x| range(key.y).flat_map(move |y| range(key.z).map(move |z| NodeKey { level, x, y, z })))
         .filter(move |node| Some(*node) != own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::divide::Subtree;
+    use super::super::units::in_order;
+    use super::*;
+
+    fn key(level: u8, x: u32, y: u32, z: u32) -> NodeKey {
+        NodeKey { level, x, y, z }
+    }
+
+    /// True if nodes of both at one level may touch.
+    fn meet(a: &Unit, b: &Unit) -> bool {
+        let level = a.key.level.max(b.key.level);
+        let is_above = |unit: &Unit| matches!(unit.work, Work::Above(_));
+        if [a, b].into_iter().any(|unit| is_above(unit) && unit.key.level < level) {
+            return false;
+        }
+        let cube = |unit: &Unit| {
+            let shift = level - unit.key.level;
+            xyz(unit.key).map(|c| (i64::from(c) << shift, i64::from(c + 1) << shift))
+        };
+        cube(a).iter().zip(cube(b)).all(|(a, b)| a.0 <= b.1 && b.0 <= a.1)
+    }
+
+    #[test]
+    fn a_unit_needs_its_children_and_whoever_before_it_shares_a_border_of_a_level() {
+        let subtrees = [
+            key(1, 0, 0, 0),
+            key(2, 2, 0, 0),
+            key(2, 3, 1, 1),
+            key(3, 4, 2, 0),
+            key(3, 5, 3, 1),
+            key(4, 15, 0, 8),
+            key(2, 0, 3, 3),
+            key(3, 1, 7, 4),
+            key(2, 2, 2, 2),
+        ];
+        let units = in_order(subtrees.map(|key| Subtree { key, chunks: Vec::new() }).into());
+        let found = needs(&units);
+        for (i, unit) in units.iter().enumerate() {
+            let is_needed = |j: &usize| match &unit.work {
+                Work::Above(children) if children.contains(&units[*j].key) => true,
+                _ => meet(unit, &units[*j]),
+            };
+            let expected: Vec<usize> = (0..i).filter(is_needed).collect();
+            assert_eq!(found[i], expected, "unit {i}, {:?}", unit.key);
+        }
+        assert!(found.iter().map(Vec::len).sum::<usize>() > 20);
+    }
 }

@@ -160,6 +160,8 @@ impl Output for BatchesSettings {
             keeps_originals: self.originals,
             usual_points: task_points.min(points),
         };
+        let division: Vec<_> = tasks.iter().map(|task| (task.first_point, task.points, task.start)).collect();
+        let units = units.map(|units| units.divided(&division)).transpose()?;
         if let Some(units) = units {
             means.units(units, &tasks)?;
         }

@@ -58,7 +58,7 @@ pub(super) struct State {
 }
 
 /// A batch that was encoded.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Found {
     slot: u32,
     record: BatchRecord,
