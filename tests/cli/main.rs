@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod arguments;
+mod at_once;
 mod attributes;
 mod bad_input;
 mod bad_output;
@@ -19,6 +20,7 @@ mod from_datasets_places;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod killed;
 mod manual;
 mod many;
 mod measure;

@@ -1,0 +1,454 @@
+#!/usr/bin/env python3
+"""Runs that are killed, or whose disk fails them: what stays, and what the next run makes of it. Prints Markdown.
+
+    python3 crates/bench/reliability.py target/quick/pointmill [--kills 160] [--points 400000] [--seed 1] [--only PART]
+
+Parts: kills, full, inodes, refused, vanished, twice, same. Each run is one of every combination of output, memory (enough, or
+the least that works, so that points go to temporary files), job (none, or one that the next run resumes), and what stood
+at the place of the output (an old dataset, or nothing). Whatever happens to a run, these are checked:
+
+- At the final name is what stood there before, to the bit, or all of the new dataset.
+- A run that fails ends in one line and the right exit code.
+- The next run ends well, in the bytes of a run that nothing happened to; beside the output nothing is left.
+
+Full disks and disks without inodes are mounted (tmpfs) in a space of mounts of their own, which takes the rights of root; without
+them these parts are skipped. Needs Python's standard library alone. Ends with exit code 1 if a promise is broken.
+"""
+
+import argparse
+import collections
+import hashlib
+import itertools
+import json
+import math
+import os
+import random
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from country import RECORD, TILE, header
+
+OUTPUTS = {
+    "potree2": ["potree2"],
+    "potree2, Brotli": ["potree2", "--encoding", "brotli", "--brotli-quality", "1"],
+    "potree1": ["potree1", "--potree1-version", "1.8"],
+    "potree1, archive": ["potree1", "--archive", "--potree1-version", "1.8"],
+    "copc": ["copc"],
+    "bintree, a file per leaf": ["bintree", "--capacity", "5000"],
+    "bintree, packed": ["bintree", "--layout", "packed"],
+    "batches": ["batches"],
+    "batches, zstd": ["batches", "--compress", "zstd:1"],
+    "potree2, bintree and batches": ["potree2", "--to", "bintree", "--to", "batches"],
+    "potree2, potree1 and copc": ["potree2", "--to", "potree1", "--potree1-version", "1.8", "--to", "copc"],
+}
+UNITS = 8  # units of reading in a job
+TILES = 4
+EXTRA = 12  # numbers of 8 bytes, beside what LAS has of a point: so few points exceed the least memory
+BROKEN = []
+
+
+def scan(path, column, points, seed):
+    """A tile of hills in random order."""
+    rng = random.Random(seed)
+    numbers = b"".join(struct.pack("<HBB32s156x", 0, 7, 0, f"number {i}".encode()) for i in range(EXTRA))
+    head = bytearray(header(0, column, 0, points))
+    head += struct.pack("<H16sHH32s", 0, b"LASF_Spec", 4, len(numbers), b"extra bytes") + numbers
+    head[96:107] = struct.pack("<IIBH", len(head), 1, 3, RECORD + 8 * EXTRA)
+    with open(path, "wb") as file:
+        file.write(head)
+        for _ in range(points):
+            x, y = rng.randrange(int(TILE[0] * 1000)), rng.randrange(int(TILE[1] * 1000))
+            z = int(15_000 + 9000 * math.sin(x / 80_000) + 5000 * math.cos(y / 60_000)) + rng.randrange(100)
+            file.write(struct.pack("<3i", x + int(column * TILE[0] * 1000), y + 300_000_000, z))
+            # the time in the middle: random bits are no numbers
+            file.write(rng.randbytes(8) + bytes(8) + rng.randbytes(6 + 8 * EXTRA))
+
+
+def contents(folder):
+    """Names and checksums of all files but the report; None: nothing is there."""
+    if not folder.exists():
+        return None
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "report.json")
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+class Run:
+    """How a process has ended: exit code, phase that it was in, and what it said beside its progress."""
+
+    def __init__(self, code, log, seconds):
+        lines = log.read_text(errors="replace").splitlines()
+        progress = [json.loads(line) for line in lines if line.startswith("{")]
+        phases = [line["phase"] for line in progress if "phase" in line and line["phase"] != "clean up"]
+        self.code, self.seconds = code, seconds
+        self.phase = phases[-1] if phases else "start"
+        self.said = [line for line in lines if not line.startswith("{")]
+        self.warnings = [line["warning"] for line in progress if "warning" in line]
+
+
+class Bench:
+    def __init__(self, program, folder, points, seed):
+        self.program, self.folder, self.points = str(Path(program).resolve()), folder, points
+        self.random = random.Random(seed)
+        self.scans, self.old_scan = folder / "scans", folder / "old.las"
+        self.scans.mkdir()
+        for tile in range(TILES):
+            scan(self.scans / f"{tile}.las", tile, points // TILES, seed + tile)
+        scan(self.old_scan, 9, 3000, seed + 99)
+        self.expected, self.old, self.seconds, self.least = {}, {}, {}, {}
+        for name in OUTPUTS:
+            self.learn(name)
+
+    def learn(self, name):
+        """What undisturbed runs to an output make of the new scans and the old one, and what they need."""
+        place = self.folder / "plain"
+        ended = self.end(self.command(name, place))
+        require(ended.code == 0, name, "an undisturbed run", ended)
+        self.expected[name] = contents(place)
+        shutil.rmtree(place)
+        old = self.folder / "old" / str(len(self.old))
+        ended = self.end(self.command(name, old, scans=[self.old_scan]))
+        require(ended.code == 0, name, "the old dataset", ended)
+        self.old[name] = (old, contents(old))
+
+    def least_memory(self, name, threads):
+        """The least ceiling that the program names, with which points go to temporary files."""
+        if (name, threads) not in self.least:
+            refused = self.end([*self.command(name, self.folder / "plain", threads=threads), "--memory", "1MiB"])
+            self.least[name, threads] = re.search(r"--memory (\d+MiB)", refused.said[-1])[1]
+        return self.least[name, threads]
+
+    def command(self, name, out, scans=(), spilled=False, job=False, resume=False, over=False, temp=None, threads=2):
+        command = [self.program, "convert", *map(str, scans or [self.scans]), "-o", str(out), "--to", *OUTPUTS[name]]
+        command += ["--threads", str(threads), "--name", "scans", "--attributes", "all", "--progress", "json"]
+        command += ["--memory", self.least_memory(name, threads)] if spilled else []
+        command += ["--checkpoint", str(self.points // UNITS)] if job else ["--checkpoint", "never"]
+        command += ["--resume"] if resume else []
+        command += ["--overwrite"] if over else []
+        return command + (["--temp-dir", str(temp)] if temp else [])
+
+    def start(self, command):
+        self.log = self.folder / "log"
+        with open(self.log, "w") as log:
+            return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=log)
+
+    def end(self, command, child=None):
+        start = time.monotonic()
+        code = (child or self.start(command)).wait()
+        return Run(code, self.log, time.monotonic() - start)
+
+    def duration(self, name, **how):
+        """Seconds of an undisturbed run, which must make the same bytes as every other."""
+        key = (name, *how.items())
+        if key not in self.seconds:
+            place = self.folder / "plain"
+            ended = self.end(self.command(name, place, **how))
+            require(ended.code == 0, name, f"an undisturbed run, {how}", ended)
+            require(contents(place) == self.expected[name], name, f"other bytes: {how}", ended)
+            temporary = json.loads((place / "report.json").read_text())["temp_bytes"]
+            require(temporary > 0 or not how.get("spilled"), name, "nothing was spilled: more --points", ended)
+            shutil.rmtree(place)
+            self.seconds[key] = ended.seconds
+        return self.seconds[key]
+
+    def put_old(self, name, out):
+        shutil.copytree(self.old[name][0], out)
+        return self.old[name][1]
+
+    def finish(self, name, out, what, **how):
+        """The next run: it ends well, its bytes are right, and nothing is left beside it. Returns its report."""
+        ended = self.end(self.command(name, out, **how))
+        require(ended.code == 0, name, f"{what}: the next run", ended)
+        require(contents(out) == self.expected[name], name, f"{what}: the bytes of the next run", ended)
+        left = sorted(path.name for path in out.parent.iterdir() if path != out)
+        require(not left, name, f"{what}: {left} are left", ended)
+        return json.loads((out / "report.json").read_text()) if ended.code == 0 else {}
+
+
+def require(condition, name, what, ended):
+    if not condition:
+        BROKEN.append(f"{name}: {what}")
+        print(f"BROKEN: {name}: {what}: exit code {ended.code}, {ended.phase}, {ended.said}", file=sys.stderr, flush=True)
+
+
+def failed_well(name, what, ended, words=(), code=5):
+    """A run that failed said why, in one line, with the right exit code."""
+    is_line = len(ended.said) >= 1 and ended.said[-1].startswith("error: ")
+    others = [line for line in ended.said[:-1] if not line.startswith("pointmill: ")]
+    has_words = any(word in ended.said[-1] for word in words) if words and ended.said else True
+    require(ended.code == code and is_line and not others and has_words, name, what, ended)
+
+
+def row(*cells):
+    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
+
+
+def table(*cells):
+    print()
+    row(*cells)
+    row(*("---" for _ in cells))
+
+
+def kills(bench, count):
+    """Kill -9 at random moments; a run with a job may be killed again when it is resumed."""
+    counts = collections.defaultdict(collections.Counter)
+    combinations = list(itertools.product(OUTPUTS, (False, True), (False, True), (False, True)))
+    bench.random.shuffle(combinations)
+    for name, spilled, job, over in itertools.cycle(combinations):
+        if sum(c["kills"] for c in counts.values()) >= count:
+            break
+        what = f"killed, {'spilled' if spilled else 'in memory'}, {'job' if job else 'no job'}, {'over' if over else 'new'}"
+        seconds = bench.duration(name, spilled=spilled, job=job)
+        place = Path(tempfile.mkdtemp(dir=bench.folder))
+        out = place / "out"
+        before = bench.put_old(name, out) if over else None
+        killed = 0
+        for again in range(1 + (bench.random.randrange(3) if job else 0)):
+            how = {"spilled": spilled, "job": job, "over": over, "resume": again > 0}
+            # a third of the kills near the end, where names are given
+            near = bench.random.random() < 1 / 3
+            wait = seconds * (bench.random.uniform(0.8, 1.05) if near else bench.random.uniform(0, 0.9))
+            child = bench.start(bench.command(name, out, **how))
+            time.sleep(wait)
+            child.send_signal(signal.SIGKILL)
+            ended = bench.end(None, child)
+            found = contents(out)
+            is_old, is_new = found == before, found == bench.expected[name]
+            require(is_old or is_new, name, f"{what} in {ended.phase}: neither the old nor the new dataset", ended)
+            if ended.code != -signal.SIGKILL:
+                require(ended.code == 0, name, what, ended)
+                break
+            killed += 1
+            left = [path.name for path in place.iterdir() if path != out]
+            kind = "left" if left else "nothing left"
+            counts[name].update(["kills", f"in {ended.phase}", "new" if is_new else "old", kind])
+            counts[name].update([w for w, is_it in (("spilled", spilled), ("job", job), ("over", over)) if is_it])
+            if is_new:
+                break
+        if killed:
+            over = over or out.exists()
+            report = bench.finish(name, out, what, spilled=spilled, job=job, resume=job, over=over)
+            counts[name].update(["next"])
+            counts[name]["recalled"] += report.get("recalled_points", 0) > 0
+        shutil.rmtree(place)
+    table("output", "kills", "while starting", "reading", "building", "finishing", "with temporary files", "with a job",
+          "over an old dataset", "old one or nothing stood", "new one stood", "left something hidden",
+          "next runs, same bytes, nothing left", "of them resumed")
+    total = sum(counts.values(), collections.Counter())
+    for name, c in [*counts.items(), ("all", total)]:
+        row(name, c["kills"], c["in start"] + c["in probe"], c["in read"], c["in build"], c["in finish"], c["spilled"],
+            c["job"], c["over"], c["old"], c["new"], c["left"], c["next"], c["recalled"])
+
+
+def mounted(options, folder):
+    folder.mkdir(exist_ok=True)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", str(folder)], check=True)
+
+
+def unmount(folder):
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def short_of(bench, name, options, job, spilled, words):
+    """A run in a file system that is too small, beside an old dataset. Returns None if it was enough, or the phase."""
+    disk = bench.folder / "disk"
+    mounted(options, disk)
+    try:
+        out = disk / "out"
+        try:
+            before = bench.put_old(name, out)
+        except OSError:
+            return "no room for the old dataset"
+        ended = bench.end(bench.command(name, out, spilled=spilled, job=job, over=True))
+        if ended.code == 0:
+            require(contents(out) == bench.expected[name], name, f"{options}: other bytes", ended)
+            return None
+        what = f"{options}, {'job' if job else 'no job'}, in {ended.phase}"
+        failed_well(name, what, ended, words)
+        require(contents(out) == before, name, f"{what}: the old dataset", ended)
+        is_safe = any("safe in" in line for line in ended.said)
+        left = {path.name for path in disk.iterdir()} - {"out"} - ({"out.job"} if is_safe else set())
+        require(not left, name, f"{what}: {left} are left", ended)
+        if (disk / "out.job").exists():  # what was read is not lost: with more room the run goes on
+            subprocess.run(["mount", "-o", "remount,size=2g,nr_inodes=100000", str(disk)], check=True)
+            bench.finish(name, out, what, spilled=spilled, job=True, resume=True, over=True)
+        return ended.phase
+    finally:
+        unmount(disk)
+
+
+def full(bench):
+    """Disks of random sizes, and of the sizes just below what is enough: there the last files do not fit."""
+    table("output", "memory", "job", "disks that were too small", "full in reading", "building", "finishing",
+          "least disk that was enough, KiB")
+    for name in OUTPUTS:
+        for spilled, job in ((False, False), (True, True)):
+            phases, low, high = collections.Counter(), 4, 4 * bench.points * (RECORD + 8 * EXTRA) // 1024
+
+            def attempt(kib):
+                phase = short_of(bench, name, f"size={kib}k", job, spilled, ["No space left"])
+                phases.update([phase] if phase else [])
+                return phase
+
+            for _ in range(3):
+                attempt(bench.random.randrange(low, high // 4))
+            while high - low > 64:
+                middle = (low + high) // 8 * 4
+                low, high = (middle, high) if attempt(middle) else (low, middle)
+            for pages in range(1, 8):
+                attempt(high - 4 * pages)
+            count = sum(phases.values()) - phases["no room for the old dataset"]
+            row(name, "least" if spilled else "enough", "yes" if job else "no", count, phases["read"] + phases["probe"],
+                phases["build"], phases["finish"], high)
+
+
+def inodes(bench):
+    table("output", "numbers of inodes that were too small", "out of them in start, reading", "building", "finishing")
+    for name in OUTPUTS:
+        phases = collections.Counter()
+        have = sum(1 for _ in bench.old[name][0].rglob("*")) + 2
+        need = len(bench.expected[name]) + have + 40
+        numbers = sorted({*range(have, have + 12), *bench.random.sample(range(have, need), min(12, need - have))})
+        for number in numbers:
+            phase = short_of(bench, name, f"size=1g,nr_inodes={number}", False, False, ["No space left"])
+            phases.update([phase] if phase else [])
+        count = sum(phases.values()) - phases["no room for the old dataset"]
+        row(name, count, phases["start"] + phases["probe"] + phases["read"], phases["build"], phases["finish"])
+
+
+def refused(bench):
+    """A disk that cannot be written, for the output or for temporary files."""
+    table("read-only", "runs", "exit code 5, one line, before the first point is read")
+    disk = bench.folder / "disk"
+    for place in ("output", "temporary files"):
+        for name in OUTPUTS:
+            mounted("ro", disk)
+            out = (disk if place == "output" else bench.folder) / "new"
+            temp = None if place == "output" else disk
+            ended = bench.end(bench.command(name, out, spilled=temp is not None, job=temp is not None, temp=temp))
+            failed_well(name, f"read-only {place}", ended, ["ead-only"])
+            require(not out.exists(), name, f"read-only {place}: something was made", ended)
+            require(ended.phase in ("start", "probe"), name, f"read-only {place}: in {ended.phase}", ended)
+            unmount(disk)
+        row(place, len(OUTPUTS), len(OUTPUTS))
+
+
+def vanished(bench):
+    """The folder of temporary files is removed while the run works."""
+    table("output", "runs whose folder was removed", "ended well", "exit code 5, one line", "old dataset, or the new one")
+    for name in OUTPUTS:
+        counts = collections.Counter()
+        for job in (False, True, False, True):
+            place = Path(tempfile.mkdtemp(dir=bench.folder))
+            out, temp = place / "out", bench.folder / "temp"
+            temp.mkdir()
+            before = bench.put_old(name, out)
+            how = {"spilled": True, "job": job, "over": True, "temp": temp}
+            seconds = bench.duration(name, spilled=True, job=job)
+            child = bench.start(bench.command(name, out, **how))
+            time.sleep(seconds * bench.random.uniform(0.02, 0.8))
+            shutil.rmtree(temp, ignore_errors=True)
+            ended = bench.end(None, child)
+            what = f"the folder of temporary files vanished in {ended.phase}"
+            if ended.code == 0:
+                require(contents(out) == bench.expected[name], name, f"{what}: other bytes", ended)
+            else:
+                failed_well(name, what, ended, code=2 if ended.phase == "start" else 5)  # looked for before the work
+                require(contents(out) == before, name, f"{what}: the old dataset", ended)
+            counts.update(["well" if ended.code == 0 else "failed"])
+            temp.mkdir(exist_ok=True)
+            bench.finish(name, out, what, **how)
+            shutil.rmtree(place)
+            shutil.rmtree(temp)
+        row(name, sum(counts.values()), counts["well"], counts["failed"], sum(counts.values()))
+
+
+def twice(bench):
+    """Two runs to one output at once."""
+    table("place of the output", "pairs", "both ended well", "one ended with code 2 and said why",
+          "one complete dataset, nothing beside it")
+    for over, job in ((False, False), (True, False), (True, True)):
+        counts = collections.Counter()
+        for name in OUTPUTS:
+            place = Path(tempfile.mkdtemp(dir=bench.folder))
+            out = place / "out"
+            if over:
+                bench.put_old(name, out)
+            command = bench.command(name, out, over=over, job=job)
+            runs = []
+            for number in range(2):
+                with open(bench.folder / f"log{number}", "w") as log:
+                    runs.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=log))
+                time.sleep(bench.random.uniform(0, 0.2))
+            ended = [Run(run.wait(), bench.folder / f"log{number}", 0) for number, run in enumerate(runs)]
+            lost = [run for run in ended if run.code != 0]
+            what = f"two runs, {'over' if over else 'new'}, {'job' if job else 'no job'}"
+            require(len(lost) < 2, name, f"{what}: none was done", ended[0])
+            for run in lost:
+                require(run.code == 2 and run.said[-1].startswith("error: "), name, what, run)
+            require(contents(out) == bench.expected[name], name, f"{what}: other bytes", ended[0])
+            left = sorted(path.name for path in place.iterdir() if path != out)
+            require(not left, name, f"{what}: {left} are left", ended[0])
+            counts.update(["lost" if lost else "both"])
+            shutil.rmtree(place)
+        row(f"{'an old dataset' if over else 'nothing'}{', with jobs' if job else ''}", len(OUTPUTS), counts["both"],
+            counts["lost"], len(OUTPUTS))
+
+
+def same(bench):
+    """Bytes do not depend on threads, memory, the folder for temporary files, or the order of the inputs."""
+    table("output", "runs", "same bytes")
+    for name in OUTPUTS:
+        good = count = 0
+        temp = bench.folder / "temp"
+        temp.mkdir()
+        files = sorted(map(str, bench.scans.iterdir()))
+        for threads, spilled, elsewhere in itertools.product((1, 2, 4), (False, True), (False, True)):
+            out = bench.folder / "plain"
+            order = bench.random.sample(files, len(files))
+            how = {"spilled": spilled, "temp": temp if elsewhere else None, "job": elsewhere, "threads": threads}
+            ended = bench.end(bench.command(name, out, scans=order, **how))
+            is_same = ended.code == 0 and contents(out) == bench.expected[name]
+            require(is_same, name, f"{how}, {order}", ended)
+            count, good = count + 1, good + is_same
+            shutil.rmtree(out, ignore_errors=True)
+        temp.rmdir()
+        row(name, count, good)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program")
+    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--points", type=int, default=400_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", help="parts, separated by commas")
+    given = parser.parse_args()
+    own_mounts = ["unshare", "-m", sys.executable, *sys.argv]
+    can_mount = os.environ.get("RELIABILITY_MOUNTS") == "1"
+    if not can_mount and subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode == 0:
+        os.execvpe("unshare", own_mounts, {**os.environ, "RELIABILITY_MOUNTS": "1"})
+    parts = {"kills": lambda b: kills(b, given.kills), "full": full, "inodes": inodes, "refused": refused,
+             "vanished": vanished, "twice": twice, "same": same}
+    chosen = given.only.split(",") if given.only else list(parts)
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(given.program, Path(folder), given.points, given.seed)
+        for part in chosen:
+            if part in ("full", "inodes", "refused") and not can_mount:
+                print(f"\nskipped: {part}: no rights to mount")
+                continue
+            start = time.monotonic()
+            parts[part](bench)
+            print(f"\n{part}: {time.monotonic() - start:.0f} s", flush=True)
+    print(f"\n{len(BROKEN)} promises were broken")
+    sys.exit(1 if BROKEN else 0)
+
+
+if __name__ == "__main__":
+    main()
