@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs that are killed, or whose disk fails them: what stays, and what the next run makes of it. Prints Markdown.
 
-    python3 crates/bench/reliability.py target/quick/pointmill [--kills 160] [--points 400000] [--seed 1] [--only PART]
+    python3 crates/bench/reliability.py target/quick/pointmill [--kills 160] [--points 100000] [--seed 1] [--only PART]
 
 Parts: kills, full, inodes, refused, vanished, twice, same. Each run is one of every combination of output, memory (enough, or
 the least that works, so that points go to temporary files), job (none, or one that the next run resumes), and what stood
@@ -50,7 +50,7 @@ OUTPUTS = {
 }
 UNITS = 8  # units of reading in a job
 TILES = 4
-EXTRA = 12  # numbers of 8 bytes, beside what LAS has of a point: so few points exceed the least memory
+EXTRA = 24  # numbers of 8 bytes, beside what LAS has of a point: so few points exceed the least memory
 BROKEN = []
 
 
@@ -196,47 +196,19 @@ def table(*cells):
 
 
 def kills(bench, count):
-    """Kill -9 at random moments; a run with a job may be killed again when it is resumed."""
+    """Kill -9 at random moments, until there are so many, or Ctrl-C."""
     counts = collections.defaultdict(collections.Counter)
     combinations = list(itertools.product(OUTPUTS, (False, True), (False, True), (False, True)))
     bench.random.shuffle(combinations)
-    for name, spilled, job, over in itertools.cycle(combinations):
-        if sum(c["kills"] for c in counts.values()) >= count:
-            break
-        what = f"killed, {'spilled' if spilled else 'in memory'}, {'job' if job else 'no job'}, {'over' if over else 'new'}"
-        seconds = bench.duration(name, spilled=spilled, job=job)
-        place = Path(tempfile.mkdtemp(dir=bench.folder))
-        out = place / "out"
-        before = bench.put_old(name, out) if over else None
-        killed = 0
-        for again in range(1 + (bench.random.randrange(3) if job else 0)):
-            how = {"spilled": spilled, "job": job, "over": over, "resume": again > 0}
-            # a third of the kills near the end, where names are given
-            near = bench.random.random() < 1 / 3
-            wait = seconds * (bench.random.uniform(0.8, 1.05) if near else bench.random.uniform(0, 0.9))
-            child = bench.start(bench.command(name, out, **how))
-            time.sleep(wait)
-            child.send_signal(signal.SIGKILL)
-            ended = bench.end(None, child)
-            found = contents(out)
-            is_old, is_new = found == before, found == bench.expected[name]
-            require(is_old or is_new, name, f"{what} in {ended.phase}: neither the old nor the new dataset", ended)
-            if ended.code != -signal.SIGKILL:
-                require(ended.code == 0, name, what, ended)
+    try:
+        for combination in itertools.cycle(combinations):
+            killed = sum(c["kills"] for c in counts.values())
+            if killed >= count:
                 break
-            killed += 1
-            left = [path.name for path in place.iterdir() if path != out]
-            kind = "left" if left else "nothing left"
-            counts[name].update(["kills", f"in {ended.phase}", "new" if is_new else "old", kind])
-            counts[name].update([w for w, is_it in (("spilled", spilled), ("job", job), ("over", over)) if is_it])
-            if is_new:
-                break
-        if killed:
-            over = over or out.exists()
-            report = bench.finish(name, out, what, spilled=spilled, job=job, resume=job, over=over)
-            counts[name].update(["next"])
-            counts[name]["recalled"] += report.get("recalled_points", 0) > 0
-        shutil.rmtree(place)
+            print(f"{killed} kills", file=sys.stderr, flush=True)
+            kill(bench, *combination, counts[combination[0]])
+    except KeyboardInterrupt:
+        pass
     table("output", "kills", "while starting", "reading", "building", "finishing", "with temporary files", "with a job",
           "over an old dataset", "old one or nothing stood", "new one stood", "left something hidden",
           "next runs, same bytes, nothing left", "of them resumed")
@@ -244,6 +216,42 @@ def kills(bench, count):
     for name, c in [*counts.items(), ("all", total)]:
         row(name, c["kills"], c["in start"] + c["in probe"], c["in read"], c["in build"], c["in finish"], c["spilled"],
             c["job"], c["over"], c["old"], c["new"], c["left"], c["next"], c["recalled"])
+
+
+def kill(bench, name, spilled, job, over, counts):
+    """Kills a run to an output; one with a job perhaps again when it is resumed. Then the next run must end well."""
+    what = f"killed, {'spilled' if spilled else 'in memory'}, {'job' if job else 'no job'}, {'over' if over else 'new'}"
+    seconds = bench.duration(name, spilled=spilled, job=job)
+    place = Path(tempfile.mkdtemp(dir=bench.folder))
+    out = place / "out"
+    before = bench.put_old(name, out) if over else None
+    killed = 0
+    for again in range(1 + (bench.random.randrange(3) if job else 0)):
+        how = {"spilled": spilled, "job": job, "over": over, "resume": again > 0}
+        # a third of the kills near the end, where names are given
+        near = bench.random.random() < 1 / 3
+        wait = seconds * (bench.random.uniform(0.8, 1.05) if near else bench.random.uniform(0, 0.9))
+        child = bench.start(bench.command(name, out, **how))
+        time.sleep(wait)
+        child.send_signal(signal.SIGKILL)
+        ended = bench.end(None, child)
+        found = contents(out)
+        is_old, is_new = found == before, found == bench.expected[name]
+        require(is_old or is_new, name, f"{what} in {ended.phase}: neither the old nor the new dataset", ended)
+        if ended.code != -signal.SIGKILL:
+            require(ended.code == 0, name, what, ended)
+            break
+        killed += 1
+        left = "left" if any(path != out for path in place.iterdir()) else "nothing left"
+        counts.update(["kills", f"in {ended.phase}", "new" if is_new else "old", left])
+        counts.update([w for w, is_it in (("spilled", spilled), ("job", job), ("over", over)) if is_it])
+        if is_new:
+            break
+    if killed:
+        report = bench.finish(name, out, what, spilled=spilled, job=job, resume=job, over=over or out.exists())
+        counts["next"] += 1
+        counts["recalled"] += report.get("recalled_points", 0) > 0
+    shutil.rmtree(place)
 
 
 def mounted(options, folder):
@@ -426,7 +434,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program")
     parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--points", type=int, default=400_000)
+    parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", help="parts, separated by commas")
     given = parser.parse_args()

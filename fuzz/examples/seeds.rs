@@ -1,13 +1,8 @@
 //! Puts the fixtures where the fuzzer looks for its first inputs: `corpus/<target>/`.
 
-#[path = "../../crates/converter/tests/hostile_job/left_job.rs"]
-mod left_job;
-
 use std::fs;
 use std::io;
 use std::path::Path;
-
-use left_job::LeftJob;
 
 fn main() -> io::Result<()> {
     let fuzz = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -69,9 +64,7 @@ fn main() -> io::Result<()> {
             fs::copy(&path, corpus.join(name))?;
         }
     }
-    datasets(&fixtures, &fuzz.join("corpus/datasets"))?;
-    systems(&fuzz.join("corpus/crs"))?;
-    job(&fuzz.join("corpus/job"))
+    datasets(&fixtures, &fuzz.join("corpus/datasets"))
 }
 
 /// What the target writes to a folder: the kind, then files with their lengths, the last without.
@@ -100,39 +93,4 @@ fn datasets(fixtures: &Path, corpus: &Path) -> io::Result<()> {
         fs::write(corpus.join(format!("{}-{}", folder.replace('/', "-"), names[names.len() - 1])), input)?;
     }
     Ok(())
-}
-
-/// Systems in each of the forms that they have.
-const SYSTEMS: [&str; 8] = [
-    "EPSG:25832+5783",
-    "+proj=utm +zone=10 +datum=WGS84 +units=us-ft +no_defs",
-    "+proj=lcc +lat_1=43 +lat_2=40 +lat_0=39.83333 +lon_0=-100 +x_0=500000 +y_0=0 +ellps=GRS80 +towgs84=1,2,3,4,5,6,7",
-    "+proj=tmerc +lon_0=9 +lat_0=48 +k=0.9996 +ellps=bessel +geoidgrids=x.gtx +vunits=ft +axis=neu",
-    r#"PROJCS["a",GEOGCS["b",DATUM["c",SPHEROID["WGS 84",6378137,298.257223563],TOWGS84[0,0,0,0,0,0,0]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",15],PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],PARAMETER["false_northing",0],UNIT["metre",1]]"#,
-    r#"COMPD_CS["c",PROJCS["a",GEOGCS["g",AUTHORITY["EPSG","4269"]],UNIT["metre",1],AUTHORITY["EPSG","26915"]],VERT_CS["h",UNIT["US survey foot",0.3048006096],AUTHORITY["EPSG","6360"]]]"#,
-    r#"PROJCRS["x",BASEGEOGCRS["y",DATUM["WGS",ELLIPSOID["WGS 84",6378137,298.257223563]]],CONVERSION["z",METHOD["Lambert Conic Conformal (2SP)"],PARAMETER["Latitude of false origin",40,ANGLEUNIT["degree",0.0174532925199433]]],CS[Cartesian,2],AXIS["easting",east],LENGTHUNIT["metre",1],ID["EPSG",2154]]"#,
-    r#"PROJCS["mine",EXTENSION["PROJ4","+proj=tmerc +lon_0=9 +units=m"]]"#,
-];
-
-fn systems(corpus: &Path) -> io::Result<()> {
-    fs::create_dir_all(corpus)?;
-    for (i, text) in SYSTEMS.iter().enumerate() {
-        fs::write(corpus.join(i.to_string()), text)?;
-    }
-    Ok(())
-}
-
-/// The journal of a job is of no use to another; what units leave is.
-fn job(corpus: &Path) -> io::Result<()> {
-    fs::create_dir_all(corpus)?;
-    let folder = tempfile::tempdir()?;
-    let job = LeftJob::new(folder.path(), 300);
-    let mut input = vec![1];
-    for payload in &job.payloads()[1..] {
-        input.extend((payload.len() as u16).to_le_bytes());
-        input.extend(*payload);
-    }
-    fs::write(corpus.join("units"), input)?;
-    fs::write(corpus.join("records"), [&[2], job.records()].concat())?;
-    fs::write(corpus.join("journal"), [&[0], &job.journal(&job.payloads())[..]].concat())
 }

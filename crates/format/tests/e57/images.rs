@@ -99,11 +99,17 @@ fn an_image_that_is_not_where_it_should_be_is_told() {
 
 #[test]
 fn damaged_descriptions_give_images_or_an_error() {
-    let whole = fixture("images.e57");
-    let xml = u64_at(&whole, 24) as usize;
+    let whole = &fixture("images.e57")[..];
+    let xml = u64_at(whole, 24) as usize;
+    // anything, and more often where images are said to be
+    let places = ["fileOffset=\"", "length=\""].into_iter().flat_map(|name| {
+        let found = (xml..whole.len() - name.len()).filter(move |at| whole[*at..].starts_with(name.as_bytes()));
+        found.map(move |at| at + name.len()..at + name.len() + 4)
+    });
+    let ranges: Vec<_> = places.chain([xml..whole.len()]).collect();
     let (path, mut random, mut read) = (files::temporary(b""), Random::new(41), [0; 2]);
-    for _ in 0..rounds(1500) {
-        let mut damaged = mutated(&whole, std::slice::from_ref(&(xml..whole.len())), &mut random);
+    for _ in 0..rounds(500) {
+        let mut damaged = mutated(whole, &ranges, &mut random);
         repair(&mut damaged);
         std::fs::write(&path, &damaged).unwrap();
         let Ok(scan) = e57::open(&path).inspect_err(check_error) else { continue };
@@ -117,5 +123,5 @@ fn damaged_descriptions_give_images_or_an_error() {
             }
         }
     }
-    assert!(read[0] > 1000 && read[1] > 20, "{read:?}");
+    assert!(read[0] > 200 && read[1] > 5, "{read:?}");
 }
