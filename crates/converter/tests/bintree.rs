@@ -11,6 +11,7 @@ use pointmill_format::bintree::{Bintree, Layout, NodeKind, SplitRule};
 use pointmill_format::{NodePoints, OpenOptions};
 use pointmill_testkit::Random;
 use pointmill_testkit::files::dataset;
+use pointmill_testkit::las::Las;
 
 /// Lattice integers (steps of 0.01) and classes.
 type Points = Vec<([i64; 3], u8)>;
@@ -38,11 +39,13 @@ fn plan(inputs: Vec<PathBuf>, out: PathBuf) -> Plan {
     plan
 }
 
-fn make(dir: &Path, points: &Points, settings: BintreeSettings) -> (PathBuf, Report) {
+fn make(dir: &Path, points: &Points, settings: BintreeSettings, task_points: Option<u64>) -> (PathBuf, Report) {
     let (scan, out) = (dir.join("scan.xyz"), dir.join("out"));
     write_text(&scan, points);
     let _ = fs::remove_dir_all(&out);
-    let report = convert(&plan(vec![scan], out.clone()), &[settings.into()], &Silent).unwrap();
+    let mut plan = plan(vec![scan], out.clone());
+    plan.task_points = task_points;
+    let report = convert(&plan, &[settings.into()], &Silent).unwrap();
     (out, report)
 }
 
@@ -136,30 +139,67 @@ fn the_tree_is_that_of_the_page_for_every_rule_and_shape() {
     let dir = tempfile::tempdir().unwrap();
     let clustered =
         |p: [f64; 3]| if p[0] < 0.5 { [p[0], p[1] * 3.0, 1.0] } else { [900.0 * p[0], -40.0 * p[1], p[2].powi(9)] };
-    let clouds: [(&str, Points); 7] = [
+    let clouds: [(&str, Points); 8] = [
         ("box", random(9000, 1, |p| [400.0 * p[0] - 200.0, 300.0 * p[1], 20.0 * p[2] * p[2]])),
         ("clusters", random(9000, 2, clustered)),
         ("outliers", random(3000, 3, |p| [2f64.powf(20.0 * p[0]) / 2f64.powi(4), p[1], p[2]])),
         ("one place", random(1234, 4, |_| [7.0, -5.0, 0.12])),
         ("two places", random(1500, 5, |p| [if p[0] < 0.1 { 1.0 } else { -3.0 }, 0.0, 0.0])),
+        ("two places, most at the higher", random(1500, 8, |p| [0.0, if p[0] < 0.1 { -3.0 } else { 1.0 }, 0.0])),
         ("a line", random(2000, 6, |p| [0.0, 5.0, p[2] * 1e4])),
         ("one point", random(1, 7, |p| p)),
     ];
     for (name, points) in clouds {
         for split in [SplitRule::Mean, SplitRule::Median, SplitRule::Midpoint] {
             let settings = BintreeSettings { capacity: 100, split, ..BintreeSettings::default() };
-            let (out, report) = make(dir.path(), &points, settings);
             let mut expected = Vec::new();
             reference(points.clone(), 100, split, 0, &mut expected);
-            let found = read(&out);
-            let differs = found.iter().zip(&expected).position(|(f, e)| f != e);
-            assert_eq!((differs, found.len()), (None, expected.len()), "{name}, {}", split.name());
-            assert_eq!(
-                (report.outputs[0].points, report.checksum_in),
-                (points.len() as u64, report.outputs[0].checksum.clone()),
-                "{name}"
-            );
+            // in memory, and divided on the disk down to 250 points before that
+            for task_points in [None, Some(250)] {
+                let (out, report) = make(dir.path(), &points, settings, task_points);
+                assert_same_nodes(&read(&out), &expected, &format!("{name}, {}, {task_points:?}", split.name()));
+                assert_eq!(
+                    (report.outputs[0].points, report.checksum_in),
+                    (points.len() as u64, report.outputs[0].checksum.clone()),
+                    "{name}"
+                );
+            }
         }
+    }
+}
+
+fn assert_same_nodes(found: &[Expected], expected: &[Expected], what: &str) {
+    let differs = found.iter().zip(expected).position(|(f, e)| f != e);
+    assert_eq!((differs, found.len()), (None, expected.len()), "{what}");
+}
+
+#[test]
+fn planes_are_in_the_world_whatever_is_stored_and_whatever_the_offset() {
+    let dir = tempfile::tempdir().unwrap();
+    let settings = BintreeSettings { capacity: 100, ..BintreeSettings::default() };
+    let near = random(2000, 31, |p| [90.0 * p[0], 50.0 * p[1], 20.0 * p[2]]);
+    let expected = |points: Points| {
+        let mut expected = Vec::new();
+        reference(points, 100, SplitRule::Mean, 0, &mut expected);
+        expected
+    };
+    // steps from 0 that 32 bits do not hold: records keep those from the middle
+    let far: Points = near.iter().map(|([x, y, z], c)| ([x + 5_000_000_000, y - 7_000_000_000, *z], *c)).collect();
+    // the lattice of a scan, whose corner is not a whole number of steps from 0
+    let mut las = Las::numbered(near.iter().map(|(q, _)| q.map(|v| v as i32)));
+    las.offset = [1234.005; 3];
+    let scan = dir.path().join("scan.las");
+    for task_points in [None, Some(250)] {
+        let (out, _) = make(dir.path(), &far, settings, task_points);
+        assert_same_nodes(&read(&out), &expected(far.clone()), "far");
+        fs::write(&scan, las.bytes()).unwrap();
+        let out = dir.path().join("las");
+        let _ = fs::remove_dir_all(&out);
+        let mut plan = Plan::new(vec![scan.clone()], out.clone());
+        plan.task_points = task_points;
+        convert(&plan, &[settings.into()], &Silent).unwrap();
+        let numbered = las.points.iter().zip(&near).map(|(p, (q, _))| (*q, p.class)).collect();
+        assert_same_nodes(&read(&out), &expected(numbered), "offset");
     }
 }
 
@@ -204,7 +244,7 @@ fn beside_an_octree_from_one_read_it_is_the_same_tree() {
     let dir = tempfile::tempdir().unwrap();
     let points = random(30_000, 21, |p| [100.0 * p[0], 100.0 * p[1], p[2]]);
     let settings = BintreeSettings { capacity: 1000, ..BintreeSettings::default() };
-    let (alone, _) = make(dir.path(), &points, settings);
+    let (alone, _) = make(dir.path(), &points, settings, None);
     let both = dir.path().join("both");
     let mut plan = plan(vec![dir.path().join("scan.xyz")], both.clone());
     plan.task_points = Some(2000);

@@ -295,4 +295,10 @@ mod tests {
         let across = PositionErrors::bound([3.0, 0.0, 0.0]).after(&PositionErrors::bound([0.0, 4.0, 0.0]));
         assert_eq!(across.max_3d, length([above(3.0), above(4.0), 0.0]));
     }
+
+    #[test]
+    fn words_of_reports_say_how_a_figure_is_known() {
+        let all = [How::Exact, How::Rounding, How::Measured, How::Bound];
+        assert_eq!(all.map(How::name), ["exact", "rounding", "measured", "bound"]);
+    }
 }

@@ -71,7 +71,9 @@ mod tests {
         assert_eq!(tolerance(metre, None).unwrap(), [0.01; 3]);
         assert_eq!(tolerance(metre, foot).unwrap(), [0.01, 0.01, 0.01 / 0.3048]);
         assert_eq!(tolerance(foot, None).unwrap(), [0.01 / 0.3048; 3]);
-        let degrees = tolerance(Some(Unit::Angle(1f64.to_radians())), None).unwrap();
+        let degree = Some(Unit::Angle(1f64.to_radians()));
+        assert_eq!(tolerance(degree, foot).unwrap()[2], 0.01 / 0.3048);
+        let degrees = tolerance(degree, None).unwrap();
         let centimetres = [111_319.491 * 100.0, 111_693.980 * 100.0, 100.0];
         for (found, per_unit) in degrees.iter().zip(centimetres) {
             assert!((found * per_unit - 1.0).abs() < 1e-8, "{degrees:?}");

@@ -276,3 +276,83 @@ fn whole_decimals_stay_whole() {
     assert_eq!(tidy_world(-7, 0.001, 0.0), -0.007);
     assert_eq!(tidy_world(3, 0.3, 1.0), 3.0 * 0.3 + 1.0);
 }
+
+#[test]
+fn a_coarse_axis_makes_the_side_longer_and_has_its_own_place() {
+    let at = |extent| Cube::around(&JobBounds::new([0; 3], [0, extent, 0]), &lattice([1.0, 4.0, 1.0])).unwrap();
+    let thin = at(0);
+    // 129 steps of the coarse axis are 516 of the others, the next odd number is 517
+    assert_eq!((thin.whole_steps(), thin.side, thin.resolved_level()), (Some((517, [0, 2, 0])), 517.0, 10));
+    assert_eq!(thin.min, JobPoint([-259, -65, -259]), "the first above the middle planes, 258.5 and 64.625");
+    assert_eq!(at(100).min, JobPoint([-259, -14, -259]), "of 129 coarse coordinates 28 are left over");
+    assert_eq!(at(64).min, JobPoint([-259, -65, -259]), "up to the last coordinate");
+    assert_eq!(at(65).min, JobPoint([-259, -32, -259]));
+}
+
+#[test]
+fn the_axis_that_is_longest_in_the_world_gives_the_side_of_unequal_scales() {
+    let around = |scale, extent| Cube::around(&JobBounds::new([0; 3], extent), &lattice(scale)).unwrap();
+    let scale = [0.75, 0.5, 0.25];
+    let cube = around(scale, [4000, 6000, 0]);
+    assert_eq!((cube.side, cube.steps, cube.resolved_level()), (4001.0 * 0.75, None, 31), "of equals the first");
+    assert_eq!(around(scale, [4000, 6001, 0]).side, 6003.0 * 0.5, "the next odd number");
+    // a step of the coarsest axis fits twice: 2 · 384 / 0.5 = 1536
+    let coarse = |extent| around([0.5, 0.75, 384.0], [extent, 0, 0]);
+    assert_eq!((coarse(0).side, coarse(0).min[0]), (1537.0 * 0.5, -769));
+    assert_eq!((coarse(767).min[0], coarse(768).min[0]), (-769, -384), "768 coordinates are above the middle");
+    // the side is 12,003 steps of z: the last coordinate is 12,002, the first above the middle plane 6002
+    let place = |thin| around(scale, [4000, 0, thin]).min[2];
+    assert_eq!((place(6000), place(6001), place(12_000)), (-6002, -3000, -1));
+}
+
+#[test]
+fn nearest_tree_coordinates_are_the_nearest() {
+    let mut random = Random::new(11);
+    for steps in [129u64, 517, 65_537, (1 << 30) + 1, (1 << 31) - 1] {
+        let cube = long(steps as i64 - 1);
+        for x in (0..40).chain(steps - 40..steps).chain((0..200).map(|_| random.below(steps))) {
+            let exact = ((u128::from(x) << 32) + u128::from(steps)) / (2 * u128::from(steps));
+            assert_eq!(u128::from(cube.nearest_tree(JobPoint([x as i64, 0, 0]))[0]), exact, "{x} of {steps}");
+        }
+    }
+    let coarse = Cube::around(&JobBounds::new([0; 3], [0, 100, 0]), &lattice([1.0, 4.0, 1.0])).unwrap();
+    let [_, y, _] = coarse.nearest_tree(JobPoint([0, 50, 0]));
+    assert_eq!(y, ((256 << 32) + 517) / (2 * 517), "64 coarse steps above the corner");
+}
+
+#[test]
+fn cells_of_unequal_scales_have_factors_where_no_bit_is_lost() {
+    let bounds = JobBounds::new([0; 3], [3000, 100, 700]);
+    let cube = Cube::around(&bounds, &lattice([0.75, 0.5, 0.25])).unwrap();
+    // the factor of 3001 is odd and its shift is 20: the cells of level 11 are the upper bits, those of level 10 would lose one
+    assert_eq!((cube.factor[0] % 2, cube.shift[0]), (1, 20));
+    assert_eq!([9, 10, 32].map(|level| cube.cell_factors(level)), [None; 3]);
+    let factors = cube.cell_factors(11).unwrap();
+    for q in [[0; 3], [1, 1, 1], [1500, 50, 350], [3000, 100, 700]].map(JobPoint) {
+        let t = cube.tree(q);
+        let cells: [u64; 3] = std::array::from_fn(|a| high((q[a] - cube.min[a]) as u64, factors[a]));
+        assert_eq!(cells, t.0.map(|t| u64::from(t >> 20)), "{q:?}");
+    }
+}
+
+#[test]
+fn the_corner_in_the_world_is_a_point_of_the_lattice() {
+    let cube = Cube::around(&JobBounds::new([-40; 3], [960, -40, 960]), &lattice([0.01; 3])).unwrap();
+    let lattice = Lattice { scale: [0.01; 3], offset: [476_000.0, 0.0, -2.5] };
+    // y: 501 steps below its only coordinate
+    assert_eq!(cube.offset(&lattice), [475_999.6, -5.41, -2.9]);
+}
+
+#[test]
+fn decimals_are_tidied_only_where_the_offset_is_whole_steps() {
+    for (q, scale, offset, plain, tidy) in [
+        (3, 0.1, 0.0, 0.300_000_000_000_000_04, 0.3),
+        (56, 0.01, 4.0, 4.560_000_000_000_000_5, 4.56),
+        (-56, 0.01, -4.0, -4.560_000_000_000_000_5, -4.56),
+    ] {
+        assert_eq!((q as f64 * scale + offset, tidy_world(q, scale, offset)), (plain, tidy));
+    }
+    // half a step: 0.035 would be nearer, but is not what readers compute
+    assert_eq!(tidy_world(3, 0.01, 0.005), 3.0 * 0.01 + 0.005);
+    assert_ne!(3.0 * 0.01 + 0.005, 0.035);
+}

@@ -259,6 +259,7 @@ mod tests {
         let step = |others: &[Need], room| choose(&[&[own], others].concat(), room).grid.step;
         assert_eq!(step(&[Need::Step(0.001)], ALL), 0.001);
         assert_eq!(step(&[Need::Step(0.1)], ALL), 0.01);
+        assert_eq!(choose(&[own, Need::Step(0.1)], ALL).reason.basis, LatticeBasis::Sources, "one part is no part");
         assert_eq!(step(&[Need::Finest], Room { wished: 2e-6, ..ALL }), 0.01 / 1000.0);
         assert_eq!(step(&[Need::Finest, Need::Step(0.1)], Room { wished: 2e-6, ..ALL }), 0.01 / 1000.0);
         assert_eq!(step(&[Need::Single { step: 0.0001, farthest: 1.0 }], Room { wished: 2e-6, ..ALL }), 0.0001);

@@ -69,4 +69,10 @@ mod tests {
     fn doubles_have_their_distances() {
         assert_eq!([1.0, 1e9, 0.0].map(least), [2f64.powi(-51), 2f64.powi(-22), 0.0]);
     }
+
+    #[test]
+    fn a_step_of_one_digit_just_below_a_power_of_ten_is_that_power() {
+        // the logarithm is below 3, the quotient of decimals that is meant is 1000
+        assert_eq!([1000.0 * (1.0 - 1e-13), 1000.0 * (1.0 - 1e-11)].map(one_digit), [1000.0, 900.0]);
+    }
 }

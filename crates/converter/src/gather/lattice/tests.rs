@@ -249,3 +249,111 @@ fn offsets_of_requested_steps_are_0_or_the_least_of_the_sources() {
     assert_eq!(offset([1.000_000_5, 2.0], 1.0), 0.0, "within a millionth of a step");
     assert_eq!(offset([1.000_002, 2.0], 1.0), 1.000_002);
 }
+
+/// A source whose integers lie on the coarser grid of `step`, as a sample of them shows.
+fn with_divisor(own: Lattice, step: f64) -> Source {
+    let stored = Stored { lattice: Some(own), resolution: Default::default(), fineness: [grid(step); 3] };
+    Source::of_header(stored, None, None)
+}
+
+#[test]
+fn a_second_read_is_for_another_lattice_only() {
+    let auto = plan(ScaleChoice::Auto);
+    let again = |sources: &Sources, present: f64, side: i64, off_grid| {
+        let present = JobLattice { lattice: lattice(present, [0.0; 3]), ..from_headers(&auto, sources).unwrap() };
+        let bounds = JobBounds { min: JobPoint([0; 3]), max: JobPoint([side; 3]) };
+        settled(&auto, sources, &present, &stats(bounds, &present.lattice, [off_grid; 3])).map(|j| j.lattice.scale[0])
+    };
+    let own = |step| with_lattice(lattice(step, [0.0; 3]), None);
+    // 0.005 holds both, but no coordinate is lost at 0.01
+    let two = sources(vec![own(0.01), own(0.025)]);
+    assert_eq!(chosen(vec![own(0.01), own(0.025)]).lattice.scale, [0.005; 3]);
+    assert_eq!([0.01, 0.025].map(|present| again(&two, present, 9, false)), [None, Some(0.005)]);
+    // the most steps that there may be
+    let whole = sources(vec![own(1.0)]);
+    assert_eq!([0, 1].map(|more| again(&whole, 1.0, (1 << 31) - 2 + more, false)), [None, Some(2.0)]);
+    assert_eq!(again(&whole, 1.0, 9, true), None, "the points are off the grid, and there is no finer one");
+    // a sample showed millimetres; now doubles of this extent ask for half of them
+    let text = sources(vec![world([grid(0.001); 3], [0.0; 3], [1e6; 3])]);
+    assert_eq!([false, true].map(|off| again(&text, 0.001, 1_000_000_000, off)), [None, Some(5e-4)]);
+    let mut precise = sources(vec![world([Fineness::Double; 3], [0.0; 3], [1000.0; 3])]);
+    precise.tolerance = Some(Tolerance { total: [0.0075; 3], lattice: [0.0075; 3] });
+    assert_eq!(
+        [0.015, 0.016].map(|step| again(&precise, step, 9, false)),
+        [None, Some(0.01)],
+        "as coarse as is allowed"
+    );
+}
+
+#[test]
+fn divisors_hold_until_a_point_contradicts_them() {
+    let auto = plan(ScaleChoice::Auto);
+    let source = || with_divisor(lattice(0.001, [0.0; 3]), 0.01);
+    let present = chosen(vec![source()]);
+    assert_eq!((present.lattice.scale, present.reason.axes[0].basis), ([0.01; 3], LatticeBasis::Divisor));
+    let seen = JobBounds { min: JobPoint([0; 3]), max: JobPoint([100; 3]) };
+    let settled =
+        |off_grid| settled(&auto, &sources(vec![source()]), &present, &stats(seen, &present.lattice, off_grid));
+    assert_eq!(settled([false; 3]), None);
+    assert_eq!(settled([false, true, false]).unwrap().lattice.scale, [0.01, 0.001, 0.01]);
+}
+
+#[test]
+fn free_axes_take_the_finest_step_and_its_reason() {
+    let single = [Fineness::Single; 3];
+    let c = chosen(vec![world(single, [5_400_000.0, 499_000.0, 0.0], [5_401_000.0, 500_000.0, 0.0])]);
+    assert_eq!(c.lattice.scale, [0.5, 2f64.powi(-5), 2f64.powi(-5)]);
+    assert_eq!(c.reason.axes[2], c.reason.axes[1]);
+    let c = chosen(vec![world(single, [5_400_000.0, 5_500_000.0, 0.0], [5_401_000.0, 5_501_000.0, 0.0])]);
+    assert_eq!((c.lattice.scale, c.reason.axes[2]), ([0.5; 3], c.reason.axes[0]), "of equals the first");
+}
+
+#[test]
+fn steps_a_power_of_two_apart_or_far_apart_stay_unequal() {
+    let single = [Fineness::Single; 3];
+    let c =
+        chosen(vec![world(single, [5_400_000.0, 1_200_000.0, 1_200_000.0], [5_400_100.0, 1_200_100.0, 1_200_100.0])]);
+    assert_eq!(c.lattice.scale, [0.5, 0.125, 0.125]);
+    let of = |steps: [f64; 3]| chosen(vec![world(steps.map(grid), [0.0; 3], [100.0; 3])]).lattice.scale;
+    assert_eq!(of([0.3, 0.6, 0.3]), [0.3, 0.6, 0.3]);
+    assert_eq!(of([0.001, 1.0, 0.001]), [0.001; 3], "a thousand times");
+    assert_eq!(of([0.001, 2.0, 0.001]), [0.001, 2.0, 0.001]);
+}
+
+#[test]
+fn only_a_sample_without_a_declaration_says_how_large_a_cloud_is() {
+    let side = |max: f64| Aabb { min: [0.0; 3], max: [max; 3] };
+    let decimals = || Stored { lattice: None, resolution: Default::default(), fineness: [grid(0.001); 3] };
+    let wide = Some(side(9e6));
+    assert_eq!(chosen(vec![Source::of_header(decimals(), None, wide)]).lattice.scale, [0.005; 3]);
+    assert_eq!(chosen(vec![Source::of_header(decimals(), wide, wide)]).lattice.scale, [0.001; 3], "declared");
+    let mut doubles = world([Fineness::Double; 3], [0.0; 3], [1000.0; 3]);
+    if let Some(extent) = &mut doubles.extent {
+        extent.is_sampled = true;
+    }
+    assert_eq!(chosen(vec![doubles]).lattice.scale, [1e-6; 3], "the rest may be as far again");
+}
+
+#[test]
+fn a_source_without_points_asks_for_nothing() {
+    let own = with_lattice(lattice(0.001, [0.0; 3]), None);
+    let stored = Stored { lattice: None, resolution: Default::default(), fineness: [Fineness::Double; 3] };
+    let mut both = sources(vec![own, Source::of_header(stored, None, None)]);
+    both.tolerance = Some(Tolerance { total: [0.001; 3], lattice: [0.001; 3] });
+    // all coordinates are known to be whole steps: three of them (docs/accuracy.md, section 10)
+    assert_eq!(from_headers(&plan(ScaleChoice::Auto), &both).unwrap().lattice.scale, [0.003; 3]);
+}
+
+#[test]
+fn the_lattice_inside_a_box_is_that_of_its_extent() {
+    let auto = plan(ScaleChoice::Auto);
+    let near = Aabb { min: [0.0; 3], max: [1000.0; 3] };
+    let inside = |source: Source, present: f64, side: i64| {
+        let all = sources(vec![source]);
+        let present = JobLattice { lattice: lattice(present, [0.0; 3]), ..from_headers(&auto, &all).unwrap() };
+        let bounds = JobBounds { min: JobPoint([0; 3]), max: JobPoint([side; 3]) };
+        inside(&auto, &all, &present, &stats(bounds, &present.lattice, [false; 3]), &near).lattice.scale
+    };
+    assert_eq!(inside(world([Fineness::Double; 3], [0.0; 3], [1e9; 3]), 1.0, 1_000_000_000), [5e-7; 3]);
+    assert_eq!(inside(with_lattice(lattice(0.001, [0.0; 3]), None), 0.002, 3_000_000_000), [0.001; 3]);
+}

@@ -84,4 +84,38 @@ mod tests {
         assert_eq!(a, take(1));
         assert_ne!(a, take(2));
     }
+
+    #[test]
+    fn hashes_are_the_published_ones() {
+        // the first numbers of SplitMix64 from 0 (Steele, Lea and Flood 2014): the finalizer of multiples of its step
+        let step = 0x9e37_79b9_7f4a_7c15u64;
+        let expected = [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4, 0x06c4_5d18_8009_454f];
+        assert_eq!([1, 2, 3].map(|n| mix(step.wrapping_mul(n))), expected);
+    }
+
+    #[test]
+    fn the_most_central_of_three_axes_is_taken() {
+        // cells of 8 units whose middle is at 3.5; the last two are as far from it, and the first of them wins
+        let points = [[8, 0, 0], [15, 1, 3], [10, 2, 6], [13, 5, 1]].map(TreePoint);
+        let mut accepted = [false; 4];
+        nearest_to_center(&Candidates { points: &points, are_free: &[true; 4], shift: 3 }, &mut accepted);
+        assert_eq!(accepted, [false, false, true, false]);
+    }
+
+    #[test]
+    fn the_same_seed_and_level_take_the_same_points() {
+        // eight cells of 16 points; worked out by another program from the definition: the least of
+        // mix(mix(salt ^ (x << 32 | y)) ^ z) with salt = mix(seed ^ mix(level + 1))
+        let points: Vec<TreePoint> = (0..128).map(|i| TreePoint([i, i * 7 % 16, i * 5 % 16])).collect();
+        let candidates = Candidates { points: &points, are_free: &[true; 128], shift: 4 };
+        let take = |seed, level| {
+            let mut accepted = vec![false; points.len()];
+            random(NodeKey { level, x: 0, y: 0, z: 0 }, seed, &candidates, &mut accepted);
+            let taken: Vec<usize> = accepted.iter().enumerate().filter(|(_, a)| **a).map(|(i, _)| i % 16).collect();
+            taken
+        };
+        assert_eq!(take(1, 20), [3, 13, 13, 2, 4, 9, 3, 15]);
+        assert_eq!(take(1, 3), [15, 15, 4, 12, 3, 6, 13, 9]);
+        assert_eq!(take((1 << 63) + 5, 20), [4, 11, 8, 15, 8, 12, 11, 8]);
+    }
 }

@@ -205,3 +205,6 @@ fn free(
         at += run;
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -99,7 +99,7 @@ mod tests {
     fn a_spacing_is_a_unit_or_less_but_more_than_half_of_one() {
         for (divisor, bits) in [(16.0, 4), (100.0, 6), (127.9, 6), (128.0, 7), (181.0, 7), (255.0, 7)] {
             let spacing = Spacing::new(divisor);
-            assert_eq!(spacing.bits(), bits);
+            assert_eq!((spacing.bits(), spacing.divisor()), (bits, divisor));
             assert!(spacing.in_units() > 0.5 && spacing.in_units() <= 1.0);
             let side = 2f64.powi(31 - 5);
             assert!((spacing.squared(5).sqrt() * divisor / side - 1.0).abs() < 1e-12);
@@ -107,5 +107,11 @@ mod tests {
         assert_eq!(Spacing::new(128.0).reach(0), Some(1 << 24));
         assert_eq!(Spacing::new(128.0).reach(24), Some(1));
         assert_eq!(Spacing::new(128.0).reach(25), None);
+    }
+
+    #[test]
+    fn ways_to_sample_have_the_words_of_reports() {
+        let all = [Sampling::Poisson, Sampling::Grid, Sampling::Random { seed: 1 }];
+        assert_eq!(all.map(Sampling::name), ["poisson", "grid", "random"]);
     }
 }

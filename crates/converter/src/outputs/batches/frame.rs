@@ -41,7 +41,7 @@ impl Frame {
         Ok(Self::of_grid(grid, tight, lattice, cloud.frame.origin))
     }
 
-    fn of_grid(grid: Grid, tight: Aabb, lattice: Lattice, origin: StoredOrigin) -> Self {
+    pub(super) fn of_grid(grid: Grid, tight: Aabb, lattice: Lattice, origin: StoredOrigin) -> Self {
         let power = |bits: u32| 2f64.powi(bits as i32 - grid.exponent as i32);
         let is_power_of_two = grid.cell.to_bits() << 12 == 0 && grid.cell.is_normal() && grid.cell.recip().is_normal();
         Self {

@@ -153,3 +153,96 @@ pub(super) fn shown_word(cell: &OpenCell, level: usize) -> u32 {
 pub(super) fn unselected(word: u32) -> u32 {
     colour_word(rgb_of(word), LEVELS as u8)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use pointmill_format::batches::{Grid, lod_of};
+    use pointmill_format::{Aabb, Lattice};
+    use pointmill_testkit::Random;
+
+    use super::*;
+    use crate::cloud::{JobPoint, StoredOrigin};
+    use crate::outputs::batches::frame::code_of;
+
+    const CELL: f64 = 2.0;
+
+    /// Points in Morton order, in cells, on a raster of eighths: many are as far from a center as others. Of each, a word.
+    fn points() -> (Vec<[f64; 3]>, Vec<u32>) {
+        let mut random = Random::new(4);
+        let mut next = |end: u64| random.below(end) as f64 / 8.0;
+        let mut points: Vec<[f64; 3]> = (0..400).map(|_| [next(40), next(40), next(12)]).collect();
+        points.extend((0..200).map(|_| [next(4), 3.0 + next(3), next(3)])); // a crowd in a few cells
+        points.sort_by_key(|u| code_of(u.map(|v| (v * 4.0) as u32)));
+        let words = points.iter().map(|_| random.next_u32() & 0xFF_FFFF).collect();
+        (points, words)
+    }
+
+    /// All at once: of each cell the first that is nearest to the center shows the mean, coarser levels before finer ones.
+    fn plain(points: &[[f64; 3]], words: &[u32]) -> Vec<u32> {
+        let mut shown: Vec<u32> = words.iter().map(|w| unselected(*w)).collect();
+        for level in (0..LEVELS).rev() {
+            let scaled = |i: usize| points[i].map(|v| v * 2f64.powi(level as i32));
+            let mut cells: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
+            (0..points.len()).for_each(|i| cells.entry(scaled(i).map(|v| v as u32)).or_default().push(i));
+            for (key, members) in cells {
+                let distance = |i: usize| (0..3).map(|a| (scaled(i)[a] - f64::from(key[a]) - 0.5).powi(2)).sum::<f64>();
+                let nearest = members.iter().copied().min_by(|i, j| distance(*i).total_cmp(&distance(*j))).unwrap();
+                let mut colours = ColourSum::default();
+                members.iter().for_each(|i| colours.add(words[*i]));
+                shown[nearest] = colour_word(colours.mean(), level as u8);
+            }
+        }
+        shown
+    }
+
+    /// In tasks of `size` points, each in two parts.
+    fn in_tasks(points: &[[f64; 3]], words: &[u32], size: usize) -> Vec<u32> {
+        let tight = Aabb { min: [0.0; 3], max: [10.0; 3] };
+        let lattice = Lattice { scale: [0.25; 3], offset: [0.0; 3] };
+        let origin = StoredOrigin(JobPoint([0; 3]));
+        let frame = Frame::of_grid(Grid::new(&tight, CELL).unwrap(), tight, lattice, origin);
+        let mut shown: Vec<u32> = words.iter().map(|w| unselected(*w)).collect();
+        let mut edges: [Vec<Edges>; LEVELS] = Default::default();
+        for (task, points) in points.chunks(size).enumerate() {
+            let first = task * size;
+            let words = &words[first..first + points.len()];
+            let shown = &mut shown[first..first + points.len()];
+            let relative = [0, 1, 2].map(|a| points.iter().map(|u| u[a] * CELL).collect::<Vec<f64>>());
+            let mut levels = Levels::default();
+            for part in [0..points.len() / 2, points.len() / 2..points.len()] {
+                let [x, y, z] = &relative;
+                levels.add(&frame, [&x[part.clone()], &y[part.clone()], &z[part.clone()]], &words[part.clone()], shown);
+            }
+            for (all, edges) in edges.iter_mut().zip(levels.finish(first as u64, words, shown)) {
+                all.extend(edges);
+            }
+        }
+        let before = shown.clone();
+        for (level, edges) in edges.into_iter().enumerate() {
+            join(edges.into_iter(), |cell| {
+                let at = cell.candidate as usize;
+                assert_eq!((cell.word, cell.shown), (words[at], before[at]));
+                if usize::from(lod_of(shown[at])) > level {
+                    shown[at] = shown_word(&cell, level);
+                }
+            });
+        }
+        shown
+    }
+
+    #[test]
+    fn cells_are_those_of_all_points_at_once_however_tasks_cut_them() {
+        let (points, words) = points();
+        let expected = plain(&points, &words);
+        for size in [1, 2, 7, 50, 333, points.len()] {
+            assert_eq!(in_tasks(&points, &words, size), expected, "tasks of {size} points");
+        }
+    }
+
+    #[test]
+    fn a_task_without_points_has_no_cells() {
+        assert_eq!(Levels::default().finish(5, &[], &[]), [None; LEVELS]);
+    }
+}

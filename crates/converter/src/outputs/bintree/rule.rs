@@ -67,6 +67,7 @@ mod tests {
         let b = |max: [i64; 3]| JobBounds::new([0; 3], max);
         assert_eq!(longest_axis(&b([5, 7, 7]), [1.0; 3]), Some(1));
         assert_eq!(longest_axis(&b([5, 7, 7]), [1.0, 0.1, 1.0]), Some(2));
+        assert_eq!(longest_axis(&b([100, 7, 7]), [0.01, 1.0, 1.0]), Some(1));
         assert_eq!(longest_axis(&b([0; 3]), [1.0; 3]), None);
         assert_eq!(longest_axis(&b([0, 1, 0]), [1.0, 0.0, 1.0]), Some(1));
         // equal in single precision

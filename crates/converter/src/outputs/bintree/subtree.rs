@@ -317,3 +317,15 @@ pub(super) fn unite(nodes: &mut [Node]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_takes_its_record_two_items_and_its_part_of_a_large_leaf() {
+        let core = RecordLayout::core(); // 16 bytes
+        let bytes = |capacity| Builder::bytes_per_point(18, &core, capacity);
+        assert_eq!([1000, 100_000, 100_001].map(bytes), [18 + 2 * 16 + 2, 18 + 2 * 16 + 2, 18 + 2 * 16 + 20 + 16]);
+    }
+}
