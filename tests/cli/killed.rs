@@ -56,7 +56,9 @@ fn a_killed_run_to_any_output_leaves_the_old_dataset_or_the_new_one_and_the_next
             assert_eq!(dir.names(), ["old", "old.las", "out", "plain", "scans"], "{output:?}, kill {kill}");
             fs::remove_dir_all(dir.path("out")).unwrap();
         }
-        ["old", "plain"].map(|folder| fs::remove_dir_all(dir.path(folder)).unwrap());
+        for folder in ["old", "plain"] {
+            fs::remove_dir_all(dir.path(folder)).unwrap();
+        }
     }
     assert!(killed >= 8 && left >= 4, "{killed} runs were killed, {left} left something");
 }
