@@ -25,17 +25,16 @@ mod text_choice;
 
 use std::process::ExitCode;
 
-use args::{Args, Command, mistake};
-use clap::Parser as _;
-use clap::error::ErrorKind;
-use commands::{convert, export, extract, info, manual, measure, preview, validate, view};
+use args::{Args, Command};
+use commands::{convert, export, extract, info, job, manual, measure, preview, validate, view};
 use exit::Failure;
 
 fn main() -> ExitCode {
     allocator::give_back_early();
     exit::remember_panics();
     interrupt::watch();
-    let result = std::panic::catch_unwind(|| run(&args()?)).unwrap_or_else(|_| Err(exit::last_panic()));
+    let result = std::panic::catch_unwind(|| run(&profiles::command_line(&std::env::args_os().collect::<Vec<_>>())?))
+        .unwrap_or_else(|_| Err(exit::last_panic()));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -48,21 +47,10 @@ fn main() -> ExitCode {
     }
 }
 
-/// The command line; help and version are printed here, and end the process.
-fn args() -> Result<Args, Failure> {
-    let typed: Vec<_> = std::env::args_os().collect();
-    let args = Args::try_parse_from(&typed).map_err(|error| {
-        if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
-            error.exit();
-        }
-        Failure::Usage(mistake::line(&error, &typed))
-    })?;
-    profiles::apply(args, &typed)
-}
-
 fn run(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Convert(convert) => convert::run(convert),
+        Command::Job(job) => job::run(job),
         Command::Export(export) => export::run(export),
         Command::Measure(measure) => measure::run(measure),
         Command::Validate(validate) => validate::run(validate),

@@ -3,7 +3,8 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use clap::{CommandFactory as _, FromArgMatches as _};
+use clap::error::ErrorKind;
+use clap::{CommandFactory as _, FromArgMatches as _, Parser as _};
 use serde_json::Value;
 
 use crate::args::{Args, Command, ConvertArgs, ProfileArg, TargetArg, mistake};
@@ -35,8 +36,20 @@ struct Chosen {
     why: String,
 }
 
+/// A command line, the name of the program first, with the options of its profile; help and version are printed here, and end the
+/// process.
+pub(crate) fn command_line(typed: &[OsString]) -> Result<Args, Failure> {
+    let args = Args::try_parse_from(typed).map_err(|error| {
+        if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+            error.exit();
+        }
+        Failure::Usage(mistake::line(&error, typed))
+    })?;
+    apply(args, typed)
+}
+
 /// The command line with the options of its profile, which those that were typed override. Nothing changes without a profile.
-pub(crate) fn apply(args: Args, typed: &[OsString]) -> Result<Args, Failure> {
+fn apply(args: Args, typed: &[OsString]) -> Result<Args, Failure> {
     let Command::Convert(convert) = &args.command else { return Ok(args) };
     let Some(profile) = convert.profile else {
         return match convert.measured {

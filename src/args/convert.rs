@@ -33,6 +33,10 @@ pub(crate) struct ConvertArgs {
     /// Replaces OUT if it is a dataset; the old dataset is kept until the new one is complete
     #[arg(long, help_heading = "Output")]
     pub(crate) overwrite: bool,
+    /// Adds the points of the inputs to those of OUT, a dataset, and replaces it: the same bytes as converting all scans at once, if it
+    /// was made with the same options and holds all attributes; everything is built anew
+    #[arg(long, conflicts_with = "overwrite", help_heading = "Output")]
+    pub(crate) append: bool,
     /// Name of the point cloud in the metadata [default: name of the first input]
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     pub(crate) name: Option<String>,
@@ -154,8 +158,8 @@ pub(crate) struct ConvertArgs {
           help_heading = "Output")]
     pub(crate) verify: Option<VerifyArg>,
 
-    /// Goes on where a run with the same inputs and options was ended, if it has left OUT.job: what it has read is not read
-    /// again
+    /// Goes on where a run with the same inputs and options was ended, if it has left OUT.job: what it has read and built is not
+    /// read and built again
     #[arg(long, help_heading = "Resources")]
     pub(crate) resume: bool,
     /// Whether a run that is ended leaves OUT.job for --resume: never, always, or auto: if the points are not expected to fit into

@@ -52,6 +52,14 @@ Examples:
   pointmill completions zsh > ~/.zfunc/_pointmill
   pointmill completions fish > ~/.config/fish/completions/pointmill.fish";
 
+pub(super) const JOB: &str = "\
+Examples:
+  pointmill job plan scans/ -o city --job /shared/city.job
+  pointmill job units /shared/city.job --json
+  pointmill job run /shared/city.job read-1-0 read-1-1
+  pointmill job run /shared/city.job --share 3/16   one of 16 processes
+  pointmill job finish /shared/city.job";
+
 pub(super) const MAN: &str = "\
 Examples:
   pointmill man | man -l -
@@ -66,7 +74,7 @@ mod tests {
 
     #[test]
     fn every_example_is_a_command_line() {
-        let all = [CONVERT, EXPORT, MEASURE, VALIDATE, EXTRACT, INFO, PREVIEW, VIEW, COMPLETIONS, MAN];
+        let all = [CONVERT, EXPORT, MEASURE, VALIDATE, EXTRACT, INFO, PREVIEW, VIEW, JOB, COMPLETIONS, MAN];
         let lines: Vec<&str> = all.iter().flat_map(|text| text.lines().skip(1)).collect();
         assert!(lines.len() > 20);
         for line in lines {

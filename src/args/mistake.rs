@@ -130,7 +130,7 @@ mod tests {
         let table: [(&[&str], &str); 14] = [
             (
                 &[],
-                "no command; the commands are convert, export, measure, validate, extract, info, preview, view, completions, man; see 'pointmill --help'",
+                "no command; the commands are convert, job, export, measure, validate, extract, info, preview, view, completions, man; see 'pointmill --help'",
             ),
             (&["convrt"], "there is no command 'convrt'; did you mean convert?; the commands are convert, "),
             (&["convert"], "--output OUT is missing; see 'pointmill convert --help'"),

@@ -4,6 +4,7 @@ mod common;
 mod convert;
 mod examples;
 mod export;
+mod job;
 mod manual;
 mod measure;
 pub(crate) mod mistake;
@@ -24,6 +25,7 @@ pub(crate) use convert::{
     TargetArg, VerifyArg,
 };
 pub(crate) use export::ExportArgs;
+pub(crate) use job::{JobArgs, JobCommand, JobFinishArgs, JobPlanArgs, JobResources, JobRunArgs, JobUnitsArgs, Share};
 pub(crate) use manual::{CompletionsArgs, ManArgs};
 pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use preview::PreviewArgs;
@@ -48,6 +50,9 @@ pub(crate) enum Command {
     /// Converts scans to a dataset
     #[command(after_help = examples::CONVERT)]
     Convert(Box<ConvertArgs>),
+    /// Converts in units that several processes do, on one machine or on many
+    #[command(after_help = examples::JOB)]
+    Job(JobArgs),
     /// Writes the points of scans and datasets to one file: LAS, LAZ, PLY or CSV
     #[command(after_help = examples::EXPORT)]
     Export(Box<ExportArgs>),

@@ -17,15 +17,17 @@ use crate::args::{
     EncodingArg, FaultArg, LayoutArg, OriginPointsArg, OutliersArg, Potree1VersionArg, RgbDepthArg, SEED, SamplingArg,
     SplitArg, TargetArg,
 };
+use crate::datasets;
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::inputs::Inputs;
 use crate::interrupt::{kept, no_more_checks, stop_flag};
 
-pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+/// What is to be made, and how, as the options say.
+pub(super) fn planned(args: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure> {
     let targets = targets(args)?;
-    let inputs = args.inputs.expand(&args.output)?;
+    let mut inputs = args.inputs.expand(&args.output)?;
     if args.unreadable == FaultArg::Fail
         && let Some(failure) = inputs.unread_failure("; pass --unreadable skip to convert the rest")
     {
@@ -37,12 +39,44 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     if args.page {
         PageFile::check_formats(args)?;
     }
-    let plan = plan(args, inputs)?;
+    if args.append {
+        inputs.files.push(appendable(args, &inputs)?);
+    }
+    let mut plan = plan(args, inputs)?;
+    plan.overwrite |= args.append;
+    if args.append && args.name.is_none() {
+        plan.name = name_from(&[], std::slice::from_ref(&args.output));
+    }
+    Ok((plan, targets))
+}
+
+/// The dataset that others are added to, as one more input.
+fn appendable(args: &ConvertArgs, inputs: &Inputs) -> Result<PathBuf, Failure> {
+    let (output, shown) = (&args.output, args.output.display());
+    let [to] = args.to[..] else {
+        return Err(Failure::Usage("--append adds to one dataset; leave out all --to but one".to_owned()));
+    };
+    let Some(located) = datasets::named(output)? else {
+        return Err(Failure::Usage(format!("{shown}: there is no dataset to add to; leave out --append")));
+    };
+    if located.kind.name() != to.name() {
+        let kind = located.kind;
+        return Err(Failure::Usage(format!("{shown}: the dataset is {kind}; pass --to {}", kind.name())));
+    }
+    let same = |a: &Path, b: &Path| a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b);
+    if inputs.files.iter().any(|file| same(file, output) || same(file, &located.path)) {
+        return Err(Failure::Usage(format!("{shown}: it is an input already; leave it out")));
+    }
+    Ok(output.clone())
+}
+
+pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+    let (plan, targets) = planned(args)?;
     if args.dry_run {
         let estimate = pointmill_converter::estimate(&plan, &targets)?;
         return emit(&if args.json { to_json(&estimate)? } else { conversion::estimate(&estimate, &plan) });
     }
-    protect_inputs(&plan)?;
+    protect_inputs(&plan, args.append)?;
     let page_file = PageFile::requested(args)?;
     let report_file = args.report.as_ref().map(|file| {
         let sources = plan.inputs.iter().chain(&args.inputs.files_from);
@@ -56,7 +90,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     no_more_checks();
     let for_people = progress.end();
     let report = result.map_err(|error| with_kept(error.into()))?;
-    tell(args, report_file.as_ref(), &report).map_err(|failure| after_all(failure, &plan.output))?;
+    tell(args.json, report_file.as_ref(), &report).map_err(|failure| after_all(failure, &plan.output))?;
     let page = page_file.map(|file| file.write(&plan.name)).transpose();
     let page = page.map_err(|failure| after_all(failure, &plan.output))?;
     if for_people {
@@ -69,13 +103,13 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
 }
 
 /// The report where it was asked for.
-fn tell(args: &ConvertArgs, file: Option<&ReportFile>, report: &Report) -> Result<(), Failure> {
-    if file.is_none() && !args.json {
+pub(super) fn tell(is_json: bool, file: Option<&ReportFile>, report: &Report) -> Result<(), Failure> {
+    if file.is_none() && !is_json {
         return Ok(());
     }
     let text = to_json(report)?;
     file.map_or(Ok(()), |file| file.write(&text))?;
-    if args.json { emit(&text) } else { Ok(()) }
+    if is_json { emit(&text) } else { Ok(()) }
 }
 
 /// What failed, and what of it is not lost.
@@ -91,7 +125,7 @@ fn with_kept(failure: Failure) -> Failure {
 }
 
 /// What fails once the dataset is in place must not read as if there were none.
-fn after_all(failure: Failure, output: &Path) -> Failure {
+pub(super) fn after_all(failure: Failure, output: &Path) -> Failure {
     match failure {
         Failure::Io(line) => Failure::Io(format!("{line}; the output {} is complete", output.display())),
         other => other,
@@ -318,10 +352,11 @@ pub(super) fn name_from(typed: &[PathBuf], files: &[PathBuf]) -> String {
 }
 
 /// What is being read is never replaced, nor is anything put into a dataset that is. What else may be, the converter judges.
-fn protect_inputs(plan: &Plan) -> Result<(), Failure> {
+pub(super) fn protect_inputs(plan: &Plan, is_append: bool) -> Result<(), Failure> {
     // an output that cannot be found is an error of the run
     let Ok(output) = resolve_path(&plan.output) else { return Ok(()) };
-    let clash = plan.inputs.iter().find_map(|input| {
+    let others = plan.inputs.iter().filter(|input| !(is_append && **input == plan.output));
+    let clash = others.into_iter().find_map(|input| {
         let found = input.canonicalize().ok()?;
         let what = if found.starts_with(&output) {
             "would replace"

@@ -4,6 +4,7 @@ pub(crate) mod convert;
 pub(crate) mod export;
 pub(crate) mod extract;
 pub(crate) mod info;
+pub(crate) mod job;
 pub(crate) mod manual;
 pub(crate) mod measure;
 mod page_file;

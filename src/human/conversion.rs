@@ -25,7 +25,11 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
     };
     lines.push(format!("{}, {}{memory}{temporary}", seconds(report.seconds), rate(per_second)));
     if report.recalled_points > 0 {
-        lines.push(format!("{} had been read before", plural(report.recalled_points, "point")));
+        let built = match report.recalled_units {
+            0 => String::new(),
+            n => format!(", {} built", plural(n, "unit")),
+        };
+        lines.push(format!("{} had been read before{built}", plural(report.recalled_points, "point")));
     }
     lines.extend(points_lines(report));
     lines.extend(colours_line(report));

@@ -89,8 +89,10 @@ fn files_and_folders_named_in_the_architecture_exist() {
 #[test]
 fn options_named_in_the_documents_exist() {
     let mut help = String::new();
-    for command in ["convert", "export", "measure", "validate", "info", "extract", "preview", "view"] {
-        let output = Command::new(env!("CARGO_BIN_EXE_pointmill")).args([command, "--help"]).output().unwrap();
+    let commands = "convert/export/measure/validate/info/extract/preview/view/job plan/job units/job run/job finish";
+    for command in commands.split('/') {
+        let words = command.split(' ').chain(["--help"]);
+        let output = Command::new(env!("CARGO_BIN_EXE_pointmill")).args(words).output().unwrap();
         help += &String::from_utf8(output.stdout).unwrap();
     }
     let known = options(&help);

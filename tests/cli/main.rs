@@ -1,6 +1,7 @@
 //! The program as a user meets it: commands, exit codes, what is written and, above all, what is left alone.
 
 mod accuracy;
+mod appending;
 mod arguments;
 mod at_once;
 mod attributes;
@@ -20,6 +21,7 @@ mod from_datasets_places;
 mod hostile;
 mod inputs;
 mod interrupted;
+mod jobs;
 mod killed;
 mod manual;
 mod many;

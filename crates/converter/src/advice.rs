@@ -87,6 +87,14 @@ pub enum Advice {
     WaitForRun,
     /// Begin the run anew.
     StartAnew,
+    /// Choose another folder.
+    OtherFolder,
+    /// Plan the job first.
+    PlanJob,
+    /// List the units that there are.
+    ListUnits,
+    /// Do the units that are left.
+    RunUnits,
 }
 
 impl fmt::Display for Advice {
@@ -136,6 +144,10 @@ impl fmt::Display for Advice {
             Self::MoveAway => "move it away, or choose another output",
             Self::OtherOutput => "choose another output",
             Self::StartAnew => "begin anew",
+            Self::OtherFolder => "choose another folder",
+            Self::PlanJob => "plan the job first",
+            Self::ListUnits => "list the units that are ready",
+            Self::RunUnits => "do them first",
             Self::WaitForRun => "wait until it has ended, or choose another output",
         };
         f.write_str(words)

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::cloud::{Cloud, Intake};
-use crate::error::ConvertError;
+use crate::error::{ConvertError, JobFault};
 use crate::gather::{Demand, gather, is_coarse};
-use crate::job::Job;
+use crate::job::{GroupUnits, Identity, Job, Keeper, SharedJob};
 use crate::memory::peak_resident_bytes;
 use crate::outputs::{self, StagedDataset, StagedFolder, Target};
 use crate::plan::Plan;
@@ -66,14 +66,92 @@ fn run(
     events: &dyn Events,
     verify: &Verify<'_>,
 ) -> Result<Report, ConvertError> {
+    let mut job = JobOf::Own(None);
+    let made = make(disk, plan, targets, events, verify, &mut job);
+    let JobOf::Own(job) = job else { return made };
+    match made {
+        Ok(mut report) => {
+            if let Some(left) = job.and_then(Job::end) {
+                events.warning(&left);
+                report.warnings.push(left);
+            }
+            Ok(report)
+        }
+        Err(error) => {
+            match job {
+                Some(job) if job.has_units() => events.checkpoint(job.folder()),
+                Some(job) => job.end().iter().for_each(|left| events.warning(left)),
+                None => {}
+            }
+            Err(error)
+        }
+    }
+}
+
+/// The job that a run works for.
+pub(crate) enum JobOf<'a> {
+    /// Of its own, if the plan wants one.
+    Own(Option<Job>),
+    /// One that several processes share.
+    Shared(&'a SharedJob),
+}
+
+impl JobOf<'_> {
+    fn keeper(&self) -> Option<Keeper<'_>> {
+        match self {
+            Self::Own(job) => job.as_ref().map(Keeper::Own),
+            Self::Shared(job) => Some(Keeper::Shared(job)),
+        }
+    }
+
+    /// Begins, goes on, or checks that it is the job of this run. Returns true if there was nothing to go on with, though the plan
+    /// says so.
+    fn join(
+        &mut self,
+        plan: &Plan,
+        is_large: bool,
+        sources: &Sources,
+        settings: serde_json::Map<String, serde_json::Value>,
+        output: &Path,
+        disk: &Arc<dyn Disk>,
+    ) -> Result<bool, ConvertError> {
+        match self {
+            Self::Own(job) => {
+                *job = Job::of(plan, is_large, sources, settings, output, disk)?;
+                Ok(plan.resume && job.as_ref().is_some_and(Job::is_new))
+            }
+            Self::Shared(job) => {
+                job.identify(&Identity::of(plan, sources, settings, !job.is_in_parts())?)?;
+                Ok(false)
+            }
+        }
+    }
+
+    /// Points that did not have to be read again, and units that did not have to be built again.
+    fn recalled(&self) -> (u64, u64) {
+        match self {
+            Self::Own(job) => job.as_ref().map_or((0, 0), |job| (job.recalled(), job.recalled_units())),
+            Self::Shared(_) => (0, 0),
+        }
+    }
+}
+
+/// Makes the output of a plan.
+pub(crate) fn make(
+    disk: &Arc<dyn Disk>,
+    plan: &Plan,
+    targets: &[Target],
+    events: &dyn Events,
+    verify: &Verify<'_>,
+    job: &mut JobOf<'_>,
+) -> Result<Report, ConvertError> {
     let mut clock = Clock::start(events);
     clock.begin(Phase::Probe, plan.inputs.len() as u64);
     outputs::check(plan, targets)?;
     let staged = StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(disk), events)?;
     staged.warnings.iter().for_each(|w| events.warning(w));
     events.works_in(staged.path());
-    let mut job = None;
-    let written = write(plan, targets, events, &staged, disk, &mut job, &mut clock);
+    let written = write(plan, targets, events, &staged, disk, job, &mut clock);
     let written = written.and_then(|report| verify(&staged.path_of_new()).map(|()| report));
     events.settling();
     match written {
@@ -82,18 +160,13 @@ fn run(
                 events.warning(&left);
                 report.warnings.push(left);
             }
-            if let Some(left) = job.and_then(Job::end) {
-                events.warning(&left);
-                report.warnings.push(left);
-            }
             Ok(report)
         }
         Err(error) => {
-            events.phase(Phase::CleanUp, 0); // removing many files takes its time
-            drop(staged);
-            if let Some(left) = job.filter(|job| !job.has_units()).and_then(Job::end) {
-                events.warning(&left);
+            if !matches!(error, ConvertError::Job(JobFault::Unfinished { .. })) {
+                events.phase(Phase::CleanUp, 0); // removing many files takes its time
             }
+            drop(staged);
             Err(error)
         }
     }
@@ -106,7 +179,7 @@ fn write(
     events: &dyn Events,
     staged: &StagedFolder,
     disk: &Arc<dyn Disk>,
-    job: &mut Option<Job>,
+    job: &mut JobOf<'_>,
     clock: &mut Clock<'_>,
 ) -> Result<Report, ConvertError> {
     let peak_before = peak_resident_bytes();
@@ -122,26 +195,36 @@ fn write(
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, Arc::clone(disk)), events)?;
     let expected_bytes = sources.points_declared.saturating_mul(intake.schema.stride as u64);
     let is_large = expected_bytes > rt.budget.record_bytes(sources.points_declared);
-    *job = Job::of(plan, is_large, &sources, settings(plan, targets), staged.output(), disk)?;
-    let job = job.as_ref();
-    if let Some(warning) = (plan.resume && job.is_some_and(Job::is_new)).then_some(Warning::BeginsAnew) {
-        events.warning(&warning);
-        warnings.push(warning);
+    if job.join(plan, is_large, &sources, settings(plan, targets), staged.output(), disk)? {
+        events.warning(&Warning::BeginsAnew);
+        warnings.push(Warning::BeginsAnew);
     }
+    let keeper = job.keeper();
 
     let groups = outputs::groups(targets);
     let demand = Demand { moments: wants.moments, uses: groups.len() as u32 };
     let reading = rt.budget.reading(&rt.memory)?;
-    let cloud = gather(plan, &sources, &intake, demand, warnings, job, &rt, clock)?;
+    let cloud = gather(plan, &sources, &intake, demand, warnings, keeper, &rt, clock)?;
     drop(reading);
     report::check_lattice(&cloud)?;
 
-    let mut outputs = Vec::new();
-    for group in groups {
+    let (mut outputs, mut open) = (Vec::new(), Vec::new());
+    for (number, group) in groups.into_iter().enumerate() {
         clock.begin(Phase::Build, cloud.points());
         let together: Vec<&Target> = group.iter().map(|i| &targets[*i]).collect();
-        let built = build(&together, &cloud, &rt, staged, targets.len() == 1)?;
-        outputs.extend(group.into_iter().zip(built));
+        let units = keeper.map(|keeper| GroupUnits::new(keeper, number as u32));
+        match build(&together, &cloud, &rt, staged, targets.len() == 1, units) {
+            Ok(built) => outputs.extend(group.into_iter().zip(built)),
+            // those of the other groups are to be known, too
+            Err(ConvertError::Job(JobFault::Unfinished { units })) => open.extend(units),
+            Err(other) => return Err(other),
+        }
+    }
+    if let Some(job) = keeper.and_then(Keeper::shared) {
+        job.end_settling()?;
+    }
+    if !open.is_empty() {
+        return Err(JobFault::Unfinished { units: open }.into());
     }
     outputs.sort_by_key(|(target, _)| *target);
     let outputs = outputs.into_iter().map(|(_, output)| output).collect();
@@ -153,7 +236,8 @@ fn write(
         other_files: OtherFilesReport::new(&plan.other_files),
         outputs,
         temp_bytes: rt.temp.written_bytes(),
-        recalled_points: job.map_or(0, Job::recalled),
+        recalled_points: job.recalled().0,
+        recalled_units: job.recalled().1,
         phases: clock.finish(),
         seconds: clock.seconds(),
     };
@@ -174,12 +258,13 @@ fn build(
     rt: &Runtime<'_>,
     staged: &StagedFolder,
     is_only_one: bool,
+    units: Option<GroupUnits<'_>>,
 ) -> Result<Vec<OutputReport>, ConvertError> {
     let start = Instant::now();
     let datasets: Vec<_> =
         targets.iter().map(|target| staged.dataset(target.kind(), is_only_one)).collect::<Result<_, _>>()?;
     let _building = rt.budget.building(&rt.memory, cloud.points())?;
-    let mut reports = outputs::write(targets, &datasets, cloud, rt)?;
+    let mut reports = outputs::write(targets, &datasets, cloud, rt, units)?;
     datasets.iter().try_for_each(StagedDataset::sync)?;
     for (i, (report, dataset)) in reports.iter_mut().zip(&datasets).enumerate() {
         report.warnings.iter().for_each(|w| rt.events().warning(w));

@@ -8,6 +8,7 @@ use pointmill_format::{Aabb, DatasetKind, ReadError, system_reason};
 
 use crate::advice::Advice;
 use crate::plan::{ExportFormat, PlanError};
+use crate::unit_name::JobUnit;
 
 /// Why a run could not finish; the output is as it was before.
 ///
@@ -235,6 +236,26 @@ pub enum JobFault {
         /// The first such.
         path: PathBuf,
     },
+    /// The folder for a job that is to be planned holds something.
+    NotEmpty {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// The folder holds no job that was planned.
+    NotThere {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// The job has no such unit, or not yet.
+    NoUnit {
+        /// Its name.
+        unit: String,
+    },
+    /// Units are not done: those that are known, in order.
+    Unfinished {
+        /// All units of the stage that the job has reached.
+        units: Vec<JobUnit>,
+    },
     /// A file of the job is not as it was written.
     Damaged {
         /// The file.
@@ -249,6 +270,10 @@ impl JobFault {
         match self {
             Self::InUse { .. } => Some(Advice::WaitForRun),
             Self::NoJob { .. } => Some(Advice::MoveAway),
+            Self::NotEmpty { .. } => Some(Advice::OtherFolder),
+            Self::NotThere { .. } => Some(Advice::PlanJob),
+            Self::NoUnit { .. } => Some(Advice::ListUnits),
+            Self::Unfinished { .. } => Some(Advice::RunUnits),
             _ => Some(Advice::StartAnew),
         }
     }
@@ -268,6 +293,15 @@ impl fmt::Display for JobFault {
             Self::ChangedInput { path } => write!(f, "{}: changed since the unfinished run read it", path.display()),
             Self::OtherInputs { path } => {
                 write!(f, "{}: not an input of both this and the unfinished run", path.display())
+            }
+            Self::NotEmpty { folder } => write!(f, "{}: the folder for a job is not empty", folder.display()),
+            Self::NotThere { folder } => write!(f, "{}: not the folder of a planned job", folder.display()),
+            Self::NoUnit { unit } => write!(f, "{unit}: the job has no such unit, or not yet"),
+            Self::Unfinished { units } => {
+                let open = units.iter().filter(|unit| !unit.done);
+                let first =
+                    open.clone().next().map_or_else(String::new, |unit| format!("; the first is {}", unit.name));
+                write!(f, "{} of {} known units are not done{first}", open.count(), units.len())
             }
             Self::Damaged { file, byte } => {
                 write!(f, "{}: not as it was written, from byte {byte} on", file.display())

@@ -47,7 +47,9 @@ mod plan;
 mod reason;
 mod report;
 mod runtime;
+mod shared_job;
 mod sources;
+mod unit_name;
 mod warning;
 
 pub use advice::Advice;
@@ -73,5 +75,7 @@ pub use report::{
     PlannedChoice, PointsReport, PositionErrors, PrecisionReport, Report, SavedBytes, SharedPlaceReport, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
+pub use shared_job::{finish_job, job_units, plan_job, run_units};
 pub use sources::{ResolvedCrs, resolve_crs};
+pub use unit_name::{JobUnit, JobUnits, UnitName};
 pub use warning::{ColourNote, CrsNote, NameFault, Proj4Fault, RenamedAttribute, ViewerNote, Warning};

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use pointmill_format::NodeKey;
+use serde::{Deserialize, Serialize};
 
 use super::frames::JobBounds;
 use super::moments::Moments;
@@ -10,7 +11,7 @@ use super::segments::Segments;
 
 /// The points of one octree cell, wherever they are stored. Which cells these are depends on memory and on the order of
 /// the points; what must not depend on them is in the [`CensusCell`]s.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Cell {
     pub(crate) key: NodeKey,
     pub(crate) points: u64,
@@ -29,7 +30,7 @@ impl Cell {
 }
 
 /// How many points there are in an occupied cell of the octree: the same for the same points, in whatever order.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CensusCell {
     pub(crate) key: NodeKey,
     pub(crate) points: u64,
@@ -45,7 +46,7 @@ impl CensusCell {
 }
 
 /// How many points there are where.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Census {
     /// Every occupied cell of one level of the octree, in Morton order.
     pub(crate) cells: Vec<CensusCell>,
@@ -54,7 +55,7 @@ pub(crate) struct Census {
 }
 
 /// A place that very many points share.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SharedPlace {
     /// World coordinates.
     pub(crate) position: [f64; 3],

@@ -26,7 +26,7 @@ pub(crate) struct JobPoint(pub(crate) [i64; 3]);
 pub(crate) struct StoredPoint(pub(crate) [i32; 3]);
 
 /// 31-bit fractions of the root cube: the cell at level `l` is `t >> (31 - l)`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(transparent)]
 pub(crate) struct TreePoint(pub(crate) [u32; 3]);
 

@@ -1,5 +1,7 @@
 //! Every point accounted for: sums over records, before and after the changes made on purpose.
 
+use serde::{Deserialize, Serialize};
+
 use super::checksum::Checksum;
 use super::segments::Segment;
 use super::store::Store;
@@ -7,7 +9,7 @@ use super::widening::Widening;
 use crate::error::ConvertError;
 
 /// Order-independent sums over the records that an output wrote.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Ledger {
     /// Records as they were written.
     pub(crate) written: Checksum,

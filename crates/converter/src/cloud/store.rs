@@ -1,5 +1,6 @@
 //! Where records wait between being read and being built into nodes: memory first, one spill file when it must.
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -11,6 +12,12 @@ use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
 
 /// Blocks grow to this size: a few large pages, and one long write when they go to disk.
 pub(crate) const BLOCK_BYTES: usize = 8 << 20;
+
+/// An offset on the disk has the number of its file above these bits: 0 is the store's own, others were adopted.
+const OFFSET_BITS: u32 = 44;
+
+/// As many adopted files stay open.
+const MOST_OPEN: usize = 64;
 
 /// Blocks of records. A block holds records of one source and never changes; it is dropped once all of it was taken.
 pub(crate) struct Store {
@@ -30,6 +37,15 @@ pub(crate) struct Store {
     is_kept: bool,
     spill: Mutex<Option<Arc<DiskFile>>>,
     spilled: AtomicU64,
+    adopted: Mutex<Adopted>,
+}
+
+/// Files of other processes, which are only read.
+#[derive(Default)]
+struct Adopted {
+    paths: Vec<PathBuf>,
+    /// Those that are open, by index.
+    open: Vec<(usize, Arc<DiskFile>)>,
 }
 
 /// A block that outlives the process.
@@ -97,6 +113,7 @@ impl Store {
             is_kept: file.is_some(),
             spill: Mutex::new(file.map(Arc::new)),
             spilled: AtomicU64::new(0),
+            adopted: Mutex::default(),
         })
     }
 
@@ -107,46 +124,95 @@ impl Store {
 
     /// Writes the blocks from `first` on that are in memory alone, and waits until all of them are safe. They stay in memory, too.
     pub(crate) fn secure(&self, first: u32) -> Result<Vec<SafeBlock>, ConvertError> {
-        let mut safe = Vec::new();
-        for index in first..self.next_block()? {
-            let place = self.blocks.lock().map_err(|_| poisoned())?[index as usize].place.clone();
-            let written = match &place {
-                Place::Memory(records) => Some(self.write(records)?),
-                Place::Disk { .. } | Place::Gone => None,
-            };
-            let blocks = self.blocks.lock().map_err(|_| poisoned())?;
-            let Block { source, place, .. } = &blocks[index as usize];
-            let mut all = self.kept.lock().map_err(|_| poisoned())?;
-            let kept = &mut all[index as usize];
-            kept.copy = kept.copy.or(written);
-            // it may have left memory meanwhile
-            let offset = match place {
-                Place::Disk { offset } => *offset,
-                _ => kept.copy.unwrap_or(0),
-            };
-            safe.push(SafeBlock { source: *source, offset, bytes: kept.bytes, sum: kept.sum });
-        }
+        let safe = (first..self.next_block()?).map(|block| self.write_out(block)).collect::<Result<_, _>>()?;
         self.spill_file()?.sync("syncing the records")?;
         Ok(safe)
     }
 
-    /// Takes blocks that another run has made safe; returns the number of the first.
+    /// Writes a block that is in memory alone, and does not wait until it is safe: [`Self::file`] is synced for that. It stays in
+    /// memory, too.
+    pub(crate) fn write_out(&self, index: u32) -> Result<SafeBlock, ConvertError> {
+        let place = self.blocks.lock().map_err(|_| poisoned())?[index as usize].place.clone();
+        let written = match &place {
+            Place::Memory(records) => Some(self.write(records)?),
+            Place::Disk { .. } | Place::Gone => None,
+        };
+        let blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let Block { source, place, .. } = &blocks[index as usize];
+        let mut all = self.kept.lock().map_err(|_| poisoned())?;
+        let kept = &mut all[index as usize];
+        kept.copy = kept.copy.or(written);
+        // it may have left memory meanwhile
+        let offset = match place {
+            Place::Disk { offset } => *offset,
+            _ => kept.copy.unwrap_or(0),
+        };
+        Ok(SafeBlock { source: *source, offset, bytes: kept.bytes, sum: kept.sum })
+    }
+
+    /// The file that outlives the run.
+    pub(crate) fn file(&self) -> Result<Arc<DiskFile>, ConvertError> {
+        self.spill_file()
+    }
+
+    /// Takes blocks that another run has made safe in the store's own file; returns the number of the first.
     pub(crate) fn adopt(&self, safe: &[SafeBlock]) -> Result<u32, ConvertError> {
+        safe.iter().for_each(|block| {
+            self.spilled.fetch_max(block.offset + block.bytes, Ordering::Relaxed);
+        });
+        self.adopt_at(safe, 0)
+    }
+
+    /// Takes blocks that another process has made safe in a file of its own; returns the number of the first.
+    pub(crate) fn adopt_from(&self, file: PathBuf, safe: &[SafeBlock]) -> Result<u32, ConvertError> {
+        let mut adopted = self.adopted.lock().map_err(|_| poisoned())?;
+        adopted.paths.push(file);
+        let number = adopted.paths.len() as u64;
+        drop(adopted);
+        self.adopt_at(safe, number << OFFSET_BITS)
+    }
+
+    fn adopt_at(&self, safe: &[SafeBlock], start: u64) -> Result<u32, ConvertError> {
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
+        let mut kept = self.kept.lock().map_err(|_| poisoned())?;
         let first = blocks.len() as u32;
         for &SafeBlock { source, offset, bytes, sum } in safe {
             let remaining = bytes / self.stride as u64 * u64::from(self.uses);
-            self.kept.lock().map_err(|_| poisoned())?.push(Kept { bytes, sum, copy: None });
-            blocks.push(Block { source, remaining, place: Place::Disk { offset } });
-            self.spilled.fetch_max(offset + bytes, Ordering::Relaxed);
+            if self.is_kept {
+                kept.push(Kept { bytes, sum, copy: None });
+            }
+            blocks.push(Block { source, remaining, place: Place::Disk { offset: start + offset } });
         }
         Ok(first)
+    }
+
+    /// Reads from the file that an offset is in.
+    fn read_disk(&self, out: &mut [u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
+        let (file, within) = (offset >> OFFSET_BITS, offset & ((1 << OFFSET_BITS) - 1));
+        match file.checked_sub(1) {
+            None => self.spill_file()?.read_at(out, within, doing),
+            Some(index) => self.adopted_file(index as usize)?.read_at(out, within, doing),
+        }
+    }
+
+    fn adopted_file(&self, index: usize) -> Result<Arc<DiskFile>, ConvertError> {
+        let mut adopted = self.adopted.lock().map_err(|_| poisoned())?;
+        if let Some((_, file)) = adopted.open.iter().find(|(i, _)| *i == index) {
+            return Ok(Arc::clone(file));
+        }
+        let path = adopted.paths.get(index).ok_or_else(|| ConvertError::Internal("records of no file".into()))?;
+        let file = Arc::new(self.temp.read(path)?);
+        if adopted.open.len() >= MOST_OPEN {
+            adopted.open.remove(0);
+        }
+        adopted.open.push((index, Arc::clone(&file)));
+        Ok(file)
     }
 
     /// True if a block is in the file as it was written.
     pub(crate) fn is_whole(&self, block: &SafeBlock) -> Result<bool, ConvertError> {
         let mut records = vec![0; block.bytes as usize];
-        match self.spill_file()?.read_at(&mut records, block.offset, "reading the records") {
+        match self.read_disk(&mut records, block.offset, "reading the records") {
             Ok(()) => Ok(crc32c::crc32c(&records) == block.sum),
             Err(ConvertError::Io { error, .. }) if error.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
             Err(other) => Err(other),
@@ -290,8 +356,7 @@ impl Store {
                 let at = out.len();
                 os_hints::reserve(out, len);
                 out.resize(at + len, 0);
-                let spill = self.spill_file()?;
-                spill.read_at(&mut out[at..], offset + start as u64, "reading the spill file")?;
+                self.read_disk(&mut out[at..], offset + start as u64, "reading the spill file")?;
             }
             Place::Gone => return Err(ConvertError::Internal("a record was taken twice".into())),
         }

@@ -29,6 +29,8 @@ mod read_unit;
 mod select;
 mod visit;
 
+use std::sync::Arc;
+
 use pointmill_format::{Aabb, AxisGrid, Lattice, ReadError};
 
 pub(crate) use assemble::Rows;
@@ -43,7 +45,7 @@ pub(crate) use visit::{Reading, Visit};
 
 use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
-use crate::job::Job;
+use crate::job::Keeper;
 use crate::plan::{OriginPoints, Outliers, Plan, ScaleChoice};
 use crate::runtime::{Clock, Phase, Runtime};
 use crate::sources::{Fineness, Sources, far_out, intersection};
@@ -75,7 +77,7 @@ pub(crate) fn gather<'a>(
     intake: &'a Intake,
     demand: Demand,
     mut warnings: Vec<Warning>,
-    job: Option<&Job>,
+    keeper: Option<Keeper<'_>>,
     rt: &Runtime<'_>,
     clock: &mut Clock<'_>,
 ) -> Result<Cloud<'a>, ConvertError> {
@@ -93,13 +95,13 @@ pub(crate) fn gather<'a>(
             warnings.push(warning);
         };
         let (misled, complete) =
-            match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, pass, job, rt)?.run()? {
+            match Pass::new(plan, sources, intake, demand, &lattice, hint, far_cut, pass, keeper, rt)?.run()? {
                 PassEnd::Empty(stats) => return Err(nothing_to_convert(sources, &stats)),
                 PassEnd::Misled(stats) => (Some(stats), None),
                 PassEnd::Complete(mut gathered) => {
                     // a step that was requested may put points together that the sources have apart
                     if gathered.is_lossless || plan.scale == ScaleChoice::Auto {
-                        gathered.shared_places = places::find(&mut gathered, rt)?;
+                        find_shared_places(&mut gathered, keeper, rt)?;
                     }
                     (None, Some(gathered))
                 }
@@ -134,7 +136,12 @@ pub(crate) fn gather<'a>(
             }
             (_, Some(mut gathered)) => {
                 if let Some(mark) = intake.mark {
-                    gathered.stats.fallen_together = fallen::count(&gathered, mark)?;
+                    let count = || fallen::count(&gathered, mark);
+                    let fallen = match keeper.and_then(Keeper::shared) {
+                        Some(job) => job.settled("fallen", &gathered.store, count)?,
+                        None => count()?,
+                    };
+                    gathered.stats.fallen_together = fallen;
                 }
                 if gathered.lattice.reason.is_forced_coarser() && !is_said {
                     let (scale, reason) = (gathered.lattice.lattice.scale, gathered.lattice.reason);
@@ -149,6 +156,24 @@ pub(crate) fn gather<'a>(
         }
     }
     Err(Unsupported::TooFarApart.into())
+}
+
+/// Finds places that very many points share.
+fn find_shared_places(
+    gathered: &mut Gathered,
+    keeper: Option<Keeper<'_>>,
+    rt: &Runtime<'_>,
+) -> Result<(), ConvertError> {
+    let Some(job) = keeper.and_then(Keeper::shared) else {
+        gathered.shared_places = places::find(gathered, rt)?;
+        return Ok(());
+    };
+    let store = Arc::clone(&gathered.store);
+    (gathered.shared_places, gathered.census) = job.settled("places", &store, || {
+        let places = places::find(gathered, rt)?;
+        Ok((places, gathered.census.clone()))
+    })?;
+    Ok(())
 }
 
 /// What there is to say of the points once all are in.

@@ -17,10 +17,10 @@ use crate::cloud::{
     Cell, Census, CensusCell, Cube, Gathered, Intake, JobLattice, RecordFrame, SourceStats, Stats, Store, morton, node,
     xyz,
 };
-use crate::error::ConvertError;
-use crate::job::Job;
+use crate::error::{ConvertError, JobFault};
+use crate::job::{Keeper, SharedJob};
 use crate::plan::{OnFault, Plan};
-use crate::runtime::{Consumer, Evict, Reservation, Runtime};
+use crate::runtime::{Consumer, DiskFile, Evict, Reservation, Runtime};
 use crate::sources::Sources;
 use crate::warning::{SkippedPoints, reason_of};
 
@@ -44,8 +44,22 @@ pub(super) enum PassEnd {
 pub(super) struct Pass<'a> {
     context: Context<'a>,
     lattice: &'a JobLattice,
-    job: Option<&'a Job>,
+    keeper: Option<Keeper<'a>>,
     rt: &'a Runtime<'a>,
+    /// To read a unit of a job that several processes share, apart from the others.
+    start: Start<'a>,
+}
+
+/// What a pass begins with.
+#[derive(Clone)]
+struct Start<'a> {
+    plan: &'a Plan,
+    sources: &'a Sources,
+    intake: &'a Intake,
+    demand: Demand,
+    hint: Option<Hint>,
+    far_cut: Option<Aabb>,
+    number: u32,
 }
 
 impl<'a> Pass<'a> {
@@ -61,10 +75,27 @@ impl<'a> Pass<'a> {
         hint: Option<Hint>,
         far_cut: Option<Aabb>,
         number: u32,
-        job: Option<&'a Job>,
+        keeper: Option<Keeper<'a>>,
         rt: &'a Runtime<'a>,
     ) -> Result<Self, ConvertError> {
-        let file = job.map(|job| job.records(number, &rt.temp)).transpose()?;
+        let file = match keeper {
+            Some(Keeper::Own(job)) => Some(job.records(number, &rt.temp)?),
+            Some(Keeper::Shared(job)) => job.settle_records(number, &rt.temp)?,
+            None => None,
+        };
+        let start = Start { plan, sources, intake, demand, hint, far_cut, number };
+        Ok(Self::on(file, start, lattice, keeper, rt))
+    }
+
+    /// With a file for records that outlives the process.
+    fn on(
+        file: Option<DiskFile>,
+        start: Start<'a>,
+        lattice: &'a JobLattice,
+        keeper: Option<Keeper<'a>>,
+        rt: &'a Runtime<'a>,
+    ) -> Self {
+        let Start { plan, sources, intake, demand, hint, far_cut, number } = start.clone();
         let store = Store::on(file, rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
         let evict: Arc<dyn Evict> = Arc::clone(&store) as _;
         rt.memory.evict_from(Arc::downgrade(&evict));
@@ -77,40 +108,35 @@ impl<'a> Pass<'a> {
             pass: number,
             misled: false.into(),
         };
-        Ok(Self { context, lattice, job, rt })
+        Self { context, lattice, keeper, rt, start }
     }
 
     /// Reads every point.
     pub(super) fn run(self) -> Result<PassEnd, ConvertError> {
-        let (stats, mut collected, mut room) = self.read()?;
+        let (stats, collected, mut room) = self.read()?;
         let bounds = stats.bounds;
         if bounds.is_empty() {
             return Ok(PassEnd::Empty(Box::new(stats)));
         }
-        let Self { context: Context { partition, store, misled, reading, wants_moments, .. }, lattice, rt, .. } = self;
+        let Self {
+            context: Context { partition, store, misled, reading, wants_moments, pass, .. }, lattice, rt, ..
+        } = self;
         let intake = reading.intake;
         let cube = match Cube::around(&bounds, &lattice.lattice) {
             Ok(cube) if !misled.into_inner() && partition.holds(&bounds) => cube,
             _ => return Ok(PassEnd::Misled(Box::new(stats))),
         };
         let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
-        let (grouper, level) = (Grouper { store: &store, frame: &frame, wants_moments, rt }, partition.level);
-        if !partition.is_of(&cube) {
-            let all = collected.everything();
-            room.resize(all.bytes())?;
-            (collected, room) = grouper.sift(&all, level)?;
-        }
-        let Collected { cells, loose, census, .. } = collected;
-        let census = Census { cells: census.finish(level), bounds: HashMap::new() };
-        let mut nodes: Vec<(NodeKey, CellPart)> =
-            cells.into_iter().map(|(code, part)| (node(code, level), part)).collect();
-        if !loose.is_empty() {
-            let level = level_of_loose(&nodes, loose.points(), stats.points);
-            nodes = widened(nodes, level);
-            nodes.extend(grouper.group(&loose, u32::from(level))?);
-        }
-        store.drop_spare(u64::MAX)?;
-        let cells = finished(nodes);
+        let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
+        let group = || group(&grouper, &partition, collected, stats.points, &mut room);
+        let (cells, counted) = match self.keeper.and_then(Keeper::shared) {
+            Some(job) => {
+                job.enter(pass, stats.points)?;
+                job.settled("cells", &store, group)?
+            }
+            None => group()?,
+        };
+        let census = Census { cells: counted, bounds: HashMap::new() };
         let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
         room.resize(of_cells + (census.cells.capacity() * size_of::<CensusCell>()) as u64)?;
         Ok(PassEnd::Complete(Box::new(Gathered {
@@ -128,15 +154,18 @@ impl<'a> Pass<'a> {
 
     fn read(&self) -> Result<(Stats, Collected, Reservation), ConvertError> {
         let sources = self.context.sources;
-        let units = match self.job {
+        let units = match self.keeper {
             Some(_) => read_unit::units(sources, self.context.plan.checkpoint_points),
             None => std::iter::once(0..sources.pairs()).collect(),
         };
         let mut stats = Stats::new(&self.context.intake.schema);
         // what a job keeps is taken from the threads unit by unit
-        let mut seen = vec![SourceStats::default(); self.job.map_or(0, |_| sources.all.len())];
+        let mut seen = vec![SourceStats::default(); self.keeper.map_or(0, |_| sources.all.len())];
         let mut collected = Collected::default();
         let mut room = Reservation::new(&self.rt.memory, Consumer::Cells);
+        if let Some(Keeper::Shared(job)) = self.keeper {
+            self.share(job, &units)?;
+        }
         for (number, pairs) in units.into_iter().enumerate() {
             let unit = self.unit(number as u64, pairs)?;
             stats.merge(&unit.stats);
@@ -144,13 +173,20 @@ impl<'a> Pass<'a> {
             collected.merge(unit.collected);
             room.merge(unit.room);
         }
-        stats.sources = if self.job.is_some() { seen } else { self.context.take_seen()? };
+        stats.sources = if self.keeper.is_some() { seen } else { self.context.take_seen()? };
         Ok((stats, collected, room))
     }
 
     /// A unit: what another run has left of it, or read now.
     fn unit(&self, number: u64, pairs: Range<usize>) -> Result<Unit, ConvertError> {
-        let Some(job) = self.job else { return self.read_pairs(&pairs) };
+        let job = match self.keeper {
+            Some(Keeper::Own(job)) => job,
+            Some(Keeper::Shared(job)) => {
+                let unit = read_unit::recall_shared(job, &self.context, number, &pairs)?;
+                return unit.ok_or_else(|| ConvertError::Internal("a unit is not done any more".into()));
+            }
+            None => return self.read_pairs(&pairs),
+        };
         if let Some(unit) = read_unit::recall(job, &self.context, number, &pairs, self.rt)? {
             let points = unit.seen.iter().map(|(_, seen)| seen.read).sum();
             self.rt.advance(points);
@@ -160,9 +196,32 @@ impl<'a> Pass<'a> {
         let first_block = self.context.store.next_block()?;
         let mut unit = self.read_pairs(&pairs)?;
         unit.seen = self.context.take_touched()?;
-        read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit)?;
-        self.rt.events().checkpoint(job.folder());
+        read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit, self.rt)?;
+        if job.is_safe() {
+            self.rt.events().checkpoint(job.folder());
+        }
         Ok(unit)
+    }
+
+    /// Reads the units that are to be read here.
+    ///
+    /// # Errors
+    /// Some of the pass are not done, here or elsewhere.
+    fn share(&self, job: &SharedJob, units: &[Range<usize>]) -> Result<(), ConvertError> {
+        let name = |number: usize| read_unit::name(self.context.pass, number as u64);
+        for (number, pairs) in units.iter().enumerate().filter(|(number, _)| job.wants(name(*number))) {
+            let (file, records) = job.new_records(name(number), &self.rt.temp)?;
+            let alone = Pass::on(Some(file), self.start.clone(), self.lattice, None, self.rt);
+            let mut unit = alone.read_pairs(pairs)?;
+            unit.seen = alone.context.take_touched()?;
+            read_unit::keep_shared(job, &alone.context, number as u64, pairs.clone(), &records, &mut unit)?;
+        }
+        if (0..units.len()).all(|number| job.is_done(name(number))) {
+            return Ok(());
+        }
+        let points = |pairs: &Range<usize>| pairs.clone().map(|pair| self.context.sources.pair_points(pair)).sum();
+        let listed = units.iter().enumerate().map(|(n, pairs)| job.listed(name(n), points(pairs), Vec::new()));
+        Err(JobFault::Unfinished { units: listed.collect() }.into())
     }
 
     fn read_pairs(&self, pairs: &Range<usize>) -> Result<Unit, ConvertError> {
@@ -236,6 +295,34 @@ impl<'a> Pass<'a> {
             Err(error) => Err(error.into()),
         }
     }
+}
+
+/// Cells of the octree from what was read, those that came in no order of space put in order; and how many points there are
+/// where.
+fn group(
+    grouper: &Grouper<'_>,
+    partition: &Partition,
+    mut collected: Collected,
+    points: u64,
+    room: &mut Reservation,
+) -> Result<(Vec<Cell>, Vec<CensusCell>), ConvertError> {
+    let level = partition.level;
+    if !partition.is_of(&grouper.frame.cube) {
+        let all = collected.everything();
+        room.resize(all.bytes())?;
+        let sifted = grouper.sift(&all, level)?;
+        (collected, *room) = sifted;
+    }
+    let Collected { cells, loose, census, .. } = collected;
+    let counted = census.finish(level);
+    let mut nodes: Vec<(NodeKey, CellPart)> = cells.into_iter().map(|(code, part)| (node(code, level), part)).collect();
+    if !loose.is_empty() {
+        let level = level_of_loose(&nodes, loose.points(), points);
+        nodes = widened(nodes, level);
+        nodes.extend(grouper.group(&loose, u32::from(level))?);
+    }
+    grouper.store.drop_spare(u64::MAX)?;
+    Ok((finished(nodes), counted))
 }
 
 /// What a thread works with.

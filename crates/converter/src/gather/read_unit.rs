@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::context::{Collected, Context};
 use crate::cloud::{SafeBlock, SourceStats, Stats};
 use crate::error::ConvertError;
-use crate::job::Job;
+use crate::job::{Job, SharedJob};
 use crate::runtime::{Consumer, Reservation, Runtime};
 use crate::sources::Sources;
+use crate::unit_name::{Stage, UnitName};
 
 /// What the threads have made of a unit.
 pub(super) struct Unit {
@@ -49,9 +50,7 @@ struct Keeping<'a> {
 pub(super) fn units(sources: &Sources, points: u64) -> Vec<Range<usize>> {
     let (mut units, mut start, mut sum) = (Vec::new(), 0, 0u64);
     for pair in 0..sources.pairs() {
-        let (source, pieces) = sources.pair(pair);
-        let source = &sources.all[source];
-        sum += source.points_declared * pieces.len() as u64 / u64::from(source.pieces.max(1));
+        sum += sources.pair_points(pair);
         if sum >= points {
             units.push(start..pair + 1);
             (start, sum) = (pair + 1, 0);
@@ -61,7 +60,7 @@ pub(super) fn units(sources: &Sources, points: u64) -> Vec<Range<usize>> {
     units
 }
 
-/// Puts a unit into the job, once its records are safe.
+/// Puts a unit into the job as soon as its records are safe, which is not waited for.
 pub(super) fn keep(
     job: &Job,
     context: &Context<'_>,
@@ -69,20 +68,61 @@ pub(super) fn keep(
     pairs: Range<usize>,
     first_block: u32,
     unit: &mut Unit,
+    rt: &Runtime<'_>,
 ) -> Result<(), ConvertError> {
-    let blocks = context.store.secure(first_block)?;
+    let blocks: Vec<u32> = (first_block..context.store.next_block()?).collect();
+    let written = rt.in_parallel(
+        blocks.len(),
+        Vec::new,
+        |safe, i| {
+            safe.push((blocks[i], context.store.write_out(blocks[i])?));
+            Ok(())
+        },
+        |safe| safe,
+    )?;
+    let mut written: Vec<(u32, SafeBlock)> = written.into_iter().flatten().collect();
+    written.sort_unstable_by_key(|(block, _)| *block);
+    let blocks = written.into_iter().map(|(_, block)| block).collect();
+    let file = context.store.file()?;
+    keep_by(context, pairs, first_block, blocks, unit, |kept| job.add(context.pass, number, kept, file))
+}
+
+/// The same for a job that several processes share; the records are in the file `records`.
+pub(super) fn keep_shared(
+    job: &SharedJob,
+    context: &Context<'_>,
+    number: u64,
+    pairs: Range<usize>,
+    records: &str,
+    unit: &mut Unit,
+) -> Result<(), ConvertError> {
+    let blocks = context.store.secure(0)?;
+    keep_by(context, pairs, 0, blocks, unit, |kept| {
+        job.keep(name(context.pass, number), |file| {
+            file.put(&records)?;
+            file.put(kept)
+        })
+    })
+}
+
+fn keep_by(
+    context: &Context<'_>,
+    pairs: Range<usize>,
+    first_block: u32,
+    blocks: Vec<SafeBlock>,
+    unit: &mut Unit,
+    add: impl FnOnce(&Keeping<'_>) -> Result<(), ConvertError>,
+) -> Result<(), ConvertError> {
     unit.collected.shift_back(first_block);
-    let kept = Keeping {
-        pairs,
-        stats: &unit.stats,
-        collected: &unit.collected,
-        seen: &unit.seen,
-        blocks,
-        misled: context.is_misled(),
-    };
-    let added = job.add(context.pass, number, &kept);
+    let (stats, collected, seen) = (&unit.stats, &unit.collected, &unit.seen[..]);
+    let added = add(&Keeping { pairs, stats, collected, seen, blocks, misled: context.is_misled() });
     unit.collected.shift(first_block);
     added
+}
+
+/// What a unit of reading is called.
+pub(super) fn name(pass: u32, number: u64) -> UnitName {
+    UnitName { stage: Stage::Read { pass }, number }
 }
 
 /// What a job has of a unit, its records in the store; `None`: nothing.
@@ -94,11 +134,8 @@ pub(super) fn recall(
     rt: &Runtime<'_>,
 ) -> Result<Option<Unit>, ConvertError> {
     let Some(kept) = job.unit::<Kept>(context.pass, number)? else { return Ok(None) };
-    if kept.pairs != *pairs {
-        return Err(ConvertError::Internal("the units of a job are not those of the run".into()));
-    }
-    let Kept { stats, mut collected, seen, blocks, misled, .. } = kept;
-    let first = context.store.adopt(&blocks)?;
+    let first = context.store.adopt(&kept.blocks)?;
+    let blocks = &kept.blocks;
     rt.in_parallel(
         blocks.len(),
         || (),
@@ -108,11 +145,38 @@ pub(super) fn recall(
         },
         |()| (),
     )?;
-    collected.shift(first);
-    context.note_misled(misled);
-    let mut room = Reservation::new(context.memory, Consumer::Cells);
-    room.resize(collected.bytes())?;
-    Ok(Some(Unit { stats, collected, room, seen }))
+    kept.taken(context, pairs, first).map(Some)
+}
+
+/// The same for a job that several processes share. Its records are not looked at here: the sums of all points tell in the
+/// end whether they are as they were.
+pub(super) fn recall_shared(
+    job: &SharedJob,
+    context: &Context<'_>,
+    number: u64,
+    pairs: &Range<usize>,
+) -> Result<Option<Unit>, ConvertError> {
+    let unit = name(context.pass, number);
+    let Some((records, kept)) = job.recall(unit, |file| Ok((file.get::<String>(0)?, file.get::<Kept>(1)?)))? else {
+        return Ok(None);
+    };
+    let first = context.store.adopt_from(job.records(&records), &kept.blocks)?;
+    kept.taken(context, pairs, first).map(Some)
+}
+
+impl Kept {
+    /// The unit, whose blocks have got numbers from `first` on.
+    fn taken(self, context: &Context<'_>, pairs: &Range<usize>, first: u32) -> Result<Unit, ConvertError> {
+        let Self { pairs: of, stats, mut collected, seen, misled, .. } = self;
+        if of != *pairs {
+            return Err(ConvertError::Internal("the units of a job are not those of the run".into()));
+        }
+        collected.shift(first);
+        context.note_misled(misled);
+        let mut room = Reservation::new(context.memory, Consumer::Cells);
+        room.resize(collected.bytes())?;
+        Ok(Unit { stats, collected, room, seen })
+    }
 }
 
 #[cfg(test)]

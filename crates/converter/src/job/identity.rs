@@ -18,7 +18,7 @@ const RESOURCES: [&str; 2] = ["memory", "threads"];
 
 /// What a job was begun for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Identity {
+pub(crate) struct Identity {
     version: String,
     /// Everything that shapes the output, by name.
     settings: Vec<(String, String)>,
@@ -31,16 +31,17 @@ struct Fingerprint {
     bytes: u64,
     /// See [`crate::sources::Source::mark`].
     mark: u64,
-    /// Checksums of the first and the last bytes.
-    ends: [u32; 2],
+    /// Checksums of the first and the last bytes; `None`: not looked at.
+    ends: Option<[u32; 2]>,
 }
 
 impl Identity {
-    /// Of a run. `settings`: those of the report, which shape the datasets.
-    pub(super) fn of(
+    /// Of a run. `settings`: those of the report, which shape the datasets. `looks_closely`: into the files, too.
+    pub(crate) fn of(
         plan: &Plan,
         sources: &Sources,
         settings: serde_json::Map<String, serde_json::Value>,
+        looks_closely: bool,
     ) -> Result<Self, ConvertError> {
         let mut all: Vec<(String, String)> =
             settings.into_iter().map(|(name, value)| (name, value.to_string())).collect();
@@ -52,7 +53,9 @@ impl Identity {
         all.push(("size of a unit".into(), plan.checkpoint_points.to_string()));
         let inputs = sources.all.iter().map(|source| {
             let path = source.path.to_path_buf();
-            let ends = ends(&path, source.file_bytes).map_err(|e| ConvertError::io(&path, "reading the scan", e))?;
+            let look = || ends(&path, source.file_bytes);
+            let ends =
+                looks_closely.then(look).transpose().map_err(|e| ConvertError::io(&path, "reading the scan", e))?;
             Ok(Fingerprint { path, bytes: source.file_bytes, mark: source.mark(), ends })
         });
         let version = env!("CARGO_PKG_VERSION").to_owned();
@@ -76,7 +79,8 @@ impl Identity {
             if was.path != now.path {
                 return Some(JobFault::OtherInputs { path: was.path.clone() });
             }
-            if was != now {
+            let are_ends_same = was.ends.zip(now.ends).is_none_or(|(was, now)| was == now);
+            if (was.bytes, was.mark) != (now.bytes, now.mark) || !are_ends_same {
                 return Some(JobFault::ChangedInput { path: now.path.clone() });
             }
         }

@@ -5,6 +5,10 @@
 
 mod identity;
 mod journal;
+mod keeper;
+mod shared;
+mod tasks;
+mod unit_file;
 
 use std::collections::HashMap;
 use std::fs;
@@ -12,9 +16,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use identity::Identity;
+pub(crate) use identity::Identity;
 use journal::{Entry, Journal};
+pub(crate) use keeper::{GroupUnits, Keeper};
 use serde::{Deserialize, Serialize};
+pub(crate) use shared::{SharedJob, Task};
+pub(crate) use tasks::{UnitLog, make_units, put_back};
+pub(crate) use unit_file::{UnitReader, UnitWriter};
 
 use crate::error::{ConvertError, JobFault};
 use crate::plan::{Checkpoint, Plan};
@@ -22,23 +30,31 @@ use crate::runtime::disk::{create_folder, sync_folder};
 use crate::runtime::os_files::{FileLock, Locked};
 use crate::runtime::{Disk, DiskFile, TempFiles};
 use crate::sources::Sources;
+use crate::unit_name::UnitName;
 use crate::warning::Warning;
 
 const LOCK: &str = "lock";
 const JOURNAL: &str = "journal";
 const RECORDS: &str = "records-";
+const BUILT: &str = "build-";
 
 /// What a run leaves for another one.
 #[derive(Debug)]
 pub(crate) struct Job {
     folder: PathBuf,
+    disk: Arc<dyn Disk>,
     /// Until the end of the run.
     _lock: Option<FileLock>,
-    state: Mutex<State>,
+    state: Arc<Mutex<State>>,
+    /// Notes the unit that was added last.
+    noting: Mutex<Option<Noting>>,
     /// Nothing was there to go on with.
     is_new: bool,
     recalled: AtomicU64,
+    recalled_units: AtomicU64,
 }
+
+type Noting = std::thread::JoinHandle<Result<(), ConvertError>>;
 
 #[derive(Debug)]
 struct State {
@@ -85,7 +101,7 @@ impl Job {
             return Ok(None);
         }
         let folder = folder_of(output, plan.temp_dir.as_deref());
-        let identity = Identity::of(plan, sources, settings)?;
+        let identity = Identity::of(plan, sources, settings, true)?;
         let resumed = if plan.resume { Self::resume(folder.clone(), &identity, disk)? } else { None };
         resumed.map_or_else(|| Self::begin(folder, &identity, disk), Ok).map(Some)
     }
@@ -100,8 +116,17 @@ impl Job {
         let mut journal = Journal::create(&folder.join(JOURNAL), disk)?;
         journal.append(&encode(identity)?)?;
         sync_folder(&**disk, &folder).map_err(|e| ConvertError::io(&folder, "syncing the job folder", e))?;
-        let state = Mutex::new(State { journal, units: HashMap::new() });
-        Ok(Self { folder, _lock: lock, state, is_new: true, recalled: AtomicU64::new(0) })
+        let state = Arc::new(Mutex::new(State { journal, units: HashMap::new() }));
+        Ok(Self {
+            folder,
+            disk: Arc::clone(disk),
+            _lock: lock,
+            state,
+            noting: Mutex::default(),
+            is_new: true,
+            recalled: AtomicU64::new(0),
+            recalled_units: AtomicU64::new(0),
+        })
     }
 
     /// Goes on with a job; `None`: there is none, or its run ended before it had one.
@@ -126,8 +151,17 @@ impl Job {
             let body = Entry { offset: entry.offset + u64::from(skipped), bytes: entry.bytes - skipped };
             units.insert((head.pass, head.unit), body);
         }
-        let state = Mutex::new(State { journal, units });
-        Ok(Some(Self { folder, _lock: lock, state, is_new: false, recalled: AtomicU64::new(0) }))
+        let state = Arc::new(Mutex::new(State { journal, units }));
+        Ok(Some(Self {
+            folder,
+            disk: Arc::clone(disk),
+            _lock: lock,
+            state,
+            noting: Mutex::default(),
+            is_new: false,
+            recalled: AtomicU64::new(0),
+            recalled_units: AtomicU64::new(0),
+        }))
     }
 
     /// What a unit that is done has left.
@@ -139,13 +173,35 @@ impl Job {
         postcard::from_bytes(&payload).map(Some).map_err(damaged)
     }
 
-    /// Notes that a unit is done, and waits until that is safe; what it has written elsewhere must be safe already.
-    pub(crate) fn add(&self, pass: u32, unit: u64, left: &impl Serialize) -> Result<(), ConvertError> {
+    /// Notes that a unit is done once `records` are safe; neither is waited for. One that was noted before is safe then.
+    pub(crate) fn add(
+        &self,
+        pass: u32,
+        unit: u64,
+        left: &impl Serialize,
+        records: Arc<DiskFile>,
+    ) -> Result<(), ConvertError> {
         let payload = encode(&(UnitHead { pass, unit }, left))?;
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = state.journal.append(&payload)?;
-        state.units.insert((pass, unit), entry); // nobody asks for it again
+        self.settle()?;
+        let state = Arc::clone(&self.state);
+        let note = move || {
+            records.sync("syncing the records")?;
+            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+            let entry = state.journal.append(&payload)?;
+            state.units.insert((pass, unit), entry); // nobody asks for it again
+            Ok(())
+        };
+        let failed = |e| ConvertError::io(&self.folder, "starting a thread", e);
+        let thread = std::thread::Builder::new().name("journal".into()).spawn(note).map_err(failed)?;
+        *self.noting.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
         Ok(())
+    }
+
+    /// Waits until the unit that was added last is safe.
+    pub(crate) fn settle(&self) -> Result<(), ConvertError> {
+        let Some(thread) = self.noting.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
+        let failed = |_| Err(ConvertError::Internal("the thread that writes the journal failed".into()));
+        thread.join().unwrap_or_else(failed)
     }
 
     /// The file for the records of a pass; those of passes before it are not needed any more.
@@ -170,6 +226,11 @@ impl Job {
         JobFault::Damaged { file: self.records_path(pass), byte }.into()
     }
 
+    /// Where a unit leaves what it has built.
+    fn built_path(&self, unit: UnitName) -> PathBuf {
+        self.folder.join(unit.to_string())
+    }
+
     /// The folder.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
@@ -185,26 +246,57 @@ impl Job {
         self.recalled.load(Ordering::Relaxed)
     }
 
+    /// Notes units that did not have to be built again.
+    fn count_recalled_units(&self, units: u64) {
+        self.recalled_units.fetch_add(units, Ordering::Relaxed);
+    }
+
+    /// Units that did not have to be built again.
+    pub(crate) fn recalled_units(&self) -> u64 {
+        self.recalled_units.load(Ordering::Relaxed)
+    }
+
     /// True if nothing was there to go on with.
     pub(crate) fn is_new(&self) -> bool {
         self.is_new
     }
 
-    /// True if another run could go on.
-    pub(crate) fn has_units(&self) -> bool {
+    /// True if another run could go on by now.
+    pub(crate) fn is_safe(&self) -> bool {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         !state.units.is_empty()
     }
 
+    /// True if another run can go on.
+    pub(crate) fn has_units(&self) -> bool {
+        let _ = self.settle(); // what failed is not there
+        self.is_safe()
+    }
+
     /// Removes the folder; what there is to say if that cannot be done.
     pub(crate) fn end(self) -> Option<Warning> {
+        let _ = self.settle(); // it goes
         let why = remove_files(&self.folder).err()?;
         Some(Warning::Leftover { path: self.folder, why: why.to_string() })
     }
 }
 
-fn encode(value: &impl Serialize) -> Result<Vec<u8>, ConvertError> {
-    postcard::to_stdvec(value).map_err(|e| ConvertError::Internal(format!("writing the journal: {e}")))
+/// A part of a name that no other process makes.
+fn unique() -> String {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let time = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+    // processes of two machines may have the same number, but hardly begin in the same nanosecond
+    format!("{:x}-{time:x}-{:x}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+}
+
+/// Bytes for a file of a job.
+pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, ConvertError> {
+    postcard::to_stdvec(value).map_err(|e| ConvertError::Internal(format!("writing a job: {e}")))
+}
+
+/// What [`encode`] made; fails where it was not that.
+pub(crate) fn decode<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Result<T, ConvertError> {
+    postcard::from_bytes(bytes).map_err(|e| ConvertError::Internal(format!("reading a job: {e}")))
 }
 
 fn lock(folder: &Path, take: impl FnOnce(&Path) -> std::io::Result<Locked>) -> Result<Option<FileLock>, ConvertError> {
@@ -231,7 +323,7 @@ fn remove(folder: &Path) -> Result<(), ConvertError> {
 }
 
 fn is_ours(name: &str) -> bool {
-    name == LOCK || name == JOURNAL || name.starts_with(RECORDS)
+    name == LOCK || name == JOURNAL || name.starts_with(RECORDS) || name.starts_with(BUILT)
 }
 
 /// Removes our files, and the folder if nothing else is in it. The journal goes first: without it no run

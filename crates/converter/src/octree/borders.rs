@@ -47,6 +47,11 @@ impl Borders {
         }
     }
 
+    /// Between points of a sample.
+    pub(super) fn spacing(&self) -> Spacing {
+        self.spacing
+    }
+
     /// Hands the points of a node to `add`.
     fn get(&self, key: NodeKey, mut add: impl FnMut(TreePoint)) -> Result<(), ConvertError> {
         let nodes = self.nodes.read().unwrap_or_else(PoisonError::into_inner);
@@ -69,6 +74,11 @@ impl Borders {
                 Ok(())
             }
         }
+    }
+
+    /// Lets later units see what lies near the border of one.
+    pub(super) fn publish(&self, outer: Vec<(NodeKey, Vec<TreePoint>)>) -> Result<(), ConvertError> {
+        outer.into_iter().try_for_each(|(node, points)| self.put(node, points))
     }
 
     fn put(&self, key: NodeKey, points: Vec<TreePoint>) -> Result<(), ConvertError> {
@@ -142,18 +152,19 @@ impl<'a> UnitBorders<'a> {
         }
     }
 
-    /// Lets later units see what lies near the border of this one.
-    pub(super) fn publish(self) -> Result<(), ConvertError> {
+    /// What lies near the border of the unit, for later ones: [`Borders::publish`].
+    pub(super) fn into_outer(self) -> Vec<(NodeKey, Vec<TreePoint>)> {
+        let mut outer = Vec::new();
         for (node, mut points) in self.own {
             let Some(reach) = self.others.spacing.reach(node.level) else { continue };
             let inside = Inside::of(self.unit, reach);
             points.retain(|t| !inside.holds(*t));
             if !points.is_empty() {
                 points.shrink_to_fit();
-                self.others.put(node, points)?;
+                outer.push((node, points));
             }
         }
-        Ok(())
+        outer
     }
 }
 
@@ -239,7 +250,7 @@ mod tests {
             first.note(key(4, 0, 0, 1), &[own_only]);
             assert_eq!(first.around(key(4, 1, 0, 1)).unwrap(), [own_only]);
             assert_eq!(first.around(key(4, 1, 1, 1)).unwrap(), []);
-            first.publish().unwrap();
+            borders.publish(first.into_outer()).unwrap();
             let mut second = UnitBorders::new(&borders, key(3, 1, 0, 0));
             assert_eq!(second.around(key(4, 2, 0, 1)).unwrap(), [near]);
             assert_eq!(second.around(key(4, 2, 0, 2)).unwrap(), []);

@@ -216,7 +216,7 @@ impl State {
         encoders: &impl Encoders,
         ready: &mut Vec<Placed>,
     ) -> Result<(), ConvertError> {
-        let BuiltUnit { pieces, root, ledger, written, overfull_leaves } = unit;
+        let BuiltUnit { pieces, root, ledger, written, overfull_leaves, .. } = unit;
         self.ledger.merge(&ledger);
         self.placed.iter_mut().zip(&written).for_each(|(stream, sum)| stream.written.merge(sum));
         self.overfull_leaves += overfull_leaves;

@@ -5,13 +5,15 @@
 use std::collections::BTreeMap;
 
 use pointmill_format::NodeKey;
+use serde::{Deserialize, Serialize};
 
 use crate::cloud::{Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, morton};
 use crate::error::ConvertError;
+use crate::job::GroupUnits;
 use crate::runtime::{Consumer, Reservation, Runtime};
 
 /// A subtree that is built in memory.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Chunk {
     pub(super) key: NodeKey,
     pub(super) points: u64,
@@ -20,25 +22,54 @@ pub(super) struct Chunk {
 }
 
 /// A subtree that one thread builds, from the chunks that it consists of, in Morton order.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Subtree {
     pub(super) key: NodeKey,
     pub(super) chunks: Vec<Chunk>,
+}
+
+/// How a cloud is divided.
+pub(super) struct Division {
+    pub(super) subtrees: Vec<Subtree>,
+    /// A chunk with more points has them all in one place. It is that of the process that has divided the cloud.
+    pub(super) chunk_points: u64,
+    /// What the lists take.
+    _room: Reservation,
 }
 
 /// Levels by which a cell that is too large is divided at once.
 const SPLIT_LEVELS: u32 = 3;
 
 /// The largest subtrees of at most `unit_points` in Morton order, in chunks of at most `chunk_points`, unless the points of
-/// one share one place; and what these lists take.
+/// one share one place; and what these lists take. `units`: where a job keeps them.
 pub(super) fn divide(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
     unit_points: u64,
     chunk_points: u64,
-) -> Result<(Vec<Subtree>, Reservation), ConvertError> {
-    let max_points = unit_points.min(chunk_points);
+    units: Option<GroupUnits<'_>>,
+) -> Result<Division, ConvertError> {
     let mut room = Reservation::new(&rt.memory, Consumer::Cells);
+    let (subtrees, chunk_points) = match units.and_then(|units| Some((units, units.shared()?))) {
+        Some((units, job)) => job.settled(&units.division(), &cloud.store, || {
+            Ok((divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points))
+        })?,
+        None => (divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points),
+    };
+    let bytes = |chunk: &Chunk| chunk.segments.bytes() + size_of::<Chunk>() as u64;
+    let of_subtree = |s: &Subtree| s.chunks.iter().map(bytes).sum::<u64>() + 2 * size_of::<Subtree>() as u64;
+    room.resize(subtrees.iter().map(of_subtree).sum())?;
+    Ok(Division { subtrees, chunk_points, _room: room })
+}
+
+fn divide_now(
+    cloud: &Cloud<'_>,
+    rt: &Runtime<'_>,
+    unit_points: u64,
+    chunk_points: u64,
+    room: &mut Reservation,
+) -> Result<Vec<Subtree>, ConvertError> {
+    let max_points = unit_points.min(chunk_points);
     let mut lists = 0;
     let mut regrouper = Regrouper::new(&cloud.store, cloud.frame.stride);
     let mut cells = Vec::with_capacity(cloud.cells.len());
@@ -62,10 +93,7 @@ pub(super) fn divide(
         choose(key, cells, chunk_points, &mut |key, cells| chunks.push(Chunk::of(key, cells)));
         subtrees.push(Subtree { key, chunks });
     });
-    let bytes = |chunk: &Chunk| chunk.segments.bytes() + size_of::<Chunk>() as u64;
-    let of_subtree = |s: &Subtree| s.chunks.iter().map(bytes).sum::<u64>() + 2 * size_of::<Subtree>() as u64;
-    room.resize(subtrees.iter().map(of_subtree).sum())?;
-    Ok((subtrees, room))
+    Ok(subtrees)
 }
 
 impl Chunk {

@@ -43,6 +43,11 @@ impl List {
         Self { count, place: Place::Disk(Arc::new(file), 0), is_one_place: true }
     }
 
+    /// Records that are in a file from a byte on, and stay there.
+    pub(super) fn in_file(file: Arc<DiskFile>, start: u64, count: u64, is_one_place: bool) -> Self {
+        Self { count, place: Place::Disk(file, start), is_one_place }
+    }
+
     /// The records, if they are in memory.
     pub(super) fn in_memory(&self) -> Option<&[u8]> {
         match &self.place {

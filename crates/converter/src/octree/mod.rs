@@ -7,6 +7,8 @@
 //!    neighbours have taken over their [`borders`]. Nodes above a chunk do the same with [`lists`] of records, in memory or
 //!    on the disk.
 //! 4. [`commit`] puts the finished nodes of the units behind one another.
+//! 5. With a job, what a unit comes to is kept ([`keep`]), so that another run, or another process, need not build it; units that
+//!    several processes [`share`] are built one by one.
 //!
 //! Finished nodes go to a [`sink`], behind which a format stands, or to several ([`sinks`]), each with its own bytes. The order of nodes depends on the tree alone: within a
 //! unit, a node's children are written, in order, once the node can no longer be asked for a point; the root comes last.
@@ -16,12 +18,15 @@ mod chunk;
 mod commit;
 mod divide;
 mod finished;
+mod keep;
 mod list;
 mod lists;
+mod make;
 mod order;
 mod place;
 mod raise;
 mod sample;
+mod share;
 mod sink;
 mod sinks;
 mod unit;
@@ -30,21 +35,24 @@ mod units;
 pub(crate) use commit::Octree;
 #[cfg(feature = "bench")]
 pub(crate) use order::{OrderScratch, Point, order};
+#[cfg(feature = "bench")]
+pub(crate) use sample::Sampler;
 pub use sample::Sampling;
-pub(crate) use sample::{Sampler, Spacing};
+pub(crate) use sample::Spacing;
 pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
 pub(crate) use sinks::AnySink;
 use sinks::{Several, Sinks};
 
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
+use crate::job::GroupUnits;
 use crate::runtime::Runtime;
 use borders::Borders;
 use chunk::ChunkPlan;
 use commit::Committer;
 use list::Lists;
-use unit::{Shared, UnitBuilder};
-use units::Work;
+use make::Making;
+use unit::Shared;
 
 /// How a tree is built.
 #[derive(Debug, Clone, Copy)]
@@ -64,9 +72,10 @@ pub(crate) fn build(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
     settings: OctreeSettings,
+    units: Option<GroupUnits<'_>>,
     sink: &impl NodeSink,
 ) -> Result<Octree, ConvertError> {
-    let tree = build_for(cloud, rt, settings, sink)?.pop();
+    let tree = build_for(cloud, rt, settings, units, sink)?.pop();
     tree.ok_or_else(|| ConvertError::Internal("a tree for no format".into()))
 }
 
@@ -75,21 +84,26 @@ pub(crate) fn build_all(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
     settings: OctreeSettings,
+    units: Option<GroupUnits<'_>>,
     sinks: &[&dyn AnySink],
 ) -> Result<Vec<Octree>, ConvertError> {
-    build_for(cloud, rt, settings, &Several::new(sinks, cloud.frame.stride))
+    build_for(cloud, rt, settings, units, &Several::new(sinks, cloud.frame.stride))
 }
 
 fn build_for<S: Sinks>(
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
     settings: OctreeSettings,
+    kept: Option<GroupUnits<'_>>,
     sinks: &S,
 ) -> Result<Vec<Octree>, ConvertError> {
     let OctreeSettings { sampling, spacing, leaf_capacity, most_points, unit_points } = settings;
     let (chunk_points, window) = rt.budget.units(unit_points.min(cloud.points()), cloud.frame.stride);
-    let (subtrees, _room) = divide::divide(cloud, rt, unit_points, chunk_points)?;
-    let units = units::in_order(subtrees);
+    let mut division = divide::divide(cloud, rt, unit_points, chunk_points, kept)?;
+    let chunk_points = division.chunk_points;
+    let units = units::in_order(std::mem::take(&mut division.subtrees));
+    let all: Vec<_> = units.iter().map(|unit| (unit.key, unit.points())).collect();
+    let kept = kept.map(|kept| kept.divided(&all)).transpose()?;
     let usual_points = chunk_points.min(cloud.points());
     let shared = Shared {
         plan: ChunkPlan {
@@ -105,30 +119,11 @@ fn build_for<S: Sinks>(
         chunk_points,
         chunk_bytes: rt.budget.chunk_bytes(),
     };
+    if let Some((of, job)) = kept.and_then(|of| Some((of, of.in_parts()?))) {
+        share::share(&units, of, job, &shared, sinks, sampling)?;
+    }
     let committer = Committer::new(units.len(), window, sinks, &shared.lists, rt);
-    rt.in_parallel_or(
-        units.len(),
-        || UnitBuilder::new(&shared, Sampler::new(sampling, spacing), sinks.encoders()),
-        |builder, index| {
-            let unit = &units[index];
-            let Some(buffers) = committer.admit(index) else { return Ok(()) };
-            rt.check_stop()?; // it may have waited long
-            let wait = || committer.wait_for(index, unit.class_start);
-            let built = match &unit.work {
-                Work::Subtree(chunks) => builder.subtree(unit.key, chunks, buffers, wait)?,
-                Work::Above(children) => match wait() {
-                    true => Some(builder.above(unit.key, committer.take(children)?, buffers)?),
-                    false => None,
-                },
-            };
-            let Some(built) = built else { return Ok(()) };
-            committer.submit(index, built, &mut builder.encoder)?;
-            rt.advance(unit.points());
-            Ok(())
-        },
-        |_| (),
-        |index| committer.stop_above(index),
-    )?;
+    Making { units: &units, kept, shared: &shared, committer: &committer, sinks, sampling }.all()?;
     let trees = committer.finish()?;
     trees.iter().try_for_each(|tree| tree.ledger.check(&cloud.stats.checksum))?;
     Ok(trees)

@@ -1,12 +1,13 @@
 //! Where finished nodes go: the octree knows no format.
 
 use pointmill_format::NodeKey;
+use serde::{Deserialize, Serialize};
 
 use crate::cloud::Checksum;
 use crate::error::ConvertError;
 
 /// A node that nothing changes any more, and where its bytes are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct FinishedNode {
     pub(crate) key: NodeKey,
     pub(crate) points: u32,
@@ -33,6 +34,12 @@ pub(crate) trait NodeSink: Sync {
     /// Whatever writing them meets.
     fn write(&self, nodes: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError>;
 
+    /// Takes what an encoder has noticed ([`NodeEncoder::take_notes`]), perhaps in another process.
+    ///
+    /// # Errors
+    /// Notes of something else.
+    fn add_notes(&self, notes: &[u8]) -> Result<(), ConvertError>;
+
     /// Takes a part of the bytes of a node that has too many to have them in memory together: those from `at` on. The parts
     /// of a node come in order.
     ///
@@ -54,6 +61,13 @@ pub(crate) trait NodeEncoder {
         written: &mut Checksum,
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError>;
+
+    /// What was noticed since the last call, or since the beginning: of the points of these nodes. What nobody takes goes to the
+    /// sink once the encoder is dropped.
+    ///
+    /// # Errors
+    /// It cannot be put into bytes.
+    fn take_notes(&mut self) -> Result<Vec<u8>, ConvertError>;
 
     /// Bytes of a point, if the bytes of a node are those of its points one after the other, so that they may be encoded in
     /// parts.

@@ -42,12 +42,18 @@ pub(super) trait Sinks: Sync {
     /// As [`NodeSink::write`].
     fn write(&self, stream: usize, nodes: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError>;
 
+    /// As [`NodeSink::add_notes`], of each stream.
+    fn add_notes(&self, notes: &[Vec<u8>]) -> Result<(), ConvertError>;
+
     /// As [`NodeSink::write_part`].
     fn write_part(&self, stream: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError>;
 }
 
 /// Makes the bytes of nodes, for each stream.
 pub(super) trait Encoders {
+    /// Number of streams.
+    fn count(&self) -> usize;
+
     /// As [`NodeEncoder::encode`].
     fn encode<'r>(
         &mut self,
@@ -55,6 +61,9 @@ pub(super) trait Encoders {
         records: impl ExactSizeIterator<Item = &'r [u8]>,
         streams: &mut [Stream],
     ) -> Result<(), ConvertError>;
+
+    /// As [`NodeEncoder::take_notes`], of each stream.
+    fn take_notes(&mut self) -> Result<Vec<Vec<u8>>, ConvertError>;
 
     /// Bytes of a node that is encoded in parts.
     fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64>;
@@ -85,12 +94,20 @@ impl<S: NodeSink> Sinks for S {
         NodeSink::write(self, nodes, bytes, offset)
     }
 
+    fn add_notes(&self, notes: &[Vec<u8>]) -> Result<(), ConvertError> {
+        notes.iter().try_for_each(|notes| NodeSink::add_notes(self, notes))
+    }
+
     fn write_part(&self, _: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         NodeSink::write_part(self, node, bytes, at)
     }
 }
 
 impl<E: NodeEncoder> Encoders for E {
+    fn count(&self) -> usize {
+        1
+    }
+
     fn encode<'r>(
         &mut self,
         key: NodeKey,
@@ -99,6 +116,10 @@ impl<E: NodeEncoder> Encoders for E {
     ) -> Result<(), ConvertError> {
         let [Stream { written, bytes, .. }] = streams else { return Err(uneven()) };
         NodeEncoder::encode(self, key, records, written, bytes)
+    }
+
+    fn take_notes(&mut self) -> Result<Vec<Vec<u8>>, ConvertError> {
+        Ok(vec![NodeEncoder::take_notes(self)?])
     }
 
     fn large_bytes(&self, _: usize, key: NodeKey, points: u64) -> Option<u64> {
@@ -122,6 +143,9 @@ pub(crate) trait AnySink: Sync {
     /// As [`NodeSink::write`].
     fn write_any(&self, nodes: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError>;
 
+    /// As [`NodeSink::add_notes`].
+    fn add_any_notes(&self, notes: &[u8]) -> Result<(), ConvertError>;
+
     /// As [`NodeSink::write_part`].
     fn write_any_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError>;
 }
@@ -137,6 +161,9 @@ pub(crate) trait AnyEncoder {
         written: &mut Checksum,
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError>;
+
+    /// As [`NodeEncoder::take_notes`].
+    fn take_any_notes(&mut self) -> Result<Vec<u8>, ConvertError>;
 
     /// As [`Encoders::large_bytes`]; `None`: nodes are not encoded in parts.
     fn any_large_bytes(&self, key: NodeKey, points: u64) -> Option<u64>;
@@ -154,6 +181,10 @@ impl<S: NodeSink> AnySink for S {
         NodeSink::write(self, nodes, bytes, offset)
     }
 
+    fn add_any_notes(&self, notes: &[u8]) -> Result<(), ConvertError> {
+        NodeSink::add_notes(self, notes)
+    }
+
     fn write_any_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         NodeSink::write_part(self, node, bytes, at)
     }
@@ -169,6 +200,10 @@ impl<E: NodeEncoder> AnyEncoder for E {
         out: &mut Vec<u8>,
     ) -> Result<(), ConvertError> {
         NodeEncoder::encode(self, key, rows.chunks_exact(stride), written, out)
+    }
+
+    fn take_any_notes(&mut self) -> Result<Vec<u8>, ConvertError> {
+        NodeEncoder::take_notes(self)
     }
 
     fn any_large_bytes(&self, key: NodeKey, points: u64) -> Option<u64> {
@@ -217,6 +252,10 @@ impl Sinks for Several<'_> {
         self.sink(stream)?.write_any(nodes, bytes, offset)
     }
 
+    fn add_notes(&self, notes: &[Vec<u8>]) -> Result<(), ConvertError> {
+        notes.iter().enumerate().try_for_each(|(stream, notes)| self.sink(stream)?.add_any_notes(notes))
+    }
+
     fn write_part(&self, stream: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         self.sink(stream)?.write_any_part(node, bytes, at)
     }
@@ -231,6 +270,10 @@ pub(super) struct SeveralEncoders<'s> {
 }
 
 impl Encoders for SeveralEncoders<'_> {
+    fn count(&self) -> usize {
+        self.encoders.len()
+    }
+
     fn encode<'r>(
         &mut self,
         key: NodeKey,
@@ -249,6 +292,10 @@ impl Encoders for SeveralEncoders<'_> {
             self.rows = Vec::new();
         }
         Ok(())
+    }
+
+    fn take_notes(&mut self) -> Result<Vec<Vec<u8>>, ConvertError> {
+        self.encoders.iter_mut().map(|encoder| encoder.take_any_notes()).collect()
     }
 
     fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64> {

@@ -12,7 +12,7 @@ use super::place;
 use super::raise::{Nodes, Pending};
 use super::sample::Sampler;
 use super::sinks::{Encoders, Stream};
-use crate::cloud::{Checksum, Ledger};
+use crate::cloud::{Checksum, Ledger, TreePoint};
 use crate::error::ConvertError;
 use crate::runtime::{Consumer, Reservation, Runtime, os_hints};
 
@@ -27,7 +27,14 @@ pub(super) struct BuiltUnit {
     pub(super) written: Vec<Checksum>,
     /// Leaves above the capacity, because their points share one place.
     pub(super) overfull_leaves: u64,
+    /// What was noticed of its points, for each stream; of a unit that is kept.
+    pub(super) notes: Vec<Vec<u8>>,
+    /// What was taken near its borders.
+    pub(super) outer: Outer,
 }
+
+/// Points near the border of a unit, by node.
+pub(super) type Outer = Vec<(NodeKey, Vec<TreePoint>)>;
 
 /// What threads share that build units.
 pub(super) struct Shared<'a> {
@@ -54,6 +61,11 @@ impl<'a, E: Encoders> UnitBuilder<'a, E> {
     pub(super) fn new(shared: &'a Shared<'a>, sampler: Sampler, encoder: E) -> Self {
         let lists = ListMemory::new(Reservation::new(&shared.rt.memory, Consumer::Work));
         Self { shared, encoder, sampler, chunk: ChunkMemory::default(), lists }
+    }
+
+    /// Streams that it writes to.
+    pub(super) fn streams(&self) -> usize {
+        self.encoder.count()
     }
 
     /// Builds a subtree in `buffers`, one for each stream, to use again. `wait` is called before the first sample is taken: it returns
@@ -146,9 +158,9 @@ impl<'a, E: Encoders> UnitBuilder<'a, E> {
             admit(&self.shared.lists, &mut root)?;
             Some(root)
         };
-        borders.publish()?;
         let (pieces, written) = finished.into_pieces();
-        Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves })
+        let outer = borders.into_outer();
+        Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes: Vec::new(), outer })
     }
 
     fn nodes<'n>(&'n mut self, borders: &'n mut UnitBorders<'a>, finished: &'n mut Finished) -> ListNodes<'n, 'a, E> {

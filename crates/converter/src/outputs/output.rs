@@ -10,6 +10,7 @@ use super::octrees::{ChosenSpacing, TreeSettings};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
+use crate::job::GroupUnits;
 use crate::octree::{AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{OutputReport, PlannedChoice, SavedBytes};
@@ -68,9 +69,15 @@ pub(crate) trait Output: Debug + Send + Sync {
         None
     }
 
-    /// Builds and writes the dataset.
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
-        let _ = (cloud, rt, to);
+    /// Builds and writes the dataset. `units`: where a job keeps what its units come to.
+    fn write(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        to: &StagedDataset,
+        units: Option<GroupUnits<'_>>,
+    ) -> Result<OutputReport, ConvertError> {
+        let _ = (cloud, rt, to, units);
         Err(ConvertError::Internal(format!("{} has no writer of its own", self.kind())))
     }
 }
@@ -102,7 +109,13 @@ pub(crate) trait OctreeWriter {
     ///
     /// # Errors
     /// As [`crate::octree::build`].
-    fn build(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError>;
+    fn build(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        settings: OctreeSettings,
+        units: Option<GroupUnits<'_>>,
+    ) -> Result<Octree, ConvertError>;
 
     /// Writes what is around the nodes, and syncs all.
     ///

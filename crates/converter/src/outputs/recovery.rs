@@ -3,13 +3,14 @@
 use std::cmp::Ordering;
 
 use pointmill_format::Lattice;
+use serde::{Deserialize, Serialize};
 
 use crate::cloud::{BigSort, Cloud};
 use crate::error::ConvertError;
 use crate::runtime::Runtime;
 
 /// Points that do not come back.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Lost {
     /// Points whose decoded position is rounded to other integers than their own.
     pub(super) points: u64,

@@ -5,6 +5,7 @@ use super::output::{OctreeOutput, OctreeWriter, Target};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
+use crate::job::GroupUnits;
 use crate::octree::{self, AnySink};
 use crate::report::OutputReport;
 use crate::runtime::Runtime;
@@ -24,18 +25,19 @@ pub(crate) fn groups(targets: &[Target]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Builds and writes the datasets of a group, one for each target.
+/// Builds and writes the datasets of a group, one for each target. `units`: where a job keeps what its units come to.
 pub(crate) fn write(
     targets: &[&Target],
     datasets: &[StagedDataset],
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
+    units: Option<GroupUnits<'_>>,
 ) -> Result<Vec<OutputReport>, ConvertError> {
     let octrees: Vec<&dyn OctreeOutput> = targets.iter().filter_map(|target| target.output().octree()).collect();
     if octrees.len() == targets.len() {
-        return write_octrees(&octrees, datasets, cloud, rt);
+        return write_octrees(&octrees, datasets, cloud, rt, units);
     }
-    targets.iter().zip(datasets).map(|(target, to)| target.output().write(cloud, rt, to)).collect()
+    targets.iter().zip(datasets).map(|(target, to)| target.output().write(cloud, rt, to, units)).collect()
 }
 
 /// Builds the tree that `outputs` share, each in its dataset of `datasets`.
@@ -47,6 +49,7 @@ fn write_octrees(
     datasets: &[StagedDataset],
     cloud: &Cloud<'_>,
     rt: &Runtime<'_>,
+    units: Option<GroupUnits<'_>>,
 ) -> Result<Vec<OutputReport>, ConvertError> {
     let Some(tree) = outputs.first().map(|output| output.tree()) else { return Ok(Vec::new()) };
     let spacing = ChosenSpacing::of(tree.sampling, tree.spacing, cloud)?;
@@ -54,10 +57,10 @@ fn write_octrees(
     let writers: Vec<Box<dyn OctreeWriter>> = begun.collect::<Result<_, _>>()?;
     let settings = tree.of(&spacing, cloud);
     let trees = match &writers[..] {
-        [alone] => vec![alone.build(cloud, rt, settings)?],
+        [alone] => vec![alone.build(cloud, rt, settings, units)?],
         several => {
             let sinks: Vec<&dyn AnySink> = several.iter().map(|writer| writer.sink()).collect();
-            octree::build_all(cloud, rt, settings, &sinks)?
+            octree::build_all(cloud, rt, settings, units, &sinks)?
         }
     };
     writers.into_iter().zip(trees).map(|(writer, tree)| writer.finish(tree)).collect()

@@ -27,6 +27,7 @@ pub(crate) struct Account {
     pub(crate) temp_bytes: u64,
     /// That did not have to be read again.
     pub(crate) recalled_points: u64,
+    pub(crate) recalled_units: u64,
     pub(crate) phases: Vec<PhaseTime>,
     /// Wall seconds in all.
     pub(crate) seconds: f64,
@@ -37,7 +38,8 @@ pub(crate) struct Account {
 /// # Errors
 /// Points that do not add up.
 pub(crate) fn report(mut cloud: Cloud<'_>, account: Account) -> Result<Report, ConvertError> {
-    let Account { settings, other_files, outputs, temp_bytes, recalled_points, phases, seconds } = account;
+    let Account { settings, other_files, outputs, temp_bytes, recalled_points, recalled_units, phases, seconds } =
+        account;
     let mut warnings = std::mem::take(&mut cloud.warnings);
     cloud.cells = Vec::new();
     warnings.extend(outputs.iter().flat_map(|o| &o.warnings).cloned());
@@ -54,6 +56,7 @@ pub(crate) fn report(mut cloud: Cloud<'_>, account: Account) -> Result<Report, C
         checksum_in: stats.checksum.to_string(),
         temp_bytes,
         recalled_points,
+        recalled_units,
         output_bytes: outputs.iter().map(|o| o.bytes).sum(),
         warnings,
         outputs,

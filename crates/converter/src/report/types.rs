@@ -49,6 +49,9 @@ pub struct Report {
     /// Points that an earlier run had read already, before it was ended.
     #[serde(skip_serializing_if = "is_zero")]
     pub recalled_points: u64,
+    /// Parts of the outputs that an earlier run had built already.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub recalled_units: u64,
     /// Bytes of the datasets.
     pub output_bytes: u64,
     /// What the user should know, an object with `kind` and `text` each.

@@ -184,6 +184,14 @@ impl TempFiles {
     }
 }
 
+impl TempFiles {
+    /// A file that another process has made, to read.
+    pub(crate) fn read(&self, path: &Path) -> Result<DiskFile, ConvertError> {
+        let file = File::open(path).map_err(|e| ConvertError::io(path, "opening the file", e))?;
+        Ok(DiskFile { file, path: path.to_path_buf(), disk: Arc::clone(&self.disk), written: None })
+    }
+}
+
 /// A [`DiskFile`] written from front to back.
 pub(crate) struct Sequential<'a> {
     file: &'a DiskFile,

@@ -218,6 +218,13 @@ impl Sources {
         (source, first as usize..(first + PIECES_TOGETHER).min(u64::from(s.pieces)) as usize)
     }
 
+    /// Points of a pair, as headers say.
+    pub(crate) fn pair_points(&self, number: usize) -> u64 {
+        let (source, pieces) = self.pair(number);
+        let Some(s) = self.all.get(source) else { return 0 };
+        s.points_declared * pieces.len() as u64 / u64::from(s.pieces.max(1))
+    }
+
     /// True if headers say where all points are, as opposed to a sample.
     pub(crate) fn declares_bounds(&self) -> bool {
         self.all.iter().filter_map(|s| s.extent.as_ref()).all(|extent| !extent.is_sampled)

@@ -32,6 +32,7 @@ pub fn grey(intensity: u16, least: u16, greatest: u16) -> u8 {
 }
 
 /// Sums up the colours of a cell.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ColourSum {
     points: u64,

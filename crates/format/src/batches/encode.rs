@@ -31,6 +31,7 @@ impl Default for EncodedBatch {
 }
 
 /// Errors of decoded positions, summed up: by plane count (one, two, three), then by axis. World units.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct ErrorSums {

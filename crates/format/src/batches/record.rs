@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::Precision;
 
 /// A batch: 32 bytes, as they are in the file and in a shader's structured buffer.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct BatchRecord {

@@ -18,6 +18,7 @@ pub const MAX_DEPTH: usize = 512;
 pub(super) const MAX_NAMED_DEPTH: usize = 250;
 
 /// A node. Its index in preorder is not part of it: the low child of node `i` is `i + 1`.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Node {
@@ -30,6 +31,7 @@ pub struct Node {
 }
 
 /// What a node is. Version 1 of the format has these three.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NodeKind {
     /// Split by a plane.

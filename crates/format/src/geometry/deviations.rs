@@ -10,6 +10,7 @@
 /// d.add([-0.5, 0.0, -0.25]);
 /// assert_eq!((d.points, d.max, d.sum), (2, [0.5, 0.0, 0.25], [0.0, 0.0, -0.5]));
 /// ```
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Deviations {

@@ -29,6 +29,10 @@ impl NodeEncoder for NoBytes {
         Ok(())
     }
 
+    fn take_notes(&mut self) -> Result<Vec<u8>, ConvertError> {
+        Ok(Vec::new())
+    }
+
     fn row_bytes(&self) -> Option<u64> {
         None
     }

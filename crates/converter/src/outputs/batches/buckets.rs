@@ -6,6 +6,8 @@
 
 use std::collections::HashMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::frame::{BUCKET_LEVELS, Frame, code_of};
 use crate::cloud::{Cell, Cloud, JobBounds, Regrouper, Segments, position};
 use crate::error::ConvertError;
@@ -21,7 +23,7 @@ const SPLIT_LEVELS: u32 = 3;
 const MOST_FIT: u64 = 16;
 
 /// A run of the Morton order that one thread sorts and encodes.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Task {
     /// Morton index of its first point.
     pub(super) first_point: u64,

@@ -97,7 +97,7 @@ pub(super) fn finish(
     let planes = planes::needed(cloud, settings.planes, &records, frame.lattice.scale, &errors);
     if let Some(needed) = planes.needed.filter(|needed| *needed < layout.precision()) {
         layout = layout.with_precision(needed);
-        output.file.set_len(layout.end_of_points(), "leaving out a plane")?;
+        output.cut(layout.end_of_points())?;
     }
     output.write(&record_bytes(&records), layout.records.offset)?;
     let changes = |when: usize| patches.values().filter(|patch| patch.changes()[when]).count() as u64;

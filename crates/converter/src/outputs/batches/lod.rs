@@ -1,6 +1,7 @@
 //! Levels of detail of a task's points, in one pass in Morton order with one open cell a level.
 
 use pointmill_format::batches::{ColourSum, colour_word, rgb_of};
+use serde::{Deserialize, Serialize};
 
 use super::frame::Frame;
 
@@ -8,7 +9,7 @@ use super::frame::Frame;
 pub(super) const LEVELS: usize = 3;
 
 /// What is known of a cell.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct OpenCell {
     /// Its index in the grid of its level.
     pub(super) key: [u32; 3],
@@ -22,7 +23,7 @@ pub(super) struct OpenCell {
 }
 
 /// Cells of one level of a task that may go on in its neighbours.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) enum Edges {
     /// All points lie in one cell.
     One(OpenCell),

@@ -18,6 +18,8 @@ mod task;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use pointmill_format::DatasetKind;
 use pointmill_format::batches::Layout;
 use serde_json::{Map, Value};
@@ -30,6 +32,7 @@ use super::recovery::Recovery;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
+use crate::job::{GroupUnits, UnitLog, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, ScaleChoice, Setting};
 use crate::report::{self, ChoiceReason, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -39,7 +42,7 @@ use content::Content;
 use finish::finish;
 use frame::{Frame, refused};
 use large::WORD_BYTES;
-use output::{BatchFile, ORIGINAL_BYTES};
+use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part};
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
 
 /// Tasks per thread, so that threads end together; their sizes. Small ones share too much with each other, large ones
@@ -118,7 +121,13 @@ impl Output for BatchesSettings {
         SavedBytes::NoPlane // the finished file tells
     }
 
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+    fn write(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        to: &StagedDataset,
+        units: Option<GroupUnits<'_>>,
+    ) -> Result<OutputReport, ConvertError> {
         let (points, per_point) = (cloud.points(), bytes_per_point(cloud.frame.stride));
         let most = rt.budget.task_points(per_point, MAX_TASK_POINTS);
         let task_points = (points / (rt.threads as u64 * TASKS_PER_THREAD)).max(MIN_TASK_POINTS).min(most);
@@ -126,28 +135,50 @@ impl Output for BatchesSettings {
         let frame = Frame::new(cloud, self.lod_cell)?;
         let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();
         let layout = Layout::new(points, &attributes, planes::at_most(cloud, &frame, self.planes)).map_err(refused)?;
-        let tasks = buckets::tasks(cloud, rt, &frame, task_points)?;
-        let sorted = Store::new(rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
+        let job = units.and_then(|units| Some((units, units.shared()?)));
+        let records = job.map(|(_, job)| job.more_records(&rt.temp)).transpose()?.flatten();
+        let (records, records_name) = records.unzip();
+        let sorted = Store::on(records, rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
+        let divide = || buckets::tasks(cloud, rt, &frame, task_points);
+        let cut = |tasks| large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points);
+        let tasks = match job {
+            Some((units, job)) => {
+                let tasks: Vec<Task> = job.settled(&units.division(), &cloud.store, divide)?;
+                job.settled_in(&format!("{}, cut", units.division()), &sorted, records_name, || cut(tasks))?
+            }
+            None => cut(divide()?)?,
+        };
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
         room.resize(tasks.iter().map(|task| task.segments.bytes() + size_of::<Task>() as u64).sum())?;
-        let tasks = large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points)?;
-        let file = to.create(self.kind().marker_file())?;
-        // what is compressed is written raw first, elsewhere
-        let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
-        let originals = Store::new(rt.temp.clone(), ORIGINAL_BYTES, 1, &rt.memory);
-        let output =
-            BatchFile::new(raw.as_ref().unwrap_or(&file), &layout, originals, Recovery::new(cloud), frame.grid.origin);
-        let shop = Workshop {
+        let means = Means {
+            cloud,
+            rt,
             frame: &frame,
             content: &content,
-            store: &cloud.store,
+            layout: &layout,
             sorted: &sorted,
-            stride: cloud.frame.stride,
-            output: &output,
             keeps_originals: self.originals,
             usual_points: task_points.min(points),
         };
-        let results = encode(rt, &shop, &tasks)?;
+        let division: Vec<_> = tasks.iter().map(|task| (task.first_point, task.points, task.start)).collect();
+        let units = units.map(|units| units.divided(&division)).transpose()?;
+        if let Some(units) = units {
+            means.units(units, &tasks)?;
+        }
+        let file = to.create(self.kind().marker_file())?;
+        // what is compressed is written raw first, elsewhere
+        let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
+        let output = BatchFile::new(
+            raw.as_ref().unwrap_or(&file),
+            &layout,
+            means.originals(),
+            Recovery::new(cloud),
+            frame.grid.origin,
+        );
+        let results = match units {
+            Some(units) => means.recall(units, &tasks, &output)?,
+            None => encode(rt, &means.shop(&output), &tasks)?,
+        };
         results.ledger.check(&cloud.stats.checksum)?;
         let mut finished = finish(cloud, self, &frame, &content, &output, &results)?;
         if let (Some(raw), Some(level)) = (&raw, self.zstd_level) {
@@ -169,6 +200,86 @@ impl Output for BatchesSettings {
     }
 }
 
+/// What tasks are encoded with.
+struct Means<'a> {
+    cloud: &'a Cloud<'a>,
+    rt: &'a Runtime<'a>,
+    frame: &'a Frame,
+    content: &'a Content,
+    layout: &'a Layout,
+    sorted: &'a Store,
+    keeps_originals: bool,
+    usual_points: u64,
+}
+
+impl Means<'_> {
+    fn originals(&self) -> Arc<Store> {
+        Store::new(self.rt.temp.clone(), ORIGINAL_BYTES, 1, &self.rt.memory)
+    }
+
+    fn shop<'s>(&'s self, output: &'s BatchFile<'s>) -> Workshop<'s> {
+        Workshop {
+            frame: self.frame,
+            content: self.content,
+            store: &self.cloud.store,
+            sorted: self.sorted,
+            stride: self.cloud.frame.stride,
+            output,
+            keeps_originals: self.keeps_originals,
+            usual_points: self.usual_points,
+        }
+    }
+
+    /// Encodes the tasks of a job that are to be encoded here, each into a file of its own.
+    fn units(&self, units: GroupUnits<'_>, tasks: &[Task]) -> Result<(), ConvertError> {
+        let points: Vec<u64> = tasks.iter().map(|task| task.points).collect();
+        make_units(
+            units,
+            &points,
+            self.rt,
+            || (),
+            |(), index, file| {
+                let log = UnitLog::begin(file);
+                let came_to: (TaskResults, Part, Vec<u8>) = {
+                    let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
+                    let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
+                    let output = BatchFile::of_unit(&put, self.layout, self.originals(), recovery, origin);
+                    let shop = self.shop(&output);
+                    let mut worker = Worker::new(&shop);
+                    worker.run(index, &tasks[index])?;
+                    let results = worker.finish();
+                    let (part, originals) = output.take_part()?;
+                    (results, part, originals)
+                };
+                log.end(&came_to)
+            },
+        )
+    }
+
+    /// Takes what all units of a job came to.
+    fn recall(
+        &self,
+        units: GroupUnits<'_>,
+        tasks: &[Task],
+        output: &BatchFile<'_>,
+    ) -> Result<TaskResults, ConvertError> {
+        let each = self.rt.in_parallel(
+            tasks.len(),
+            || (Encoder::default(), Vec::new()),
+            |(encoder, all), index| {
+                let put = |at: &u64, from: u64, bytes: &[u8]| output.write(bytes, at + from);
+                let unit = units.recall(index, |unit| put_back::<u64, (TaskResults, Part, Vec<u8>)>(unit, 1, put))?;
+                let (results, part, originals) = unit.ok_or_else(|| units.gone(index))?;
+                output.add_part(part, originals, encoder)?;
+                all.push(results);
+                Ok(())
+            },
+            |(_, all)| all,
+        )?;
+        Ok(TaskResults::of_all(each.into_iter().flatten()))
+    }
+}
+
 /// Encodes all tasks; edges come back in the order of the tasks.
 fn encode(rt: &Runtime<'_>, shop: &Workshop<'_>, tasks: &[Task]) -> Result<TaskResults, ConvertError> {
     let each = rt.in_parallel(
@@ -181,13 +292,5 @@ fn encode(rt: &Runtime<'_>, shop: &Workshop<'_>, tasks: &[Task]) -> Result<TaskR
         },
         Worker::finish,
     )?;
-    let mut all = TaskResults::default();
-    for mut results in each {
-        all.ledger.merge(&results.ledger);
-        all.lod_points.iter_mut().zip(results.lod_points).for_each(|(a, b)| *a += b);
-        all.changed += results.changed;
-        all.edges.append(&mut results.edges);
-    }
-    all.edges.sort_unstable_by_key(|(index, _)| *index);
-    Ok(all)
+    Ok(TaskResults::of_all(each.into_iter()))
 }

@@ -7,6 +7,8 @@ use pointmill_format::batches::{
     BATCH_POINTS, BatchRecord, EncodedBatch, ErrorSums, Layout, Section, batch_points, encode_batch, le_bytes,
 };
 
+use serde::{Deserialize, Serialize};
+
 use super::frame::refused;
 use crate::cloud::{Segment, Store};
 use crate::error::ConvertError;
@@ -18,7 +20,7 @@ pub(super) const ORIGINAL_BYTES: usize = 8;
 
 /// Where tasks put what they made, in any order, from any thread.
 pub(super) struct BatchFile<'a> {
-    pub(super) file: &'a DiskFile,
+    to: To<'a>,
     pub(super) layout: &'a Layout,
     recovery: Recovery,
     /// World coordinates of the grid's origin.
@@ -27,6 +29,16 @@ pub(super) struct BatchFile<'a> {
     /// Entries of the originals, as they came.
     pub(super) originals: Arc<Store>,
 }
+
+/// Where bytes go.
+enum To<'a> {
+    File(&'a DiskFile),
+    /// Into the file of a unit, to be put into the output later: an offset, and the bytes.
+    Unit(&'a PutAt<'a>),
+}
+
+/// Takes bytes that belong at an offset.
+pub(super) type PutAt<'a> = dyn Fn(u64, &[u8]) -> Result<(), ConvertError> + Sync + 'a;
 
 /// What is kept until the end.
 #[derive(Default)]
@@ -41,12 +53,47 @@ pub(super) struct State {
     fragments: HashMap<u32, Vec<Fragment>>,
     /// First storage index, and where the entries are.
     pub(super) originals: Vec<(u32, Segment)>,
+    /// Of a unit, which has few of all batches.
+    found: Vec<Found>,
+}
+
+/// A batch that was encoded.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Found {
+    slot: u32,
+    record: BatchRecord,
+    /// In Morton order.
+    batch: u32,
+    errors: ErrorSums,
+}
+
+impl State {
+    fn take(&mut self, found: Found) -> Result<(), ConvertError> {
+        let Found { slot, record, batch, errors } = found;
+        let places = (self.records.get_mut(slot as usize), self.errors.get_mut(batch as usize));
+        let (Some(to_record), Some(to_errors)) = places else {
+            return Err(ConvertError::Internal("a batch that is none of the output".into()));
+        };
+        (*to_record, *to_errors) = (Some(record), errors);
+        Ok(())
+    }
 }
 
 /// Consecutive points of a batch.
-struct Fragment {
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Fragment {
     start: u32,
     relative: [Vec<f64>; 3],
+}
+
+/// What a unit came to beside bytes.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Part {
+    found: Vec<Found>,
+    lost: Lost,
+    fragments: Vec<(u32, Vec<Fragment>)>,
+    /// First storage index and number of entries.
+    originals: Vec<(u32, u32)>,
 }
 
 /// Points of one task in one batch.
@@ -87,10 +134,25 @@ impl<'a> BatchFile<'a> {
         recovery: Recovery,
         origin: [f64; 3],
     ) -> Self {
-        let batches = layout.batches as usize;
+        Self::to(To::File(file), layout, originals, recovery, origin)
+    }
+
+    /// What a unit puts into its own file.
+    pub(super) fn of_unit(
+        put: &'a PutAt<'a>,
+        layout: &'a Layout,
+        originals: Arc<Store>,
+        recovery: Recovery,
+        origin: [f64; 3],
+    ) -> Self {
+        Self::to(To::Unit(put), layout, originals, recovery, origin)
+    }
+
+    fn to(to: To<'a>, layout: &'a Layout, originals: Arc<Store>, recovery: Recovery, origin: [f64; 3]) -> Self {
+        let batches = if matches!(to, To::File(_)) { layout.batches as usize } else { 0 };
         let state =
             State { records: vec![None; batches], errors: vec![ErrorSums::default(); batches], ..State::default() };
-        Self { file, layout, recovery, origin, state: Mutex::new(state), originals }
+        Self { to, layout, recovery, origin, state: Mutex::new(state), originals }
     }
 
     /// The storage index of the first point of a piece.
@@ -134,8 +196,11 @@ impl<'a> BatchFile<'a> {
         let lost = self.lost_of(relative, encoded);
         let mut state = self.lock()?;
         state.lost.merge(lost);
-        state.records[slot as usize] = Some(encoded.record);
-        state.errors[batch as usize] = encoded.errors;
+        let found = Found { slot, record: encoded.record, batch, errors: encoded.errors };
+        match self.to {
+            To::Unit(_) => state.found.push(found),
+            To::File(_) => state.take(found)?,
+        }
         Ok(())
     }
 
@@ -161,7 +226,18 @@ impl<'a> BatchFile<'a> {
     }
 
     pub(super) fn write(&self, bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
-        self.file.write_at(bytes, offset, "writing the batches")
+        match self.to {
+            To::File(file) => file.write_at(bytes, offset, "writing the batches"),
+            To::Unit(put) => put(offset, bytes),
+        }
+    }
+
+    /// Cuts what is behind so many bytes.
+    pub(super) fn cut(&self, bytes: u64) -> Result<(), ConvertError> {
+        match self.to {
+            To::File(file) => file.set_len(bytes, "leaving out a plane"),
+            To::Unit(_) => Ok(()),
+        }
     }
 
     /// Keeps the originals of one task: bytes of all entries, and for each piece its first storage index and the number
@@ -179,6 +255,35 @@ impl<'a> BatchFile<'a> {
             start += count;
         }
         Ok(())
+    }
+
+    /// What a unit came to: all that is kept until the end, and the bytes of the entries of its originals.
+    pub(super) fn take_part(&self) -> Result<(Part, Vec<u8>), ConvertError> {
+        let state = std::mem::take(&mut *self.lock()?);
+        let (mut pieces, mut entries) = (Vec::new(), Vec::new());
+        for (first, segment) in state.originals {
+            pieces.push((first, segment.count));
+            self.originals.take(segment, &mut entries)?;
+        }
+        let mut fragments: Vec<(u32, Vec<Fragment>)> = state.fragments.into_iter().collect();
+        fragments.sort_unstable_by_key(|(batch, _)| *batch);
+        let part = Part { found: state.found, lost: state.lost, fragments, originals: pieces };
+        Ok((part, entries))
+    }
+
+    /// Takes what a unit came to; its bytes are there.
+    pub(super) fn add_part(&self, part: Part, mut entries: Vec<u8>, encoder: &mut Encoder) -> Result<(), ConvertError> {
+        let mut state = self.lock()?;
+        part.found.into_iter().try_for_each(|found| state.take(found))?;
+        state.lost.merge(part.lost);
+        drop(state);
+        for (batch, fragments) in part.fragments {
+            for Fragment { start, relative: [x, y, z] } in &fragments {
+                let piece = Piece { batch, start: *start, range: 0..x.len() };
+                self.put(&piece, [x, y, z], encoder)?;
+            }
+        }
+        self.put_originals(&mut entries, &part.originals)
     }
 
     /// What was kept, once all tasks are done.

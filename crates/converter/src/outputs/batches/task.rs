@@ -1,6 +1,7 @@
 //! One task: load, sort, choose levels of detail, encode.
 
 use pointmill_format::batches::{le_bytes, lod_of, rgb_of};
+use serde::{Deserialize, Serialize};
 
 use super::buckets::Task;
 use super::content::Content;
@@ -51,7 +52,7 @@ pub(super) struct Worker<'a> {
 }
 
 /// What the tasks of a thread came to.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 pub(super) struct TaskResults {
     pub(super) ledger: Ledger,
     /// Points by level of detail, before open cells are joined.
@@ -60,6 +61,21 @@ pub(super) struct TaskResults {
     pub(super) changed: u64,
     /// By task.
     pub(super) edges: Vec<(usize, [Option<Edges>; LEVELS])>,
+}
+
+impl TaskResults {
+    /// Of all tasks; edges in the order of the tasks.
+    pub(super) fn of_all(each: impl Iterator<Item = Self>) -> Self {
+        let mut all = Self::default();
+        for mut results in each {
+            all.ledger.merge(&results.ledger);
+            all.lod_points.iter_mut().zip(results.lod_points).for_each(|(a, b)| *a += b);
+            all.changed += results.changed;
+            all.edges.append(&mut results.edges);
+        }
+        all.edges.sort_unstable_by_key(|(index, _)| *index);
+        all
+    }
 }
 
 /// Bytes of memory for a point of a task: its record, words as loaded, before and after averaging, keys twice, entry of

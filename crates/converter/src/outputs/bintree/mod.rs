@@ -30,11 +30,10 @@ use serde_json::{Map, Value};
 pub use self::settings::BintreeSettings;
 
 use self::assemble::{assemble, figures};
-use self::files::Leaves;
+use self::files::{Leaves, Place};
 use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
 use self::subtree::{Builder, Built};
-use self::upper::Upper;
 use super::attributes::changed;
 use super::origin::own_key;
 use super::output::{DiskSize, Output, Target, Wants};
@@ -42,6 +41,7 @@ use super::recovery::Lost;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
+use crate::job::{GroupUnits, UnitLog, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, FormatErrors, OutputReport, PlannedChoice};
 use crate::runtime::{Consumer, Reservation, Runtime, Sequential};
@@ -115,15 +115,31 @@ impl Output for BintreeSettings {
         ]
     }
 
-    fn write(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+    fn write(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        to: &StagedDataset,
+        units: Option<GroupUnits<'_>>,
+    ) -> Result<OutputReport, ConvertError> {
         let columns = Columns::choose(cloud)?;
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
-        let upper = upper::split(cloud, rt, self, task_points)?;
+        let split = || Ok((upper::split(cloud, rt, self, task_points)?, task_points));
+        let (upper, task_points) = match units.and_then(|units| Some((units, units.shared()?))) {
+            Some((units, job)) => job.settled(&units.division(), &cloud.store, split)?,
+            None => split()?,
+        };
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
         room.resize(upper.tasks.iter().map(upper::Task::bytes).sum())?;
+        let division: Vec<_> = upper.tasks.iter().map(|task| (task.start, task.points())).collect();
+        let units = units.map(|units| units.divided(&division)).transpose()?;
+        let make = Make { cloud, rt, settings: self, columns: &columns, tasks: &upper.tasks, task_points };
+        if let Some(units) = units {
+            make.units(units)?;
+        }
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
-        let (built, _known) = build(cloud, rt, self, &columns, &upper, task_points, &leaves)?;
+        let (built, _known) = make.all(units, &leaves)?;
         let leaf_bytes = leaves.finish(rt)?;
 
         let mut ledger = Ledger::default();
@@ -165,38 +181,93 @@ impl Output for BintreeSettings {
     }
 }
 
-/// Builds all subtrees, in parallel; they come back in order, with what their nodes take.
-fn build(
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
-    settings: &BintreeSettings,
-    columns: &Columns,
-    upper: &Upper,
+/// What all tasks share.
+struct Make<'a> {
+    cloud: &'a Cloud<'a>,
+    rt: &'a Runtime<'a>,
+    settings: &'a BintreeSettings,
+    columns: &'a Columns,
+    tasks: &'a [upper::Task],
+    /// A task of more points is built on the disk.
     task_points: u64,
-    leaves: &Leaves<'_>,
-) -> Result<(Vec<Built>, Vec<Reservation>), ConvertError> {
-    let done = rt.in_parallel(
-        upper.tasks.len(),
-        || (Builder::new(cloud, settings, columns, leaves), Vec::new(), Reservation::new(&rt.memory, Consumer::Nodes)),
-        |(builder, built, known), index| {
-            let task = &upper.tasks[index];
-            let subtree = if task.points() > task_points {
-                builder.build_large(task, rt, rt.budget.chunk_bytes())?
-            } else {
-                builder.build(task)?
-            };
-            // they are copied once, when all are put together
-            known.resize(known.bytes() + 2 * (subtree.nodes.len() * size_of::<Node>()) as u64)?;
-            built.push((index, subtree));
-            rt.advance(task.points());
-            Ok(())
-        },
-        |(_, built, known)| (built, known),
-    )?;
-    let (built, known): (Vec<_>, Vec<Reservation>) = done.into_iter().unzip();
-    let mut built: Vec<(usize, Built)> = built.into_iter().flatten().collect();
-    built.sort_unstable_by_key(|(index, _)| *index);
-    Ok((built.into_iter().map(|(_, built)| built).collect(), known))
+}
+
+impl Make<'_> {
+    /// Builds the subtrees of a job that are to be built here, each into a file of its own.
+    fn units(&self, units: GroupUnits<'_>) -> Result<(), ConvertError> {
+        let points: Vec<u64> = self.tasks.iter().map(upper::Task::points).collect();
+        let (layout, stride) = (self.settings.layout, self.columns.record.stride());
+        make_units(
+            units,
+            &points,
+            self.rt,
+            || (),
+            |(), index, file| {
+                let log = UnitLog::begin(file);
+                let built = {
+                    let put = |place: Place, records: &[u8]| log.put(place, records);
+                    let leaves = Leaves::of_unit(layout, stride, &put);
+                    let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves);
+                    self.one(&mut builder, index)?
+                };
+                log.end(&built)
+            },
+        )
+    }
+
+    /// Builds all subtrees, in parallel, or takes them from the files of `units`; they come back in order, with what their nodes
+    /// take.
+    fn all<'l>(
+        &'l self,
+        units: Option<GroupUnits<'_>>,
+        leaves: &'l Leaves<'l>,
+    ) -> Result<(Vec<Built>, Vec<Reservation>), ConvertError> {
+        let Self { cloud, rt, settings, columns, tasks, .. } = *self;
+        let done = rt.in_parallel(
+            tasks.len(),
+            || {
+                (
+                    Builder::new(cloud, settings, columns, leaves),
+                    Vec::new(),
+                    Reservation::new(&rt.memory, Consumer::Nodes),
+                )
+            },
+            |(builder, built, known), index| {
+                let subtree = match units {
+                    Some(units) => recalled(units, index, leaves)?,
+                    None => self.one(builder, index)?,
+                };
+                // they are copied once, when all are put together
+                known.resize(known.bytes() + 2 * (subtree.nodes.len() * size_of::<Node>()) as u64)?;
+                built.push((index, subtree));
+                if units.is_none() {
+                    rt.advance(tasks[index].points());
+                }
+                Ok(())
+            },
+            |(_, built, known)| (built, known),
+        )?;
+        let (built, known): (Vec<_>, Vec<Reservation>) = done.into_iter().unzip();
+        let mut built: Vec<(usize, Built)> = built.into_iter().flatten().collect();
+        built.sort_unstable_by_key(|(index, _)| *index);
+        Ok((built.into_iter().map(|(_, built)| built).collect(), known))
+    }
+
+    fn one(&self, builder: &mut Builder<'_>, index: usize) -> Result<Built, ConvertError> {
+        let task = &self.tasks[index];
+        if task.points() > self.task_points {
+            return builder.build_large(task, self.rt, self.rt.budget.chunk_bytes());
+        }
+        builder.build(task)
+    }
+}
+
+/// A subtree that a unit has built, its leaves put where they belong.
+fn recalled(units: GroupUnits<'_>, index: usize, leaves: &Leaves<'_>) -> Result<Built, ConvertError> {
+    let built = units.recall(index, |unit| {
+        put_back(unit, leaves.stride(), |place, byte, records| leaves.put_back(place, byte, records))
+    })?;
+    built.ok_or_else(|| units.gone(index))
 }
 
 fn write_index(

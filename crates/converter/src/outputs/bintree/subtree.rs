@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, RecordLayout, leaf_center};
 use pointmill_format::{Aabb, Deviations, Lattice};
+use serde::{Deserialize, Serialize};
 
 use super::extent::Extent;
 use super::files::Leaves;
@@ -22,6 +23,7 @@ use crate::runtime::os_hints;
 const LARGE_LEAF: u32 = 100_000;
 
 /// A subtree, built and written.
+#[derive(Serialize, Deserialize)]
 pub(super) struct Built {
     /// In preorder; indices count from the subtree's own root.
     pub(super) nodes: Vec<Node>,

@@ -1,6 +1,8 @@
 //! Splits of nodes that are too large for memory: planes from the sums of cells, and only the cells that a plane crosses
 //! are read.
 
+use serde::{Deserialize, Serialize};
+
 use super::rule;
 use super::settings::BintreeSettings;
 use crate::cloud::{Cloud, JobPoint, Moments, Segment, Segments, Store, StoredOrigin, position};
@@ -18,7 +20,7 @@ const CUT_BYTES: usize = 4 << 20;
 const BINS: u64 = 4096;
 
 /// Points of a node that lie near each other, wherever they are stored.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Part {
     points: u64,
     segments: Segments,
@@ -26,7 +28,7 @@ pub(super) struct Part {
 }
 
 /// A subtree to build in memory.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Task {
     pub(super) parts: Vec<Part>,
     /// Points before it in the order of leaves.
@@ -55,7 +57,7 @@ impl Task {
 }
 
 /// An upper node.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Split {
     pub(super) axis: u8,
     /// World coordinate of the plane.
@@ -64,7 +66,7 @@ pub(super) struct Split {
 }
 
 /// The top of the tree, in preorder: splits, and in their places (`None`) the tasks one after the other.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Upper {
     pub(super) splits: Vec<Option<Split>>,
     pub(super) tasks: Vec<Task>,

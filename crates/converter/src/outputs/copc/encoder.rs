@@ -5,9 +5,12 @@ use std::sync::{Mutex, PoisonError};
 use pointmill_format::scan::las::write::{ChunkEncoder, Tally};
 use pointmill_format::{Changes, DatasetKind, NodeKey};
 
+use serde::{Deserialize, Serialize};
+
 use super::content::Content;
 use crate::cloud::{Checksum, copy_record};
 use crate::error::{ConvertError, Unsupported};
+use crate::job::encode;
 use crate::octree::NodeEncoder;
 use crate::runtime::Events;
 
@@ -26,7 +29,7 @@ pub(super) struct Encoding<'a> {
 }
 
 /// What was counted.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Counted {
     pub(super) tally: Tally,
     /// Values that do not fit, by attribute that is kept.
@@ -34,7 +37,7 @@ pub(super) struct Counted {
 }
 
 impl Counted {
-    fn merge(&mut self, other: &Self) {
+    pub(super) fn merge(&mut self, other: &Self) {
         self.tally.merge(&other.tally);
         self.changes.resize(self.changes.len().max(other.changes.len()), Changes::default());
         self.changes.iter_mut().zip(&other.changes).for_each(|(all, one)| all.merge(one));
@@ -126,6 +129,11 @@ impl NodeEncoder for ChunkMaker<'_> {
             (self.rows, self.sorted, self.records, self.order) = Default::default();
         }
         Ok(())
+    }
+
+    fn take_notes(&mut self) -> Result<Vec<u8>, ConvertError> {
+        let changes = vec![Changes::default(); self.counted.changes.len()];
+        encode(&std::mem::replace(&mut self.counted, Counted { tally: Tally::default(), changes }))
     }
 
     fn row_bytes(&self) -> Option<u64> {

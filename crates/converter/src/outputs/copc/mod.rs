@@ -28,6 +28,7 @@ use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants}
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
+use crate::job::{GroupUnits, decode};
 use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::Plan;
 use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
@@ -183,6 +184,12 @@ impl NodeSink for Writer<'_> {
         Ok(())
     }
 
+    fn add_notes(&self, notes: &[u8]) -> Result<(), ConvertError> {
+        let notes = decode(notes)?;
+        self.encoding.counted.lock().unwrap_or_else(PoisonError::into_inner).merge(&notes);
+        Ok(())
+    }
+
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         self.write(&[], bytes, node.byte_offset + at)
     }
@@ -193,8 +200,14 @@ impl OctreeWriter for Writer<'_> {
         self
     }
 
-    fn build(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError> {
-        octree::build(cloud, rt, settings, self)
+    fn build(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        settings: OctreeSettings,
+        units: Option<GroupUnits<'_>>,
+    ) -> Result<Octree, ConvertError> {
+        octree::build(cloud, rt, settings, units, self)
     }
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {

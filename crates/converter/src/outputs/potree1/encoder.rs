@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use pointmill_format::batches::eight_bit;
 use pointmill_format::potree1::Metadata;
 use pointmill_format::{Changes, NodeKey};
+use serde::{Deserialize, Serialize};
 
 use super::archive;
 use super::content::{COLOUR_BYTES, Colour, Content};
@@ -12,6 +13,7 @@ use super::errors::{Meter, Seen};
 use super::steps::Steps;
 use crate::cloud::{Checksum, copy_record};
 use crate::error::ConvertError;
+use crate::job::encode;
 use crate::octree::NodeEncoder;
 use crate::outputs::colour::grey_of;
 use crate::runtime::Events;
@@ -46,7 +48,7 @@ impl<'a> Encoding<'a> {
 }
 
 /// What was counted.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
     /// By column.
     pub(super) changes: Vec<Changes>,
@@ -68,7 +70,7 @@ impl<'a> RecordEncoder<'a> {
 }
 
 impl Tally {
-    fn merge(&mut self, other: &Self) {
+    pub(super) fn merge(&mut self, other: &Self) {
         self.changes.resize(self.changes.len().max(other.changes.len()), Changes::default());
         self.changes.iter_mut().zip(&other.changes).for_each(|(all, one)| all.merge(one));
         self.positions.merge(&other.positions);
@@ -120,6 +122,11 @@ impl NodeEncoder for RecordEncoder<'_> {
             archive::end(first, head, out);
         }
         Ok(())
+    }
+
+    fn take_notes(&mut self) -> Result<Vec<u8>, ConvertError> {
+        let changes = vec![Changes::default(); self.tally.changes.len()];
+        encode(&std::mem::replace(&mut self.tally, Tally { changes, ..Tally::default() }))
     }
 
     fn row_bytes(&self) -> Option<u64> {

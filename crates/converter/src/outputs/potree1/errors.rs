@@ -1,6 +1,7 @@
 //! How far decoded positions are from the points of the lattice.
 
 use pointmill_format::{Deviations, NodeKey};
+use serde::{Deserialize, Serialize};
 
 use super::steps::Steps;
 use crate::cloud::{Cloud, JobPoint, RecordFrame, position};
@@ -64,7 +65,7 @@ fn rounding(cloud: &Cloud<'_>, steps: &Steps, depth: u32) -> [f64; 3] {
 }
 
 /// What a [`Meter`] has seen.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Seen {
     /// Largest error of positions by axis, world units.
     largest: [f64; 3],

@@ -9,6 +9,7 @@ use pointmill_format::potree1::Metadata;
 use super::archive::{ARCHIVE_FILE, Archive};
 use super::encoder::{Encoding, RecordEncoder};
 use crate::error::ConvertError;
+use crate::job::decode;
 use crate::octree::{FinishedNode, NodeSink};
 use crate::outputs::staging::StagedDataset;
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -135,6 +136,12 @@ impl NodeSink for NodeFiles<'_> {
             let from = (node.byte_offset - offset) as usize;
             self.put(node, &bytes[from..from + node.byte_size as usize])?;
         }
+        Ok(())
+    }
+
+    fn add_notes(&self, notes: &[u8]) -> Result<(), ConvertError> {
+        let notes = decode(notes)?;
+        self.encoding.tally.lock().unwrap_or_else(PoisonError::into_inner).merge(&notes);
         Ok(())
     }
 

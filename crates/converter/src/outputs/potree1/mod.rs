@@ -34,6 +34,7 @@ use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants}
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
+use crate::job::GroupUnits;
 use crate::octree::{self, AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, ChangedAttribute, OutputReport, PlannedChoice};
@@ -157,8 +158,14 @@ impl OctreeWriter for Writer<'_> {
         &self.files
     }
 
-    fn build(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError> {
-        octree::build(cloud, rt, settings, &self.files)
+    fn build(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        settings: OctreeSettings,
+        units: Option<GroupUnits<'_>>,
+    ) -> Result<Octree, ConvertError> {
+        octree::build(cloud, rt, settings, units, &self.files)
     }
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {

@@ -27,6 +27,7 @@ use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants}
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
+use crate::job::{GroupUnits, decode};
 use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
@@ -208,6 +209,11 @@ impl NodeSink for Payloads<'_> {
         Ok(())
     }
 
+    fn add_notes(&self, notes: &[u8]) -> Result<(), ConvertError> {
+        self.seen.add(&decode(notes)?);
+        Ok(())
+    }
+
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         self.write(&[], bytes, node.byte_offset + at)
     }
@@ -218,8 +224,14 @@ impl OctreeWriter for Payloads<'_> {
         self
     }
 
-    fn build(&self, cloud: &Cloud<'_>, rt: &Runtime<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError> {
-        octree::build(cloud, rt, settings, self)
+    fn build(
+        &self,
+        cloud: &Cloud<'_>,
+        rt: &Runtime<'_>,
+        settings: OctreeSettings,
+        units: Option<GroupUnits<'_>>,
+    ) -> Result<Octree, ConvertError> {
+        octree::build(cloud, rt, settings, units, self)
     }
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {

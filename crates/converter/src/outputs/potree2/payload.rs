@@ -13,6 +13,7 @@ use super::settings::Encoding;
 use super::watch::{AllSeen, Seen, Watch};
 use crate::cloud::{Checksum, copy_record};
 use crate::error::ConvertError;
+use crate::job::encode;
 use crate::octree::NodeEncoder;
 use crate::runtime::Events;
 
@@ -40,6 +41,7 @@ pub(crate) struct PayloadEncoder<'a> {
     encoding: Encoding,
     attributes: Arc<[Attribute]>,
     watch: Option<(Watch, &'a AllSeen)>,
+    seen: Seen,
     tile: Vec<u8>,
     plain: Vec<u8>,
     scratch: BrotliScratch,
@@ -50,7 +52,17 @@ impl<'a> PayloadEncoder<'a> {
         let mut attributes = vec![Attribute::new("position", AttributeType::Int32, 3)];
         attributes.extend(layout.attributes.iter().cloned());
         let (tile, plain, scratch) = (Vec::new(), Vec::new(), BrotliScratch::default());
-        Self { events, layout, encoding, attributes: attributes.into(), watch: None, tile, plain, scratch }
+        Self {
+            events,
+            layout,
+            encoding,
+            attributes: attributes.into(),
+            watch: None,
+            seen: Seen::default(),
+            tile,
+            plain,
+            scratch,
+        }
     }
 
     /// Looks for values that viewers do not show as they are meant.
@@ -67,7 +79,6 @@ impl<'a> PayloadEncoder<'a> {
     ) {
         let stride = self.layout.stored_stride;
         out.reserve(records.len() * self.layout.stride);
-        let mut seen = Seen::default();
         while records.len() > 0 {
             let (start, bytes) = (out.len(), records.len().min(TILE_RECORDS) * stride);
             if self.layout.keeps_records() {
@@ -83,11 +94,16 @@ impl<'a> PayloadEncoder<'a> {
             }
             self.layout.finish(&mut out[start..]);
             if let Some((watch, _)) = &self.watch {
-                watch.look(&mut out[start..], self.layout.stride, &mut seen);
+                watch.look(&mut out[start..], self.layout.stride, &mut self.seen);
             }
         }
+    }
+}
+
+impl Drop for PayloadEncoder<'_> {
+    fn drop(&mut self) {
         if let Some((_, all)) = &self.watch {
-            all.add(&seen);
+            all.add(&self.seen);
         }
     }
 }
@@ -177,6 +193,10 @@ impl NodeEncoder for PayloadEncoder<'_> {
             }
         }
         Ok(())
+    }
+
+    fn take_notes(&mut self) -> Result<Vec<u8>, ConvertError> {
+        encode(&std::mem::take(&mut self.seen))
     }
 
     fn row_bytes(&self) -> Option<u64> {

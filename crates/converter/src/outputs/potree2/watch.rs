@@ -3,6 +3,7 @@
 use std::sync::Mutex;
 
 use pointmill_format::{Attribute, AttributeType, Changes};
+use serde::{Deserialize, Serialize};
 
 use super::settings::DarkColours;
 use crate::cloud::Range;
@@ -25,7 +26,7 @@ pub(crate) struct Watch {
 }
 
 /// What was seen.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Seen {
     /// Points with a dark channel.
     pub(crate) dark_points: u64,

@@ -18,6 +18,7 @@ pub struct Summary {
 }
 
 /// Counts records as they are encoded; the order of records and of [`Self::merge`] does not matter.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tally {
     points: u64,

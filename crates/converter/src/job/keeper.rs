@@ -1,0 +1,148 @@
+//! Where units leave what they have made: a job of one run, or one that several processes share.
+
+use super::Job;
+use super::shared::SharedJob;
+use super::unit_file::{UnitReader, UnitWriter};
+use crate::error::{ConvertError, JobFault};
+use crate::runtime::DiskFile;
+use crate::unit_name::{JobUnit, Stage, UnitName};
+
+/// A job of either kind.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Keeper<'a> {
+    /// Of one run, on one machine.
+    Own(&'a Job),
+    Shared(&'a SharedJob),
+}
+
+impl<'a> Keeper<'a> {
+    /// The job, if it is one that several processes share.
+    pub(crate) fn shared(self) -> Option<&'a SharedJob> {
+        match self {
+            Self::Shared(job) => Some(job),
+            Self::Own(_) => None,
+        }
+    }
+}
+
+/// The units that build the outputs of a group.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GroupUnits<'a> {
+    keeper: Keeper<'a>,
+    group: u32,
+    /// Tells divisions apart: another run may divide the group otherwise.
+    mark: u32,
+}
+
+impl<'a> GroupUnits<'a> {
+    /// Those of a group, by its number.
+    pub(crate) fn new(keeper: Keeper<'a>, group: u32) -> Self {
+        Self { keeper, group, mark: 0 }
+    }
+
+    /// The same, of a group that is divided into these: what a run has kept that divided it otherwise is not found.
+    pub(crate) fn divided(self, units: &impl serde::Serialize) -> Result<Self, ConvertError> {
+        Ok(Self { mark: crc32c::crc32c(&super::encode(units)?), ..self })
+    }
+
+    /// The name of a unit.
+    pub(crate) fn name(&self, number: usize) -> UnitName {
+        UnitName { stage: Stage::Build { group: self.group }, number: number as u64 }
+    }
+
+    /// The job, if several processes share it and this one does not finish it: its units are done one by one.
+    pub(crate) fn in_parts(&self) -> Option<&'a SharedJob> {
+        self.keeper.shared().filter(|job| !matches!(job.task(), super::Task::Finish))
+    }
+
+    /// The name under which settling keeps how the group is divided.
+    pub(crate) fn division(&self) -> String {
+        format!("division {}", self.group)
+    }
+
+    /// A unit as it is listed.
+    pub(crate) fn listed(&self, job: &SharedJob, number: usize, points: u64, needs: Vec<usize>) -> JobUnit {
+        job.listed(self.name(number), points, needs.into_iter().map(|n| self.name(n)).collect())
+    }
+
+    /// True if a unit is done: of a job that several processes share, if its file is there; else if that is whole, too.
+    pub(crate) fn is_done(&self, number: usize) -> Result<bool, ConvertError> {
+        match self.keeper {
+            Keeper::Shared(job) => Ok(job.is_done(self.name(number))),
+            Keeper::Own(_) => Ok(self.recall(number, UnitReader::check)?.is_some()),
+        }
+    }
+
+    /// The error for a unit that is not whole any more, though it was done.
+    pub(crate) fn gone(&self, number: usize) -> ConvertError {
+        let unit = JobUnit::new(self.name(number), 0, Vec::new(), false);
+        JobFault::Unfinished { units: vec![unit] }.into()
+    }
+
+    /// Fails if several processes share the job and one of so many units is not done.
+    pub(crate) fn all_done(&self, units: usize) -> Result<(), ConvertError> {
+        let Some(job) = self.shared() else { return Ok(()) };
+        let open = (0..units).filter(|i| !job.is_done(self.name(*i)));
+        let open: Vec<JobUnit> = open.map(|i| JobUnit::new(self.name(i), 0, Vec::new(), false)).collect();
+        if open.is_empty() { Ok(()) } else { Err(JobFault::Unfinished { units: open }.into()) }
+    }
+
+    /// The job, if how the group is divided is kept.
+    pub(crate) fn shared(&self) -> Option<&'a SharedJob> {
+        self.keeper.shared()
+    }
+
+    /// Hands what a unit has left to `take`; `None`: it is not done.
+    pub(crate) fn recall<T>(
+        &self,
+        number: usize,
+        take: impl FnOnce(&UnitReader) -> Result<T, ConvertError>,
+    ) -> Result<Option<T>, ConvertError> {
+        let unit = self.name(number);
+        let take = |file: &UnitReader| match file.get::<u32>(file.sections().saturating_sub(1))? == self.mark {
+            true => take(file),
+            false => Err(file.damaged(0)), // of another division, or of no unit at all
+        };
+        let job = match self.keeper {
+            Keeper::Shared(job) => return job.recall(unit, take),
+            Keeper::Own(job) => job,
+        };
+        let path = job.built_path(unit);
+        let Ok(meta) = std::fs::metadata(&path) else { return Ok(None) };
+        let file = DiskFile::open(&path, path.clone(), &job.disk)?;
+        match UnitReader::open(&path, file, meta.len()).and_then(|reader| take(&reader)) {
+            Ok(value) => Ok(Some(value)),
+            // it was not safe when the power failed
+            Err(ConvertError::Job(JobFault::Damaged { .. })) => Ok(None),
+            Err(other) => Err(other),
+        }
+    }
+
+    /// Notes units that another run has built.
+    pub(crate) fn count_recalled(&self, units: usize) {
+        if let Keeper::Own(job) = self.keeper {
+            job.count_recalled_units(units as u64);
+        }
+    }
+
+    /// Writes what a unit leaves: `fill` puts it into the file.
+    pub(crate) fn keep(
+        &self,
+        number: usize,
+        fill: impl FnOnce(&mut UnitWriter) -> Result<(), ConvertError>,
+    ) -> Result<(), ConvertError> {
+        let unit = self.name(number);
+        let fill = |file: &mut UnitWriter| {
+            fill(file)?;
+            file.put(&self.mark)
+        };
+        match self.keeper {
+            Keeper::Shared(job) => job.keep(unit, fill),
+            Keeper::Own(job) => {
+                let mut file = UnitWriter::create(&job.built_path(unit), &job.disk)?;
+                fill(&mut file)?;
+                file.finish(false) // what the disk loses is found out by its sums, and made again
+            }
+        }
+    }
+}

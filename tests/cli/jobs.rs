@@ -1,0 +1,104 @@
+//! `pointmill job`: a conversion that several processes do together.
+
+use pointmill_testkit::files::{assert_same_dataset, dataset};
+use pointmill_testkit::las::Las;
+use serde_json::Value;
+
+use crate::support::Dir;
+
+const SHARES: usize = 3;
+
+fn stage() -> Dir {
+    let dir = Dir::new();
+    for seed in 1..=4 {
+        dir.write(&format!("scans/{seed}.las"), &Las::terrain(60_000, seed).bytes());
+    }
+    dir.succeed(["convert", "scans", "-o", "plain", "-q", "--name", "city"]);
+    dir
+}
+
+fn plan(dir: &Dir) {
+    dir.succeed([
+        "job",
+        "plan",
+        "scans",
+        "-o",
+        "out",
+        "--job",
+        "the.job",
+        "--checkpoint",
+        "50000",
+        "--name",
+        "city",
+        "-q",
+    ]);
+}
+
+#[test]
+fn processes_with_a_share_each_make_the_bytes_of_one_even_if_one_is_killed() {
+    let dir = stage();
+    plan(&dir);
+    let share = |i: usize| {
+        let share = format!("{}/{SHARES}", i + 1);
+        dir.command(["job", "run", "the.job", "--threads", "1", "-q", "--share", &share]).spawn().unwrap()
+    };
+    let mut processes: Vec<_> = (0..SHARES).map(share).collect();
+    std::thread::sleep(std::time::Duration::from_millis(150));
+    processes[0].kill().unwrap();
+    processes[0].wait().unwrap();
+    processes[0] = share(0);
+    for process in &mut processes {
+        assert!(process.wait().unwrap().success());
+    }
+    let status = dir.succeed(["job", "status", "the.job", "-q"]).stdout();
+    assert!(status.contains("all units are done"), "{status}");
+    dir.succeed(["job", "finish", "the.job", "-q"]);
+    assert_same_dataset(&dataset(&dir.path("out")), &dataset(&dir.path("plain")), "a job");
+    assert_eq!(dir.names(), ["out", "plain", "scans"]);
+}
+
+#[test]
+fn units_are_listed_for_people_and_for_programs() {
+    let dir = stage();
+    plan(&dir);
+    let names = dir.succeed(["job", "units", "the.job"]).stdout();
+    let names: Vec<&str> = names.lines().collect();
+    assert_eq!(names, ["read-1-0", "read-1-1", "read-1-2", "read-1-3"]);
+    let json =
+        || -> Value { serde_json::from_str(&dir.succeed(["job", "units", "the.job", "--json"]).stdout()).unwrap() };
+    let all = json();
+    assert_eq!((&all["complete"], &all["ready"][3]), (&Value::from(false), &Value::from("read-1-3")));
+    assert_eq!((&all["units"][1]["points"], &all["units"][1]["done"]), (&Value::from(60_000), &Value::from(false)));
+    // from anywhere: the job knows where it was planned
+    let folder = dir.path("the.job");
+    let args = ["job", "run", folder.to_str().unwrap(), "read-1-1"];
+    assert!(dir.command(args).current_dir(std::env::temp_dir()).status().unwrap().success());
+    assert_eq!(json()["units"][1]["done"], true);
+    let status: Value = serde_json::from_str(&dir.succeed(["job", "status", "the.job", "--json"]).stdout()).unwrap();
+    assert_eq!(status["read"], serde_json::json!({ "done": 1, "units": 4 }));
+    assert_eq!(dir.succeed(["job", "status", "the.job"]).stdout(), "1 of 4 units to read are done\n");
+    dir.succeed(["job", "run", "the.job", "read-1-0", "read-1-2", "read-1-3"]);
+    assert_eq!(dir.succeed(["job", "units", "the.job"]).stdout(), "settle-1-0\n");
+}
+
+#[test]
+fn mistakes_are_one_line_and_leave_the_job_alone() {
+    let dir = stage();
+    dir.run(["job", "units", "scans"]).failed_with(2, &["not the folder of a planned job", "job plan"]);
+    dir.run(["job", "units", "nowhere"]).failed_with(5, &["nowhere"]);
+    dir.run(["job", "plan", "scans", "-o", "out", "--job", "scans"]).failed_with(2, &["not empty", "another folder"]);
+    dir.run(["job", "plan", "scans", "-o", "plain", "--job", "the.job"]).failed_with(2, &["plain", "--overwrite"]);
+    dir.run(["job", "plan", "scans", "-o", "out", "--job", "the.job", "--resume"]).failed_with(2, &["--resume"]);
+    dir.run(["job", "plan", "scans", "-o", "out"]).failed_with(2, &["--job"]);
+    assert_eq!(dir.names(), ["plain", "scans"]);
+    plan(&dir);
+    dir.run(["job", "plan", "scans", "-o", "out", "--job", "the.job"]).failed_with(2, &["the.job", "not empty"]);
+    dir.run(["job", "run", "the.job"]).failed_with(2, &[]);
+    dir.run(["job", "run", "the.job", "build-x"]).failed_with(2, &["build-x", "job units"]);
+    dir.run(["job", "run", "the.job", "build-0-0"]).failed_with(2, &["build-0-0", "not yet"]);
+    dir.run(["job", "run", "the.job", "--share", "4/3"]).failed_with(2, &["4/3", "I/N"]);
+    dir.run(["job", "finish", "the.job"]).failed_with(2, &["4 of 4", "read-1-0"]);
+    dir.write("the.job/plan.json", b"{}");
+    dir.run(["job", "units", "the.job"]).failed_with(3, &["plan.json"]);
+    assert_eq!(dir.names(), ["plain", "scans", "the.job"]);
+}
