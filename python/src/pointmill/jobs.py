@@ -6,10 +6,8 @@ commands of ``pointmill job``, and :func:`batches`, which shares units out. Noth
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,18 +124,11 @@ def run(job: AnyPath, names: Sequence[str], *, threads: int | None = None, memor
 def finish(job: AnyPath, *, threads: int | None = None, memory: int | str | None = None) -> dict[str, Any]:
     """Puts the results of all units together, removes the job, and returns the report of the conversion.
 
-    What processes that were killed have left in the folder of the job goes, too.
-
     Raises:
         PointmillError: Units are not done, or the output cannot be written.
     """
     report: dict[str, Any] = json.loads(_call(["job", "finish", job, *_resources(threads, memory), "-q", "--json"]))
-    folder = Path(job).absolute()
-    _list_file(folder).unlink(missing_ok=True)
-    for left in folder.glob("work-*"):
-        shutil.rmtree(left, ignore_errors=True)
-    with contextlib.suppress(OSError):  # the program has removed it, or something of others is in it
-        folder.rmdir()
+    _list_file(Path(job).absolute()).unlink(missing_ok=True)
     return report
 
 
