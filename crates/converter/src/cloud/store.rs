@@ -16,6 +16,9 @@ pub(crate) const BLOCK_BYTES: usize = 8 << 20;
 /// An offset on the disk has the number of its file above these bits: 0 is the store's own, others were adopted.
 const OFFSET_BITS: u32 = 44;
 
+/// Bytes of a block that are checked together.
+const CHECK_BYTES: usize = 1 << 20;
+
 /// As many adopted files stay open.
 const MOST_OPEN: usize = 64;
 
@@ -211,12 +214,19 @@ impl Store {
 
     /// True if a block is in the file as it was written.
     pub(crate) fn is_whole(&self, block: &SafeBlock) -> Result<bool, ConvertError> {
-        let mut records = vec![0; block.bytes as usize];
-        match self.read_disk(&mut records, block.offset, "reading the records") {
-            Ok(()) => Ok(crc32c::crc32c(&records) == block.sum),
-            Err(ConvertError::Io { error, .. }) if error.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
-            Err(other) => Err(other),
+        let (mut at, mut sum, mut part) = (0, 0, vec![0; CHECK_BYTES.min(block.bytes as usize)]);
+        while at < block.bytes {
+            let part = &mut part[..CHECK_BYTES.min((block.bytes - at) as usize)];
+            match self.read_disk(part, block.offset + at, "reading the records") {
+                Ok(()) => sum = crc32c::crc32c_append(sum, part),
+                Err(ConvertError::Io { error, .. }) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
+                    return Ok(false);
+                }
+                Err(other) => return Err(other),
+            }
+            at += part.len() as u64;
         }
+        Ok(sum == block.sum)
     }
 
     /// Bytes that went to the spill file.

@@ -108,12 +108,18 @@ impl StagedFolder {
     /// Returns what there is to say of that.
     pub(crate) fn finish(mut self, events: &dyn Events) -> Result<Option<Warning>, ConvertError> {
         let output = self.place.path.as_path();
-        let standing = self.place.check(Some(self.hidden.path()))?;
+        let mut standing = self.place.check(Some(self.hidden.path()))?;
         let new = self.hidden.path_of_new();
         sync_folder(&*self.disk, &new).map_err(|e| ConvertError::io(output, "syncing the output", e))?;
+        if matches!(standing, Standing::Nothing) {
+            if (Replace { hidden: &mut self.hidden, output, disk: &*self.disk }).appear()? {
+                self.hidden.keep_parents();
+                return Ok(leftovers::clear(self.hidden, leftovers::Whose::OldOutput, events));
+            }
+            standing = self.place.check(Some(self.hidden.path()))?; // an error, or something that may be replaced
+        }
         let replace = Replace { hidden: &mut self.hidden, output, disk: &*self.disk };
         match (standing, self.replacing) {
-            (Standing::Nothing, _) => replace.appear()?,
             (Standing::Ours(files), Replacing::EntryByEntry) => replace.entries(&names_directly_in(output, &files))?,
             (_, Replacing::EntryByEntry) => replace.entries(&[])?,
             (_, replacing) => replace.whole(replacing)?,

@@ -32,14 +32,20 @@ impl Replace<'_> {
         move |e| ConvertError::io(output, doing, e)
     }
 
-    /// Nothing stands there.
-    pub(super) fn appear(self) -> Result<(), ConvertError> {
+    /// Nothing stood there; false: another run has made its output meanwhile.
+    pub(super) fn appear(self) -> Result<bool, ConvertError> {
         let new = self.hidden.path_of_new();
-        rename(self.disk, &new, self.output).map_err(self.failed("giving the output its name"))?;
+        match rename(self.disk, &new, self.output) {
+            Err(e) if matches!(e.kind(), io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists) => {
+                return Ok(false);
+            }
+            renamed => renamed.map_err(self.failed("giving the output its name"))?,
+        }
         sync_folder(self.disk, parent_of(self.output)).map_err(|e| {
             let _ = fs::rename(self.output, &new);
             self.failed("syncing the folder of the output")(e)
-        })
+        })?;
+        Ok(true)
     }
 
     /// The folder as a whole. It keeps owner and permissions; what stood there is in the hidden folder then, as `new` or
