@@ -33,8 +33,8 @@ pub(crate) struct ConvertArgs {
     /// Replaces OUT if it is a dataset; the old dataset is kept until the new one is complete
     #[arg(long, help_heading = "Output")]
     pub(crate) overwrite: bool,
-    /// Adds the points of the inputs to those of OUT, a dataset, and replaces it: the same bytes as converting all scans at once, if it
-    /// was made with the same options and holds all attributes; everything is built anew
+    /// Adds the points of the inputs to those of OUT, a dataset that was made with the same options, and replaces it: the same bytes as
+    /// converting all scans at once, if it holds all attributes and has the same --name; everything is built anew
     #[arg(long, conflicts_with = "overwrite", help_heading = "Output")]
     pub(crate) append: bool,
     /// Name of the point cloud in the metadata [default: name of the first input]

@@ -8,6 +8,7 @@ use pointmill_converter::{
     Sampling, ScaleChoice, Target, resolve_path,
 };
 use pointmill_format::bintree::{Layout, SplitRule};
+use serde_json::Value;
 
 use super::page_file::PageFile;
 use super::report_file::ReportFile;
@@ -44,15 +45,54 @@ pub(super) fn planned(args: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure
     }
     let mut plan = plan(args, inputs)?;
     plan.overwrite |= args.append;
-    if args.append && args.name.is_none() {
-        plan.name = name_from(&[], std::slice::from_ref(&args.output));
+    if args.append {
+        if args.name.is_none() {
+            plan.name = name_from(&[], std::slice::from_ref(&args.output));
+        }
+        made_alike(&plan, &targets)?;
     }
     Ok((plan, targets))
 }
 
+/// Refuses to add to a dataset that was made with other settings: they are those of all points.
+fn made_alike(plan: &Plan, targets: &[Target]) -> Result<(), Failure> {
+    let report = std::fs::read(plan.output.join("report.json")).ok();
+    let report: Option<Value> = report.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let Some(was) = report.as_ref().and_then(|report| report.get("options")?.as_object()) else { return Ok(()) };
+    let now = pointmill_converter::settings(plan, targets);
+    let differs = |name: &&String| !RESOURCES.contains(&name.as_str()) && was.get(*name) != now.get(*name);
+    let Some(name) = was.keys().chain(now.keys()).find(differs) else { return Ok(()) };
+    let shown = |value: Option<&Value>| value.map_or_else(|| "not given".to_owned(), ToString::to_string);
+    let (was, now) = (shown(was.get(name)), shown(now.get(name)));
+    let output = plan.output.display();
+    Err(Failure::Usage(format!(
+        "{output}: made with another {name}: {was}, now {now}; pass the same options, or leave out --append"
+    )))
+}
+
+/// Settings of a report that change no byte.
+const RESOURCES: [&str; 3] = ["memory", "threads", "to"];
+
 /// The dataset that others are added to, as one more input.
 fn appendable(args: &ConvertArgs, inputs: &Inputs) -> Result<PathBuf, Failure> {
     let (output, shown) = (&args.output, args.output.display());
+    let placing = &args.inputs.reading.placing;
+    let of_all = [
+        ("--every", args.every > 1),
+        ("--class", args.class.is_some()),
+        ("--bounds", args.bounds.is_some()),
+        ("--origin-points skip", matches!(args.origin_points, OriginPointsArg::Skip)),
+        ("--units", placing.units.is_some()),
+        ("--axes", placing.axes.is_some()),
+        ("--transform", placing.transform.is_some()),
+        ("--reproject", placing.reproject.is_some()),
+    ];
+    if let Some((option, _)) = of_all.iter().find(|(_, given)| *given) {
+        let line = format!(
+            "{option} would change the points of {shown}, too; convert the new scans to a dataset with it, and add that"
+        );
+        return Err(Failure::Usage(line));
+    }
     let [to] = args.to[..] else {
         return Err(Failure::Usage("--append adds to one dataset; leave out all --to but one".to_owned()));
     };

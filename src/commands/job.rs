@@ -61,6 +61,12 @@ fn plan(args: &JobPlanArgs) -> Result<(), Failure> {
     let planned = Planned { version: env!("CARGO_PKG_VERSION").to_owned(), folder, arguments: typed_for_convert()? };
     let job = job_of(&planned, args.job.clone())?;
     protect_inputs(&job.plan, false)?;
+    if job.folder.starts_with(&job.plan.output) {
+        let (folder, output) = (job.folder.display(), job.plan.output.display());
+        return Err(Failure::Usage(format!(
+            "{folder}: the job would be inside of the output {output}; choose another folder"
+        )));
+    }
     let progress = Progress::new(&job.convert.talk, Some(stop_flag()));
     let units = plan_job(&job.plan, &job.targets, &job.folder, &progress);
     no_more_checks();
@@ -95,7 +101,6 @@ fn typed_for_convert() -> Result<Vec<String>, Failure> {
 
 fn open(folder: &Path) -> Result<Job, Failure> {
     let path = folder.join(PLAN);
-    let folder = folder.canonicalize().map_err(|e| Failure::io(folder, "opening the job", &e))?;
     let text = match fs::read_to_string(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
@@ -104,6 +109,7 @@ fn open(folder: &Path) -> Result<Job, Failure> {
         }
         Err(e) => return Err(Failure::io(&path, "reading the plan", &e)),
     };
+    let folder = folder.canonicalize().map_err(|e| Failure::io(folder, "opening the job", &e))?;
     let broken = |e| Failure::Input(format!("{}: not as it was written ({e}); plan the job anew", path.display()));
     let planned: Planned = serde_json::from_str(&text).map_err(broken)?;
     if planned.version != env!("CARGO_PKG_VERSION") {
@@ -123,6 +129,9 @@ fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
     let Command::Convert(convert) = command_line(&typed)?.command else {
         return Err(Failure::Internal("internal error: the command line of a job is none of convert".into()));
     };
+    if convert.inputs.files_from.as_ref().is_some_and(|list| list.as_os_str() == "-") {
+        return Err(Failure::Usage("--files-from - does not go with a job: every process reads the list".to_owned()));
+    }
     let useless = [
         ("--dry-run", convert.dry_run),
         ("--resume", convert.resume),
@@ -140,21 +149,23 @@ fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
 }
 
 impl Job {
-    /// What this process may use.
-    fn with(mut self, resources: &JobResources) -> Result<Self, Failure> {
+    /// With what this process may use.
+    fn open(folder: &Path, resources: &JobResources) -> Result<Self, Failure> {
+        // before the folder that relative paths are of becomes that of the plan
+        let temp_dir = resources.temp_dir.as_ref().map(|dir| match dir.is_dir() {
+            true => std::path::absolute(dir).map_err(|e| Failure::io(dir, "looking for the folder", &e)),
+            false => Err(Failure::Usage(format!("{}: --temp-dir is not a folder", dir.display()))),
+        });
+        let temp_dir = temp_dir.transpose()?;
+        let mut job = open(folder)?;
         if let Some(bytes) = resources.memory {
-            self.plan.memory_bytes = bytes;
+            job.plan.memory_bytes = bytes;
         }
         if let Some(threads) = resources.threads {
-            self.plan.threads = usize::from(threads.get());
+            job.plan.threads = usize::from(threads.get());
         }
-        if let Some(dir) = &resources.temp_dir {
-            if !dir.is_dir() {
-                return Err(Failure::Usage(format!("{}: --temp-dir is not a folder", dir.display())));
-            }
-            self.plan.temp_dir = Some(dir.clone());
-        }
-        Ok(self)
+        job.plan.temp_dir = temp_dir.or(job.plan.temp_dir);
+        Ok(job)
     }
 }
 
@@ -230,7 +241,7 @@ fn describe(units: &JobUnits) -> String {
 }
 
 fn run_some(args: &JobRunArgs) -> Result<(), Failure> {
-    let job = open(&args.job)?.with(&args.resources)?;
+    let job = Job::open(&args.job, &args.resources)?;
     let progress = Progress::new(&args.talk, Some(stop_flag()));
     let done = match args.share {
         Some(share) => run_share(&job, share, &progress),
@@ -267,7 +278,7 @@ fn run_share(job: &Job, share: Share, progress: &Progress) -> Result<JobUnits, F
 }
 
 fn finish(args: &JobFinishArgs) -> Result<(), Failure> {
-    let job = open(&args.job)?.with(&args.resources)?;
+    let job = Job::open(&args.job, &args.resources)?;
     protect_inputs(&job.plan, false)?;
     let report_file = job.convert.report.as_ref().map(|file| {
         let sources = job.plan.inputs.iter().chain(&job.convert.inputs.files_from);

@@ -47,6 +47,9 @@ fn what_cannot_be_added_to_is_left_alone() {
     append(&["-o", "city", "--to", "bintree"]).failed_with(2, &["city", "potree2", "--to potree2"]);
     append(&["-o", "city", "--to", "potree2", "--to", "copc"]).failed_with(2, &["--append", "one dataset"]);
     append(&["-o", "city", "--overwrite"]).failed_with(2, &["--append", "--overwrite"]);
+    append(&["-o", "city", "--every", "2"]).failed_with(2, &["--every", "points of city"]);
+    append(&["-o", "city", "--axes", "y-up"]).failed_with(2, &["--axes", "points of city"]);
+    append(&["-o", "city", "--encoding", "brotli"]).failed_with(2, &["city", "another", "same options"]);
     append(&["-o", "city", "city"]).failed_with(2, &["city", "already"]);
     dir.write("cut.las", &std::fs::read(dir.path("b.las")).unwrap()[..5000]);
     dir.run(["convert", "cut.las", "-o", "city", "--append", "-q"]).failed_with(3, &["cut.las"]);

@@ -85,7 +85,9 @@ fn units_are_listed_for_people_and_for_programs() {
 fn mistakes_are_one_line_and_leave_the_job_alone() {
     let dir = stage();
     dir.run(["job", "units", "scans"]).failed_with(2, &["not the folder of a planned job", "job plan"]);
-    dir.run(["job", "units", "nowhere"]).failed_with(5, &["nowhere"]);
+    dir.run(["job", "units", "nowhere"]).failed_with(2, &["nowhere", "not the folder of a planned job"]);
+    dir.run(["job", "plan", "scans", "-o", "out", "--job", "out/the.job"]).failed_with(2, &["inside of the output"]);
+    dir.run(["job", "plan", "--files-from", "-", "-o", "out", "--job", "the.job"]).failed_with(2, &["--files-from -"]);
     dir.run(["job", "plan", "scans", "-o", "out", "--job", "scans"]).failed_with(2, &["not empty", "another folder"]);
     dir.run(["job", "plan", "scans", "-o", "plain", "--job", "the.job"]).failed_with(2, &["plain", "--overwrite"]);
     dir.run(["job", "plan", "scans", "-o", "out", "--job", "the.job", "--resume"]).failed_with(2, &["--resume"]);

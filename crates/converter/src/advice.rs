@@ -91,6 +91,8 @@ pub enum Advice {
     OtherFolder,
     /// Plan the job first.
     PlanJob,
+    /// Plan the job anew.
+    PlanAnew,
     /// List the units that there are.
     ListUnits,
     /// Do the units that are left.
@@ -146,6 +148,7 @@ impl fmt::Display for Advice {
             Self::StartAnew => "begin anew",
             Self::OtherFolder => "choose another folder",
             Self::PlanJob => "plan the job first",
+            Self::PlanAnew => "plan the job anew, in another folder",
             Self::ListUnits => "list the units that are ready",
             Self::RunUnits => "do them first",
             Self::WaitForRun => "wait until it has ended, or choose another output",

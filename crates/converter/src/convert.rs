@@ -299,7 +299,8 @@ fn above_ceiling(plan: &Plan, peak_before: Option<u64>) -> Option<Warning> {
         .then_some(Warning::AboveCeiling { peak, ceiling })
 }
 
-fn settings(plan: &Plan, targets: &[Target]) -> serde_json::Map<String, serde_json::Value> {
+/// What the report of a run says of its settings, by name.
+pub fn settings(plan: &Plan, targets: &[Target]) -> serde_json::Map<String, serde_json::Value> {
     let kinds: Vec<_> = targets.iter().map(Target::kind).collect();
     let mut settings = report::settings(plan, &kinds);
     targets.iter().for_each(|t| t.output().describe_settings(&mut settings));

@@ -251,6 +251,13 @@ pub enum JobFault {
         /// Its name.
         unit: String,
     },
+    /// Files of the job do not fit together: records or units were changed, lost or exchanged.
+    Mixed {
+        /// Its folder.
+        folder: PathBuf,
+        /// How that was found.
+        what: String,
+    },
     /// Units are not done: those that are known, in order.
     Unfinished {
         /// All units of the stage that the job has reached.
@@ -272,6 +279,7 @@ impl JobFault {
             Self::NoJob { .. } => Some(Advice::MoveAway),
             Self::NotEmpty { .. } => Some(Advice::OtherFolder),
             Self::NotThere { .. } => Some(Advice::PlanJob),
+            Self::Mixed { .. } => Some(Advice::PlanAnew),
             Self::NoUnit { .. } => Some(Advice::ListUnits),
             Self::Unfinished { .. } => Some(Advice::RunUnits),
             _ => Some(Advice::StartAnew),
@@ -297,6 +305,9 @@ impl fmt::Display for JobFault {
             Self::NotEmpty { folder } => write!(f, "{}: the folder for a job is not empty", folder.display()),
             Self::NotThere { folder } => write!(f, "{}: not the folder of a planned job", folder.display()),
             Self::NoUnit { unit } => write!(f, "{unit}: the job has no such unit, or not yet"),
+            Self::Mixed { folder, what } => {
+                write!(f, "{}: files of the job were changed or exchanged ({what})", folder.display())
+            }
             Self::Unfinished { units } => {
                 let open = units.iter().filter(|unit| !unit.done);
                 let first =

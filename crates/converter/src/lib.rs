@@ -53,7 +53,7 @@ mod unit_name;
 mod warning;
 
 pub use advice::Advice;
-pub use convert::{Verify, convert, convert_on, convert_verified};
+pub use convert::{Verify, convert, convert_on, convert_verified, settings};
 pub use error::{ConvertError, InputFault, JobFault, MemoryNeed, OutputFault, Unsupported};
 pub use estimate::estimate;
 pub use export::{ExportReport, ExportedAttribute, ExportedPoints, PositionChange, export, export_on};

@@ -82,9 +82,18 @@ pub fn finish_job(
 ) -> Result<Report, ConvertError> {
     let disk = disk();
     let job = SharedJob::open(folder, Task::Finish, &disk)?;
-    let report = make(&disk, plan, targets, events, verify, &mut JobOf::Shared(&job))?;
+    let made = make(&disk, plan, targets, events, verify, &mut JobOf::Shared(&job));
+    let report = made.map_err(|error| mixed(error, folder))?;
     job.end()?;
     Ok(report)
+}
+
+/// The sums of all points, or something before them, tell that records are not those that were read.
+fn mixed(error: ConvertError, folder: &Path) -> ConvertError {
+    match error {
+        ConvertError::Internal(what) => JobFault::Mixed { folder: folder.to_path_buf(), what }.into(),
+        other => other,
+    }
 }
 
 /// Does what the job is opened for; the output is not begun.
@@ -103,7 +112,7 @@ fn in_parts(
             let complete = units.iter().all(|unit| unit.done && is_last(unit.name.stage));
             Ok(JobUnits { units, complete })
         }
-        Err(other) => Err(other),
+        Err(other) => Err(mixed(other, job.folder())),
         Ok(_) => Err(ConvertError::Internal("a part of a job made its output".into())),
     }
 }

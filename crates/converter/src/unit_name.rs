@@ -30,6 +30,13 @@ impl fmt::Display for UnitName {
     }
 }
 
+impl UnitName {
+    /// Tells its file from those of other units; `mark`: how the work was divided.
+    pub(crate) fn label(self, mark: u32) -> u32 {
+        crc32c::crc32c_append(mark, self.to_string().as_bytes())
+    }
+}
+
 impl Stage {
     fn parts(self) -> (&'static str, u32) {
         match self {

@@ -133,6 +133,54 @@ fn a_second_pass_and_other_samplings_are_done_in_units_too() {
 }
 
 #[test]
+fn points_that_are_dropped_after_a_whole_pass_cost_a_second_one() {
+    let mut scans = scans();
+    scans[0].points[7].xyz = [2_000_000_000, 0, 0]; // 20,000 km away
+    let mut bench = Bench::new(&scans, targets().into());
+    bench.plan.outliers = pointmill_converter::Outliers::Drop;
+    bench.do_all(4);
+    let report = bench.finish().unwrap();
+    assert_eq!((report.points.read, report.points.outliers), (450_000, 1));
+    assert_same_dataset(&dataset(&bench.plan.output), &bench.plain(), "a job");
+}
+
+#[test]
+fn files_that_were_exchanged_are_no_units_and_records_that_changed_are_found() {
+    let bench = Bench::new(&scans(), targets().into());
+    bench.do_all(5);
+    let units = bench.job().join("units");
+    let [a, b] = ["build-0-0", "build-0-1"].map(|name| units.join(name));
+    let (first, second) = (fs::read(&a).unwrap(), fs::read(&b).unwrap());
+    fs::write(&a, &second).unwrap();
+    fs::write(&b, &first).unwrap();
+    assert!(matches!(bench.fault(bench.finish()), JobFault::Unfinished { .. }));
+    fs::write(&a, &first).unwrap();
+    fs::write(&b, &second).unwrap();
+    // of a unit that is built once more
+    let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+    let records = fs::read_dir(&units).unwrap().map(|e| e.unwrap().path());
+    for path in records.filter(|path| name(path).starts_with("read-") && name(path).ends_with(".records")) {
+        let mut bytes = fs::read(&path).unwrap();
+        let at = bytes.len() / 2;
+        bytes[at] ^= 1;
+        fs::write(path, bytes).unwrap();
+    }
+    for build in
+        fs::read_dir(&units).unwrap().map(|e| e.unwrap().path()).filter(|path| name(path).starts_with("build-"))
+    {
+        fs::remove_file(build).unwrap();
+    }
+    let mut known = Ok(bench.look());
+    while let Ok(JobUnits { complete: false, .. }) = &known {
+        let ready: Vec<UnitName> = known.iter().flat_map(JobUnits::ready).map(|unit| unit.name).collect();
+        known = bench.run(&ready);
+    }
+    let found = known.and_then(|_| bench.finish());
+    assert!(matches!(bench.fault(found), JobFault::Mixed { .. }));
+    assert!(!bench.plan.output.exists());
+}
+
+#[test]
 fn a_unit_that_is_done_twice_is_the_same_and_a_broken_one_is_done_again() {
     let bench = Bench::new(&scans(), vec![Potree2Settings::default().into()]);
     bench.do_all(3);

@@ -109,9 +109,15 @@ pub(crate) fn gather<'a>(
         let Some(stats) = misled.as_deref().or(complete.as_deref().map(|gathered| &gathered.stats)) else { continue };
         let settled = lattice::settled(plan, sources, &lattice, stats);
         let read = Read { lattice: &lattice, stats, complete: complete.as_deref(), settled: settled.as_ref() };
+        // what was settled of this pass is how others learn what follows from it
+        let end_pass = |is_complete: bool| match keeper.and_then(Keeper::shared).filter(|_| is_complete) {
+            Some(job) => job.end_settling(),
+            None => Ok(()),
+        };
         if far_cut.is_none()
             && let Some((others, points, without)) = read.without_outliers(plan, sources, rt)?
         {
+            end_pass(complete.is_some())?;
             warn(Warning::OutliersDropped { points, others });
             hint = Some(Hint { bounds: quantized(&without.lattice, &others), is_promise: false });
             (far_cut, lattice) = (Some(others), without);
@@ -126,6 +132,7 @@ pub(crate) fn gather<'a>(
                 lattice = other;
             }
             (Some(other), Some(_)) if pass < MAX_PASSES => {
+                end_pass(true)?;
                 warn(change_of_step(&lattice, &other));
                 hint = Some(Hint { bounds, is_promise: true });
                 lattice = other;

@@ -183,7 +183,9 @@ impl<'a> Pass<'a> {
             Some(Keeper::Own(job)) => job,
             Some(Keeper::Shared(job)) => {
                 let unit = read_unit::recall_shared(job, &self.context, number, &pairs)?;
-                return unit.ok_or_else(|| ConvertError::Internal("a unit is not done any more".into()));
+                let points = pairs.map(|pair| self.context.sources.pair_points(pair)).sum();
+                let listed = || job.listed(read_unit::name(self.context.pass, number), points, Vec::new());
+                return unit.ok_or_else(|| JobFault::Unfinished { units: vec![listed()] }.into());
             }
             None => return self.read_pairs(&pairs),
         };

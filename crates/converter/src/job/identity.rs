@@ -27,12 +27,19 @@ pub(crate) struct Identity {
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Fingerprint {
-    path: PathBuf,
+    /// As bytes: names need not be UTF-8.
+    path: Vec<u8>,
     bytes: u64,
     /// See [`crate::sources::Source::mark`].
     mark: u64,
     /// Checksums of the first and the last bytes; `None`: not looked at.
     ends: Option<[u32; 2]>,
+}
+
+impl Fingerprint {
+    fn shown(&self) -> PathBuf {
+        String::from_utf8_lossy(&self.path).into_owned().into()
+    }
 }
 
 impl Identity {
@@ -56,6 +63,7 @@ impl Identity {
             let look = || ends(&path, source.file_bytes);
             let ends =
                 looks_closely.then(look).transpose().map_err(|e| ConvertError::io(&path, "reading the scan", e))?;
+            let path = path.as_os_str().as_encoded_bytes().to_vec();
             Ok(Fingerprint { path, bytes: source.file_bytes, mark: source.mark(), ends })
         });
         let version = env!("CARGO_PKG_VERSION").to_owned();
@@ -77,15 +85,15 @@ impl Identity {
         }
         for (was, now) in was.inputs.iter().zip(&self.inputs) {
             if was.path != now.path {
-                return Some(JobFault::OtherInputs { path: was.path.clone() });
+                return Some(JobFault::OtherInputs { path: was.shown() });
             }
             let are_ends_same = was.ends.zip(now.ends).is_none_or(|(was, now)| was == now);
             if (was.bytes, was.mark) != (now.bytes, now.mark) || !are_ends_same {
-                return Some(JobFault::ChangedInput { path: now.path.clone() });
+                return Some(JobFault::ChangedInput { path: now.shown() });
             }
         }
         let more = was.inputs.get(self.inputs.len()).or_else(|| self.inputs.get(was.inputs.len()));
-        more.map(|input| JobFault::OtherInputs { path: input.path.clone() })
+        more.map(|input| JobFault::OtherInputs { path: input.shown() })
     }
 }
 

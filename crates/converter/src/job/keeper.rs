@@ -99,18 +99,14 @@ impl<'a> GroupUnits<'a> {
         take: impl FnOnce(&UnitReader) -> Result<T, ConvertError>,
     ) -> Result<Option<T>, ConvertError> {
         let unit = self.name(number);
-        let take = |file: &UnitReader| match file.get::<u32>(file.sections().saturating_sub(1))? == self.mark {
-            true => take(file),
-            false => Err(file.damaged(0)), // of another division, or of no unit at all
-        };
         let job = match self.keeper {
-            Keeper::Shared(job) => return job.recall(unit, take),
+            Keeper::Shared(job) => return job.recall_marked(unit, self.mark, take),
             Keeper::Own(job) => job,
         };
         let path = job.built_path(unit);
         let Ok(meta) = std::fs::metadata(&path) else { return Ok(None) };
         let file = DiskFile::open(&path, path.clone(), &job.disk)?;
-        match UnitReader::open(&path, file, meta.len()).and_then(|reader| take(&reader)) {
+        match UnitReader::open(&path, unit.label(self.mark), file, meta.len()).and_then(|reader| take(&reader)) {
             Ok(value) => Ok(Some(value)),
             // it was not safe when the power failed
             Err(ConvertError::Job(JobFault::Damaged { .. })) => Ok(None),
@@ -132,14 +128,10 @@ impl<'a> GroupUnits<'a> {
         fill: impl FnOnce(&mut UnitWriter) -> Result<(), ConvertError>,
     ) -> Result<(), ConvertError> {
         let unit = self.name(number);
-        let fill = |file: &mut UnitWriter| {
-            fill(file)?;
-            file.put(&self.mark)
-        };
         match self.keeper {
-            Keeper::Shared(job) => job.keep(unit, fill),
+            Keeper::Shared(job) => job.keep_marked(unit, self.mark, fill),
             Keeper::Own(job) => {
-                let mut file = UnitWriter::create(&job.built_path(unit), &job.disk)?;
+                let mut file = UnitWriter::create(&job.built_path(unit), unit.label(self.mark), &job.disk)?;
                 fill(&mut file)?;
                 file.finish(false) // what the disk loses is found out by its sums, and made again
             }

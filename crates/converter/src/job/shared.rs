@@ -105,12 +105,17 @@ impl SharedJob {
     pub(crate) fn identify(&self, identity: &Identity) -> Result<(), ConvertError> {
         let path = self.folder.join(IDENTITY);
         if matches!(self.task, Task::Plan) {
-            let mut file = UnitWriter::create(&path, &self.disk)?;
+            let mut file = UnitWriter::create(&path, 0, &self.disk)?;
             file.put(identity)?;
             return file.finish(true);
         }
-        let was: Identity = self.read(&path)?.get(0)?;
+        let was: Identity = self.read(&path, 0)?.get(0)?;
         identity.differs_from(&was).map_or(Ok(()), |fault| Err(fault.into()))
+    }
+
+    /// The folder.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// What this process does.
@@ -147,11 +152,21 @@ impl SharedJob {
         unit: UnitName,
         take: impl FnOnce(&UnitReader) -> Result<T, ConvertError>,
     ) -> Result<Option<T>, ConvertError> {
+        self.recall_marked(unit, 0, take)
+    }
+
+    /// [`Self::recall`] of a unit of work that was divided so.
+    pub(super) fn recall_marked<T>(
+        &self,
+        unit: UnitName,
+        mark: u32,
+        take: impl FnOnce(&UnitReader) -> Result<T, ConvertError>,
+    ) -> Result<Option<T>, ConvertError> {
         if !self.is_done(unit) {
             return Ok(None);
         }
         let path = self.path(unit);
-        match self.read(&path).and_then(|reader| take(&reader)) {
+        match self.read(&path, unit.label(mark)).and_then(|reader| take(&reader)) {
             Ok(value) => Ok(Some(value)),
             Err(ConvertError::Job(JobFault::Damaged { .. })) => {
                 fs::remove_file(&path).map_err(|e| ConvertError::io(&path, "removing a broken unit", e))?;
@@ -168,7 +183,17 @@ impl SharedJob {
         unit: UnitName,
         fill: impl FnOnce(&mut UnitWriter) -> Result<(), ConvertError>,
     ) -> Result<(), ConvertError> {
-        let mut file = UnitWriter::create(&self.path(unit), &self.disk)?;
+        self.keep_marked(unit, 0, fill)
+    }
+
+    /// [`Self::keep`] of a unit of work that was divided so.
+    pub(super) fn keep_marked(
+        &self,
+        unit: UnitName,
+        mark: u32,
+        fill: impl FnOnce(&mut UnitWriter) -> Result<(), ConvertError>,
+    ) -> Result<(), ConvertError> {
+        let mut file = UnitWriter::create(&self.path(unit), unit.label(mark), &self.disk)?;
         fill(&mut file)?;
         file.finish(true)?;
         self.lock_done().insert(unit);
@@ -272,13 +297,16 @@ impl SharedJob {
         Ok(value)
     }
 
-    /// Ends settling, if this process does it: its results are safe then.
+    /// Ends settling, if this process does it: its results are safe then. What another process has settled meanwhile stays: units may
+    /// have been built from it.
     pub(crate) fn end_settling(&self) -> Result<(), ConvertError> {
-        let settling = self.settling();
-        if !settling.is_running {
+        let Settling { pass, is_running, results, .. } = std::mem::take(&mut *self.settling());
+        if !is_running {
             return Ok(());
         }
-        self.keep(settle(settling.pass), |file| file.put(&settling.results))
+        self.look_again()?;
+        let unit = settle(pass);
+        if self.is_done(unit) { Ok(()) } else { self.keep(unit, |file| file.put(&results)) }
     }
 
     /// Removes the job, and what else its processes have left in its folders. Files of others stay.
@@ -307,10 +335,10 @@ impl SharedJob {
         self.folder.join(UNITS).join(unit.to_string())
     }
 
-    fn read(&self, path: &Path) -> Result<UnitReader, ConvertError> {
+    fn read(&self, path: &Path, label: u32) -> Result<UnitReader, ConvertError> {
         let fail = |e| ConvertError::io(path, "opening a unit", e);
         let length = fs::metadata(path).map_err(fail)?.len();
-        UnitReader::open(path, DiskFile::open(path, path.to_path_buf(), &self.disk)?, length)
+        UnitReader::open(path, label, DiskFile::open(path, path.to_path_buf(), &self.disk)?, length)
     }
 
     fn lock_done(&self) -> MutexGuard<'_, HashSet<UnitName>> {

@@ -123,13 +123,13 @@ mod tests {
         let (path, disk): (_, Arc<dyn Disk>) = (dir.path().join("unit"), Arc::new(SystemDisk));
         let large: Vec<u8> = (0..PIECE_BYTES + 5).map(|i| (i % 253) as u8).collect();
         let pieces = [(7u64, &large[..]), (9, &[]), (1, &[1, 2, 3])];
-        let mut file = UnitWriter::create(&path, &disk).unwrap();
+        let mut file = UnitWriter::create(&path, 0, &disk).unwrap();
         let log = UnitLog::begin(&mut file);
         pieces.iter().for_each(|(place, bytes)| log.put(*place, bytes).unwrap());
         log.end(&"the end").unwrap();
         file.finish(true).unwrap();
         let open = |path: &Path| DiskFile::open(path, path.to_path_buf(), &disk).unwrap();
-        let unit = UnitReader::open(&path, open(&path), std::fs::metadata(&path).unwrap().len()).unwrap();
+        let unit = UnitReader::open(&path, 0, open(&path), std::fs::metadata(&path).unwrap().len()).unwrap();
         let mut found: Vec<(u64, Vec<u8>)> = Vec::new();
         let came_to: String = put_back(&unit, 3, |place: &u64, from, bytes| {
             assert_eq!(from % 3, 0);

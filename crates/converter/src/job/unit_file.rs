@@ -1,11 +1,11 @@
 //! The file that a unit leaves: sections with a checksum each, and a table of them at its end. It gets its name once it is complete.
 //!
 //! ```text
-//! magic, 16 bytes │ section │ section │ … │ table │ length of the table u32 │ CRC-32C of the table u32 │ magic, 16 bytes
+//! magic, 16 bytes │ section │ section │ … │ table │ length of the table u32 │ CRC-32C of the table u32 │ label u32 │ magic, 16 bytes
 //! table: offset u64, length u64, CRC-32C u32 of each section
 //! ```
 //!
-//! All little-endian. A file that is cut, or has another byte anywhere, is not whole: the unit is done again.
+//! All little-endian. The label tells what the file is of: one that was given the name of another is not whole. A file that is cut, or has another byte anywhere, is not whole: the unit is done again.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::runtime::disk::{rename, sync_folder};
 use crate::runtime::{Disk, DiskFile};
 
 const MAGIC: &[u8; 16] = b"pointmill unit 1";
-const TAIL_BYTES: u64 = 24;
+const TAIL_BYTES: u64 = 28;
 const ENTRY_BYTES: usize = 20;
 
 /// Bytes that are written together.
@@ -45,14 +45,15 @@ pub(crate) struct UnitWriter {
     disk: Arc<dyn Disk>,
     sections: Vec<Section>,
     buffer: Vec<u8>,
+    label: u32,
     /// Bytes that are in the file.
     written: u64,
     is_done: bool,
 }
 
 impl UnitWriter {
-    /// Begins the file `path`; several processes may do so at once.
-    pub(crate) fn create(path: &Path, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
+    /// Begins the file `path`; several processes may do so at once. `label`: what it is of.
+    pub(crate) fn create(path: &Path, label: u32, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
         let new = new_name(path);
         let file = DiskFile::create(&new, path.to_path_buf(), disk)?;
         Ok(Self {
@@ -62,6 +63,7 @@ impl UnitWriter {
             disk: Arc::clone(disk),
             sections: Vec::new(),
             buffer: MAGIC.to_vec(),
+            label,
             written: 0,
             is_done: false,
         })
@@ -117,7 +119,13 @@ impl UnitWriter {
             table.extend_from_slice(&bytes.to_le_bytes());
             table.extend_from_slice(&sum.to_le_bytes());
         }
-        let tail = [&(table.len() as u32).to_le_bytes()[..], &crc32c::crc32c(&table).to_le_bytes(), MAGIC].concat();
+        let tail = [
+            &(table.len() as u32).to_le_bytes()[..],
+            &crc32c::crc32c(&table).to_le_bytes(),
+            &self.label.to_le_bytes(),
+            MAGIC,
+        ]
+        .concat();
         self.append(&table)?;
         self.append(&tail)?;
         self.flush()?;
@@ -160,8 +168,8 @@ impl UnitReader {
     /// Opens a file that is there.
     ///
     /// # Errors
-    /// It is not whole, or cannot be read.
-    pub(crate) fn open(path: &Path, file: DiskFile, length: u64) -> Result<Self, ConvertError> {
+    /// It is not whole, of something else, or cannot be read.
+    pub(crate) fn open(path: &Path, label: u32, file: DiskFile, length: u64) -> Result<Self, ConvertError> {
         let broken = |byte: u64| ConvertError::Job(JobFault::Damaged { file: path.to_path_buf(), byte });
         let Some(at) = length.checked_sub(TAIL_BYTES).filter(|at| *at >= MAGIC.len() as u64) else {
             return Err(broken(length));
@@ -170,7 +178,9 @@ impl UnitReader {
         file.read_at(&mut tail, at, "reading a unit")?;
         let word = |i: usize| u32::from_le_bytes([0, 1, 2, 3].map(|j| tail[i + j]));
         let (bytes, sum) = (u64::from(word(0)), word(4));
-        let start = at.checked_sub(bytes).filter(|start| *start >= MAGIC.len() as u64 && tail[8..] == *MAGIC);
+        let start = at
+            .checked_sub(bytes)
+            .filter(|start| *start >= MAGIC.len() as u64 && tail[12..] == *MAGIC && word(8) == label);
         let start = start.filter(|_| bytes % ENTRY_BYTES as u64 == 0).ok_or_else(|| broken(at))?;
         let mut table = vec![0; bytes as usize];
         file.read_at(&mut table, start, "reading a unit")?;
@@ -254,7 +264,7 @@ mod tests {
     fn open(path: &Path) -> Result<UnitReader, ConvertError> {
         let disk: Arc<dyn Disk> = Arc::new(SystemDisk);
         let length = std::fs::metadata(path).unwrap().len();
-        UnitReader::open(path, DiskFile::open(path, path.to_path_buf(), &disk).unwrap(), length)
+        UnitReader::open(path, 7, DiskFile::open(path, path.to_path_buf(), &disk).unwrap(), length)
     }
 
     fn read(path: &Path) -> Result<(Vec<u32>, Vec<u8>, u64), ConvertError> {
@@ -269,7 +279,7 @@ mod tests {
         let (path, disk): (_, Arc<dyn Disk>) = (dir.path().join("unit"), Arc::new(SystemDisk));
         let large: Vec<u8> = (0..2_500_000u32).map(|i| (i % 251) as u8).collect();
         for bytes in [&large[..], &large[..100], &[]] {
-            let mut unit = UnitWriter::create(&path, &disk).unwrap();
+            let mut unit = UnitWriter::create(&path, 7, &disk).unwrap();
             unit.put(&vec![1u32, 70_000]).unwrap();
             unit.begin();
             bytes.chunks(900_001).for_each(|part| unit.write(part).unwrap());
@@ -278,7 +288,7 @@ mod tests {
             assert!(numbers == [1, 70_000] && back == bytes);
         }
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is left beside it");
-        let mut unit = UnitWriter::create(&path, &disk).unwrap();
+        let mut unit = UnitWriter::create(&path, 7, &disk).unwrap();
         unit.put(&vec![1u32, 70_000]).unwrap();
         unit.begin();
         unit.write(&large[..100]).unwrap();
@@ -292,7 +302,11 @@ mod tests {
             std::fs::write(&path, &whole[..at]).unwrap();
             assert!(matches!(read(&path), Err(ConvertError::Job(JobFault::Damaged { .. }))), "cut at {at}");
         }
-        drop(UnitWriter::create(&path, &disk).unwrap());
+        std::fs::write(&path, &whole).unwrap();
+        let length = whole.len() as u64;
+        let other = UnitReader::open(&path, 8, DiskFile::open(&path, path.clone(), &disk).unwrap(), length);
+        assert!(matches!(other, Err(ConvertError::Job(JobFault::Damaged { .. }))), "of something else");
+        drop(UnitWriter::create(&path, 7, &disk).unwrap());
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "one that was not finished is removed");
     }
 }

@@ -51,6 +51,9 @@ const TASKS_PER_THREAD: u64 = 6;
 const MAX_TASK_POINTS: u64 = 800_000;
 const MIN_TASK_POINTS: u64 = 50_000;
 
+/// The same of a job that several processes share.
+const SHARED_TASK_POINTS: u64 = 400_000;
+
 /// Bytes of the record of a batch.
 const BATCH_BYTES: u64 = 32;
 
@@ -131,6 +134,9 @@ impl Output for BatchesSettings {
         let (points, per_point) = (cloud.points(), bytes_per_point(cloud.frame.stride));
         let most = rt.budget.task_points(per_point, MAX_TASK_POINTS);
         let task_points = (points / (rt.threads as u64 * TASKS_PER_THREAD)).max(MIN_TASK_POINTS).min(most);
+        // processes that share a job may have other memory and threads: how it is divided must be the same whoever does it
+        let is_shared = units.is_some_and(|units| units.shared().is_some());
+        let task_points = if is_shared { SHARED_TASK_POINTS } else { task_points };
         let content = Content::choose(cloud);
         let frame = Frame::new(cloud, self.lod_cell)?;
         let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();

@@ -51,6 +51,9 @@ use crate::warning::Warning;
 /// Tasks of this size keep all threads busy to the end, and few cells are cut above them.
 const MAX_TASK_POINTS: u64 = 2_000_000;
 
+/// The same of a job that several processes share, whatever memory they have.
+const SHARED_TASK_POINTS: u64 = 500_000;
+
 /// This many files are slow to write, to copy and to list.
 const MANY_FILES: usize = 20_000;
 
@@ -125,6 +128,9 @@ impl Output for BintreeSettings {
         let columns = Columns::choose(cloud)?;
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
+        // processes that share a job may have other memory: how it is divided must be the same whoever does it
+        let is_shared = units.is_some_and(|units| units.shared().is_some());
+        let task_points = if is_shared { SHARED_TASK_POINTS } else { task_points };
         let split = || Ok((upper::split(cloud, rt, self, task_points)?, task_points));
         let (upper, task_points) = match units.and_then(|units| Some((units, units.shared()?))) {
             Some((units, job)) => job.settled(&units.division(), &cloud.store, split)?,
