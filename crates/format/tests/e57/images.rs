@@ -106,7 +106,7 @@ fn damaged_descriptions_give_images_or_an_error() {
         let found = (xml..whole.len() - name.len()).filter(move |at| whole[*at..].starts_with(name.as_bytes()));
         found.map(move |at| at + name.len()..at + name.len() + 4)
     });
-    let ranges: Vec<_> = places.chain([xml..whole.len()]).collect();
+    let ranges: Vec<_> = places.chain(std::iter::once(xml..whole.len())).collect();
     let (path, mut random, mut read) = (files::temporary(b""), Random::new(41), [0; 2]);
     for _ in 0..rounds(500) {
         let mut damaged = mutated(whole, &ranges, &mut random);
