@@ -12,6 +12,7 @@ fn main() -> io::Result<()> {
         ("copc", "copc", &["laz"]),
         ("copc_validate", "copc", &["laz"]),
         ("e57", "e57", &["e57"]),
+        ("images", "e57", &["e57"]),
         ("ply", "rows", &["ply"]),
         ("pcd", "rows", &["pcd"]),
         ("text", "rows", &["xyz", "txt", "asc", "csv", "pts", "ptx", "off"]),
@@ -62,6 +63,34 @@ fn main() -> io::Result<()> {
         if let Some(name) = path.file_name().filter(|_| path.extension().is_some_and(|e| e == "qbatch")) {
             fs::copy(&path, corpus.join(name))?;
         }
+    }
+    datasets(&fixtures, &fuzz.join("corpus/datasets"))
+}
+
+/// What the target writes to a folder: the kind, then files with their lengths, the last without.
+fn datasets(fixtures: &Path, corpus: &Path) -> io::Result<()> {
+    fs::create_dir_all(corpus)?;
+    let all: [(u8, &str, &[&str]); 9] = [
+        (0, "potree2/default", &["metadata.json", "hierarchy.bin", "", "octree.bin"]),
+        (0, "potree2/brotli", &["metadata.json", "hierarchy.bin", "", "octree.bin"]),
+        (1, "potree1/objects", &["cloud.js", "data/r/r.hrc", "", "data/r/r.bin"]),
+        (1, "potree1/flat", &["cloud.js", "", "", "data/r.bin"]),
+        (2, "bintree/files", &["index.json", "n00.bin", "n010.bin", "n011.bin"]),
+        (3, "bintree/packed", &["index.json", "", "leaves.bin"]),
+        (4, "batches", &["example.qbatch"]),
+        (4, "batches", &["blocks.qbatch"]),
+        (4, "batches", &["coarse.qbatch"]),
+    ];
+    for (kind, folder, names) in all {
+        let mut input = vec![kind];
+        for (i, name) in names.iter().enumerate() {
+            let bytes = if name.is_empty() { Vec::new() } else { fs::read(fixtures.join(folder).join(name))? };
+            if i + 1 < names.len() {
+                input.extend((bytes.len() as u32).to_le_bytes());
+            }
+            input.extend(bytes);
+        }
+        fs::write(corpus.join(format!("{}-{}", folder.replace('/', "-"), names[names.len() - 1])), input)?;
     }
     Ok(())
 }

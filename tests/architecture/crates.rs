@@ -21,7 +21,7 @@ const ALLOWED: [(&str, &[&str]); 10] = [
         ],
     ),
     ("pointmill-capi", &["pointmill-format", "pointmill-validate", "pointmill-testkit"]),
-    ("pointmill-crs", &["pointmill-format"]),
+    ("pointmill-crs", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-converter", &["pointmill-format", "pointmill-testkit"]),
     ("pointmill-measure", &["pointmill-format", "pointmill-render", "pointmill-testkit"]),
     ("pointmill-render", &["pointmill-format", "pointmill-testkit"]),

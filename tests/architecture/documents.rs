@@ -16,6 +16,7 @@ const OTHER_OPTIONS: &[&str] = &[
     "--format",
     "--ignored",
     "--jobs",
+    "--kills",
     "--lend",
     "--locked",
     "--note",

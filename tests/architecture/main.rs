@@ -8,6 +8,7 @@ mod imports;
 mod layers;
 mod modules;
 mod planted;
+mod promises;
 mod tokens;
 
 use std::path::{Path, PathBuf};

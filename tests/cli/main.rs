@@ -3,6 +3,7 @@
 mod accuracy;
 mod appending;
 mod arguments;
+mod at_once;
 mod attributes;
 mod bad_input;
 mod bad_output;
@@ -21,6 +22,7 @@ mod hostile;
 mod inputs;
 mod interrupted;
 mod jobs;
+mod killed;
 mod manual;
 mod many;
 mod measure;

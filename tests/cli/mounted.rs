@@ -78,6 +78,79 @@ fn a_full_disk_is_answered_with_advice_for_that_disk() {
     dir.validate("new", &["a.las"]);
 }
 
+/// Converts `b.las` over the dataset `old` on a disk with these limits; checks that it is the old or the new one, and alone.
+/// `None`: no rights. Else true if there was enough.
+fn is_enough(dir: &Dir, limits: &str, output: &str) -> Option<bool> {
+    let script = format!(
+        "mount -t tmpfs -o {limits} none store && cp -a old store/out || exit 99
+         \"$0\" convert b.las -o store/out --overwrite {output}; code=$?; ls -A store
+         if [ $code = 0 ]; then diff -rq -x report.json new store/out; else diff -rq old store/out; fi || exit 98; exit $code"
+    );
+    let ended = mounted(dir, &script)?;
+    let is_enough = ended.code() == 0;
+    if !is_enough {
+        ended.failed_with(5, &["store/out", "No space left"]);
+    }
+    assert_eq!(ended.stdout(), "out\n", "{limits} {output}");
+    Some(is_enough)
+}
+
+/// An old dataset, and the new one as a disk with enough room has it; how many inodes both take.
+fn old_and_new(dir: &Dir, output: &str) -> usize {
+    let convert = |scan, out| ["convert", scan, "-o", out, "-q", "--overwrite"].into_iter().chain(output.split(' '));
+    dir.succeed(convert("a.las", "old"));
+    dir.succeed(convert("b.las", "new"));
+    let count = |name: &str| walkdir::WalkDir::new(dir.path(name)).into_iter().count();
+    count("old") + count("new")
+}
+
+const ON_SMALL_DISKS: [&str; 3] =
+    ["--to potree2", "--to bintree --capacity 3000", "--to potree2 --to batches --to copc"];
+
+#[test]
+fn a_disk_that_is_full_in_any_phase_keeps_the_old_dataset() {
+    let dir = with_scans();
+    for output in ON_SMALL_DISKS {
+        old_and_new(&dir, output);
+        let (mut low, mut high) = (500, 10_000); // KiB
+        while high - low > 4 {
+            let middle = (low + high) / 8 * 4;
+            let Some(is_enough) = is_enough(&dir, &format!("size={middle}k"), output) else { return };
+            (low, high) = if is_enough { (low, middle) } else { (middle, high) };
+        }
+        // just below what is enough, the files that are written last do not fit
+        assert!((2..8).all(|pages| is_enough(&dir, &format!("size={}k", high - 4 * pages), output) == Some(false)));
+    }
+}
+
+#[test]
+fn a_disk_without_inodes_keeps_the_old_dataset() {
+    let dir = with_scans();
+    for output in ON_SMALL_DISKS {
+        let most = old_and_new(&dir, output) + 10;
+        let have = walkdir::WalkDir::new(dir.path("old")).into_iter().count() + 1;
+        let mut short = 0;
+        for inodes in have..most {
+            match is_enough(&dir, &format!("size=100m,nr_inodes={inodes}"), output) {
+                None => return,
+                Some(true) => break,
+                Some(false) => short += 1,
+            }
+        }
+        assert!(short >= 5 && have + short < most, "{output}: {short}");
+    }
+}
+
+#[test]
+fn a_temporary_folder_that_cannot_be_written_is_an_error_before_the_work() {
+    let dir = with_scans();
+    let script = "mount -t tmpfs -o ro none store
+                  \"$0\" convert a.las -o new --temp-dir store --checkpoint always --progress json";
+    let Some(ended) = mounted(&dir, script) else { return };
+    ended.failed_with(5, &["store", "ead-only"]);
+    assert!(!ended.stderr().contains("\"read\"") && !dir.path("new").exists(), "{}", ended.stderr());
+}
+
 /// The folder of the output was made for a user who may write nothing beside it.
 #[test]
 fn an_output_in_a_folder_of_others_is_made_and_replaced() {

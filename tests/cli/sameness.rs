@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 
-use crate::support::Dir;
+use crate::support::{Dir, OUTPUTS};
 
 fn two_scans(points: usize) -> Dir {
     let dir = Dir::new();
@@ -29,6 +29,24 @@ fn one_thread_or_four() {
     let one = bytes(&dir, &["scans", "--threads", "1"]);
     assert_eq!(bytes(&dir, &["scans", "--threads", "4"]), one);
     assert_eq!(bytes(&dir, &["scans", "--threads", "4"]), one, "a second time");
+}
+
+#[test]
+fn whatever_threads_folder_of_temporary_files_order_or_job_for_every_output() {
+    let dir = two_scans(20_000);
+    std::fs::create_dir(dir.path("temp")).unwrap();
+    for output in OUTPUTS {
+        let options = |more: &[&'static str]| [more, output].concat();
+        let plain = bytes(&dir, &options(&["scans/a.las", "scans/b.las", "--threads", "1"]));
+        let others: [&[&str]; 2] = [
+            &["scans/b.las", "scans/a.las", "--threads", "4", "--temp-dir", "temp"],
+            &["scans/b.las", "scans/a.las", "--threads", "2", "--temp-dir", "temp", "--checkpoint", "5000"],
+        ];
+        for other in others {
+            assert!(bytes(&dir, &options(other)) == plain, "{output:?}, {other:?}");
+        }
+        assert_eq!(std::fs::read_dir(dir.path("temp")).unwrap().count(), 0);
+    }
 }
 
 #[test]

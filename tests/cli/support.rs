@@ -7,6 +7,18 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
+/// Options of every kind of output.
+pub(crate) const OUTPUTS: [&[&str]; 8] = [
+    &["--to", "potree2"],
+    &["--to", "potree1"],
+    &["--to", "potree1", "--archive"],
+    &["--to", "copc"],
+    &["--to", "bintree", "--capacity", "1000"],
+    &["--to", "bintree", "--layout", "packed"],
+    &["--to", "batches"],
+    &["--to", "potree2", "--to", "bintree", "--to", "batches"],
+];
+
 /// One temporary folder per test.
 pub(crate) struct Dir(tempfile::TempDir);
 

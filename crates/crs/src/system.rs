@@ -207,7 +207,7 @@ fn by_keys(crs: &Crs) -> Option<Result<System, CrsError>> {
 fn unsupported(text: &str, error: &proj_wkt::ParseError) -> CrsError {
     let why = error.to_string();
     let bare = PREFIXES.iter().fold(why.as_str(), |why, prefix| why.strip_prefix(prefix).unwrap_or(why));
-    CrsError::Unsupported { definition: quoted(text), why: bare.to_owned() }
+    CrsError::Unsupported { definition: quoted(text), why: one_line(bare) }
 }
 
 fn is_definition(text: &str) -> bool {
@@ -231,8 +231,13 @@ fn code_at_the_end(wkt: &str) -> Option<String> {
     code.parse::<u32>().ok().map(|code| format!("EPSG:{code}"))
 }
 
+/// The parser quotes what it was given.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
 fn quoted(text: &str) -> String {
-    let mut short: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_QUOTED).collect();
+    let mut short: String = one_line(text).chars().take(MAX_QUOTED).collect();
     if text.chars().count() > MAX_QUOTED {
         short.push('…');
     }

@@ -4,9 +4,11 @@ use std::ops::ControlFlow;
 
 use pointmill_format::scan::e57;
 use pointmill_format::{Blob, ImageEncoding, ImageKind, ReadError, ScanImage, ScanInfo};
-use pointmill_testkit::files;
+use pointmill_testkit::damage::{mutated, rounds, u64_at};
+use pointmill_testkit::reader::check_error;
+use pointmill_testkit::{Random, files};
 
-use crate::common::{fixture, replace};
+use crate::common::{fixture, repair, replace};
 
 fn info() -> ScanInfo {
     e57::open(files::fixture("e57").join("images.e57")).unwrap().info().clone()
@@ -93,4 +95,33 @@ fn an_image_that_is_not_where_it_should_be_is_told() {
     replace(&mut lost, "length=\"", "len=\"");
     let scan = e57::open(files::temporary(&lost)).unwrap();
     assert!(scan.info().warnings.iter().any(|w| w.to_string().contains("has no length")), "{:?}", scan.info().warnings);
+}
+
+#[test]
+fn damaged_descriptions_give_images_or_an_error() {
+    let whole = &fixture("images.e57")[..];
+    let xml = u64_at(whole, 24) as usize;
+    // anything, and more often where images are said to be
+    let places = ["fileOffset=\"", "length=\""].into_iter().flat_map(|name| {
+        let found = (xml..whole.len() - name.len()).filter(move |at| whole[*at..].starts_with(name.as_bytes()));
+        found.map(move |at| at + name.len()..at + name.len() + 4)
+    });
+    let ranges: Vec<_> = places.chain([xml..whole.len()]).collect();
+    let (path, mut random, mut read) = (files::temporary(b""), Random::new(41), [0; 2]);
+    for _ in 0..rounds(500) {
+        let mut damaged = mutated(whole, &ranges, &mut random);
+        repair(&mut damaged);
+        std::fs::write(&path, &damaged).unwrap();
+        let Ok(scan) = e57::open(&path).inspect_err(check_error) else { continue };
+        for image in &scan.info().images {
+            for blob in [Some(image.data), image.mask].into_iter().flatten() {
+                match bytes(&path, &blob).inspect_err(check_error) {
+                    Ok(bytes) => assert_eq!(bytes.len() as u64, blob.bytes),
+                    Err(_) => read[1] += 1,
+                }
+                read[0] += 1;
+            }
+        }
+    }
+    assert!(read[0] > 200 && read[1] > 5, "{read:?}");
 }

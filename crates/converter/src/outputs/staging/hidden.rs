@@ -190,7 +190,8 @@ impl Drop for HiddenFolder {
         }
         let is_empty = fs::read_dir(&self.path).is_ok_and(|entries| entries.count() <= 1);
         if is_empty {
-            let _ = fs::remove_file(self.path.join(LOCK)).and_then(|()| fs::remove_dir(&self.path));
+            let _ = fs::remove_file(self.path.join(LOCK)); // not there where the disk had no room for it
+            let _ = fs::remove_dir(&self.path);
         }
         remove_empty(&self.parents);
     }
