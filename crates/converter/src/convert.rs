@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::cloud::{Cloud, Intake};
+use crate::cloud::Intake;
 use crate::error::{ConvertError, JobFault};
 use crate::gather::{Demand, gather, is_coarse};
-use crate::job::{GroupUnits, Identity, Job, Keeper, SharedJob};
+use crate::job::{Build, GroupUnits, Identity, Job, Keeper, SharedJob};
 use crate::memory::peak_resident_bytes;
 use crate::outputs::{self, StagedDataset, StagedFolder, Target};
 use crate::plan::Plan;
@@ -213,7 +213,7 @@ fn write(
         clock.begin(Phase::Build, cloud.points());
         let together: Vec<&Target> = group.iter().map(|i| &targets[*i]).collect();
         let units = keeper.map(|keeper| GroupUnits::new(keeper, number as u32));
-        match build(&together, &cloud, &rt, staged, targets.len() == 1, units) {
+        match build(&together, Build { cloud: &cloud, rt: &rt, units }, staged, targets.len() == 1) {
             Ok(built) => outputs.extend(group.into_iter().zip(built)),
             // those of the other groups are to be known, too
             Err(ConvertError::Job(JobFault::Unfinished { units })) => open.extend(units),
@@ -254,17 +254,16 @@ fn write(
 /// Builds the datasets of targets that are built together.
 fn build(
     targets: &[&Target],
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
+    build: Build<'_>,
     staged: &StagedFolder,
     is_only_one: bool,
-    units: Option<GroupUnits<'_>>,
 ) -> Result<Vec<OutputReport>, ConvertError> {
+    let Build { cloud, rt, .. } = build;
     let start = Instant::now();
     let datasets: Vec<_> =
         targets.iter().map(|target| staged.dataset(target.kind(), is_only_one)).collect::<Result<_, _>>()?;
     let _building = rt.budget.building(&rt.memory, cloud.points())?;
-    let mut reports = outputs::write(targets, &datasets, cloud, rt, units)?;
+    let mut reports = outputs::write(targets, &datasets, build)?;
     datasets.iter().try_for_each(StagedDataset::sync)?;
     for (i, (report, dataset)) in reports.iter_mut().zip(&datasets).enumerate() {
         report.warnings.iter().for_each(|w| rt.events().warning(w));

@@ -45,7 +45,7 @@ pub(crate) use visit::{Reading, Visit};
 
 use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
 use crate::error::{ConvertError, InputFault, Unsupported};
-use crate::job::Keeper;
+use crate::job::{self, Keeper};
 use crate::plan::{OriginPoints, Outliers, Plan, ScaleChoice};
 use crate::runtime::{Clock, Phase, Runtime};
 use crate::sources::{Fineness, Sources, far_out, intersection};
@@ -144,10 +144,7 @@ pub(crate) fn gather<'a>(
             (_, Some(mut gathered)) => {
                 if let Some(mark) = intake.mark {
                     let count = || fallen::count(&gathered, mark);
-                    let fallen = match keeper.and_then(Keeper::shared) {
-                        Some(job) => job.settled("fallen", &gathered.store, count)?,
-                        None => count()?,
-                    };
+                    let fallen = job::settled(keeper, "fallen", &gathered.store, count)?;
                     gathered.stats.fallen_together = fallen;
                 }
                 if gathered.lattice.reason.is_forced_coarser() && !is_said {
@@ -171,14 +168,10 @@ fn find_shared_places(
     keeper: Option<Keeper<'_>>,
     rt: &Runtime<'_>,
 ) -> Result<(), ConvertError> {
-    let Some(job) = keeper.and_then(Keeper::shared) else {
-        gathered.shared_places = places::find(gathered, rt)?;
-        return Ok(());
-    };
     let store = Arc::clone(&gathered.store);
-    (gathered.shared_places, gathered.census) = job.settled("places", &store, || {
+    (gathered.shared_places, gathered.census) = job::settled(keeper, "places", &store, || {
         let places = places::find(gathered, rt)?;
-        Ok((places, gathered.census.clone()))
+        Ok((places, std::mem::take(&mut gathered.census)))
     })?;
     Ok(())
 }

@@ -18,7 +18,7 @@ use crate::cloud::{
     xyz,
 };
 use crate::error::{ConvertError, JobFault};
-use crate::job::{Keeper, SharedJob};
+use crate::job::{Keeper, SharedJob, settled};
 use crate::plan::{OnFault, Plan};
 use crate::runtime::{Consumer, DiskFile, Evict, Reservation, Runtime};
 use crate::sources::Sources;
@@ -129,13 +129,8 @@ impl<'a> Pass<'a> {
         let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
         let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
         let group = || group(&grouper, &partition, collected, stats.points, &mut room);
-        let (cells, counted) = match self.keeper.and_then(Keeper::shared) {
-            Some(job) => {
-                job.enter(pass, stats.points)?;
-                job.settled("cells", &store, group)?
-            }
-            None => group()?,
-        };
+        self.keeper.and_then(Keeper::shared).map_or(Ok(()), |job| job.enter(pass, stats.points))?;
+        let (cells, counted) = settled(self.keeper, "cells", &store, group)?;
         let census = Census { cells: counted, bounds: HashMap::new() };
         let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
         room.resize(of_cells + (census.cells.capacity() * size_of::<CensusCell>()) as u64)?;

@@ -1,10 +1,14 @@
 //! Where units leave what they have made: a job of one run, or one that several processes share.
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 use super::Job;
 use super::shared::SharedJob;
 use super::unit_file::{UnitReader, UnitWriter};
+use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, JobFault};
-use crate::runtime::DiskFile;
+use crate::runtime::{DiskFile, Runtime};
 use crate::unit_name::{JobUnit, Stage, UnitName};
 
 /// A job of either kind.
@@ -13,6 +17,44 @@ pub(crate) enum Keeper<'a> {
     /// Of one run, on one machine.
     Own(&'a Job),
     Shared(&'a SharedJob),
+}
+
+/// What outputs are built from, with what, and where a job keeps what their units come to.
+#[derive(Clone, Copy)]
+pub(crate) struct Build<'a> {
+    pub(crate) cloud: &'a Cloud<'a>,
+    pub(crate) rt: &'a Runtime<'a>,
+    pub(crate) units: Option<GroupUnits<'a>>,
+}
+
+impl Build<'_> {
+    /// True if several processes share the work: they may have other memory and threads, and must divide it alike.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.units.is_some_and(|units| units.shared().is_some())
+    }
+
+    /// How the work is divided: as `divide` says, or as another process that shares it has said.
+    pub(crate) fn divided<T: Serialize + DeserializeOwned>(
+        &self,
+        divide: impl FnOnce() -> Result<T, ConvertError>,
+    ) -> Result<T, ConvertError> {
+        let name = self.units.map_or_else(String::new, |units| units.division());
+        settled(self.units.map(|units| units.keeper), &name, &self.cloud.store, divide)
+    }
+}
+
+/// A result of settling by its name, where several processes share a job; anywhere else what `make` makes. `store`: where it puts
+/// records.
+pub(crate) fn settled<T: Serialize + DeserializeOwned>(
+    keeper: Option<Keeper<'_>>,
+    name: &str,
+    store: &Store,
+    make: impl FnOnce() -> Result<T, ConvertError>,
+) -> Result<T, ConvertError> {
+    match keeper.and_then(Keeper::shared) {
+        Some(job) => job.settled(name, store, make),
+        None => make(),
+    }
 }
 
 impl<'a> Keeper<'a> {
@@ -41,7 +83,7 @@ impl<'a> GroupUnits<'a> {
     }
 
     /// The same, of a group that is divided into these: what a run has kept that divided it otherwise is not found.
-    pub(crate) fn divided(self, units: &impl serde::Serialize) -> Result<Self, ConvertError> {
+    pub(crate) fn divided(self, units: &impl Serialize) -> Result<Self, ConvertError> {
         Ok(Self { mark: crc32c::crc32c(&super::encode(units)?), ..self })
     }
 

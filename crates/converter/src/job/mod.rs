@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 pub(crate) use identity::Identity;
 use journal::{Entry, Journal};
-pub(crate) use keeper::{GroupUnits, Keeper};
+pub(crate) use keeper::{Build, GroupUnits, Keeper, settled};
 use serde::{Deserialize, Serialize};
 pub(crate) use shared::{SharedJob, Task};
 pub(crate) use tasks::{UnitLog, make_units, put_back};

@@ -77,12 +77,11 @@ pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
 ///
 /// # Errors
 /// If units of the job are done one by one, how far all of them are: nothing is left to do here then.
-pub(crate) fn make_units<S>(
+pub(crate) fn make_units(
     of: GroupUnits<'_>,
     points: &[u64],
     rt: &Runtime<'_>,
-    state: impl Fn() -> S + Sync,
-    make: impl Fn(&mut S, usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
+    make: impl Fn(usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
 ) -> Result<(), ConvertError> {
     let mut wanted = Vec::new();
     for i in 0..points.len() {
@@ -96,13 +95,13 @@ pub(crate) fn make_units<S>(
     of.count_recalled(points.len() - wanted.len());
     rt.in_parallel(
         wanted.len(),
-        state,
-        |state, i| {
-            of.keep(wanted[i], |file| make(state, wanted[i], file))?;
+        || (),
+        |(), i| {
+            of.keep(wanted[i], |file| make(wanted[i], file))?;
             rt.advance(points[wanted[i]]);
             Ok(())
         },
-        |_| (),
+        |()| (),
     )?;
     let Some(job) = of.in_parts() else { return Ok(()) };
     let listed = points.iter().enumerate().map(|(i, points)| of.listed(job, i, *points, Vec::new()));

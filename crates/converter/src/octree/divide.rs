@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cloud::{Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, morton};
 use crate::error::ConvertError;
-use crate::job::GroupUnits;
+use crate::job::Build;
 use crate::runtime::{Consumer, Reservation, Runtime};
 
 /// A subtree that is built in memory.
@@ -41,21 +41,12 @@ pub(super) struct Division {
 const SPLIT_LEVELS: u32 = 3;
 
 /// The largest subtrees of at most `unit_points` in Morton order, in chunks of at most `chunk_points`, unless the points of
-/// one share one place; and what these lists take. `units`: where a job keeps them.
-pub(super) fn divide(
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
-    unit_points: u64,
-    chunk_points: u64,
-    units: Option<GroupUnits<'_>>,
-) -> Result<Division, ConvertError> {
+/// one share one place; and what these lists take.
+pub(super) fn divide(build: Build<'_>, unit_points: u64, chunk_points: u64) -> Result<Division, ConvertError> {
+    let Build { cloud, rt, .. } = build;
     let mut room = Reservation::new(&rt.memory, Consumer::Cells);
-    let (subtrees, chunk_points) = match units.and_then(|units| Some((units, units.shared()?))) {
-        Some((units, job)) => job.settled(&units.division(), &cloud.store, || {
-            Ok((divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points))
-        })?,
-        None => (divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points),
-    };
+    let (subtrees, chunk_points) =
+        build.divided(|| Ok((divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points)))?;
     let bytes = |chunk: &Chunk| chunk.segments.bytes() + size_of::<Chunk>() as u64;
     let of_subtree = |s: &Subtree| s.chunks.iter().map(bytes).sum::<u64>() + 2 * size_of::<Subtree>() as u64;
     room.resize(subtrees.iter().map(of_subtree).sum())?;

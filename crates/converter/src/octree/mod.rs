@@ -43,10 +43,8 @@ pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
 pub(crate) use sinks::AnySink;
 use sinks::{Several, Sinks};
 
-use crate::cloud::Cloud;
 use crate::error::ConvertError;
-use crate::job::GroupUnits;
-use crate::runtime::Runtime;
+use crate::job::Build;
 use borders::Borders;
 use chunk::ChunkPlan;
 use commit::Committer;
@@ -68,38 +66,25 @@ pub(crate) struct OctreeSettings {
 }
 
 /// Builds the tree of a cloud and hands its nodes to `sink`.
-pub(crate) fn build(
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
-    settings: OctreeSettings,
-    units: Option<GroupUnits<'_>>,
-    sink: &impl NodeSink,
-) -> Result<Octree, ConvertError> {
-    let tree = build_for(cloud, rt, settings, units, sink)?.pop();
+pub(crate) fn build(build: Build<'_>, settings: OctreeSettings, sink: &impl NodeSink) -> Result<Octree, ConvertError> {
+    let tree = build_for(build, settings, sink)?.pop();
     tree.ok_or_else(|| ConvertError::Internal("a tree for no format".into()))
 }
 
 /// Builds the tree of a cloud once and hands its nodes to each of `sinks`; returns the tree as each of them has it.
 pub(crate) fn build_all(
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
+    build: Build<'_>,
     settings: OctreeSettings,
-    units: Option<GroupUnits<'_>>,
     sinks: &[&dyn AnySink],
 ) -> Result<Vec<Octree>, ConvertError> {
-    build_for(cloud, rt, settings, units, &Several::new(sinks, cloud.frame.stride))
+    build_for(build, settings, &Several::new(sinks, build.cloud.frame.stride))
 }
 
-fn build_for<S: Sinks>(
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
-    settings: OctreeSettings,
-    kept: Option<GroupUnits<'_>>,
-    sinks: &S,
-) -> Result<Vec<Octree>, ConvertError> {
+fn build_for<S: Sinks>(build: Build<'_>, settings: OctreeSettings, sinks: &S) -> Result<Vec<Octree>, ConvertError> {
+    let Build { cloud, rt, units: kept } = build;
     let OctreeSettings { sampling, spacing, leaf_capacity, most_points, unit_points } = settings;
     let (chunk_points, window) = rt.budget.units(unit_points.min(cloud.points()), cloud.frame.stride);
-    let mut division = divide::divide(cloud, rt, unit_points, chunk_points, kept)?;
+    let mut division = divide::divide(build, unit_points, chunk_points)?;
     let chunk_points = division.chunk_points;
     let units = units::in_order(std::mem::take(&mut division.subtrees));
     let all: Vec<_> = units.iter().map(|unit| (unit.key, unit.points())).collect();

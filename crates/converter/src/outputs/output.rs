@@ -10,7 +10,7 @@ use super::octrees::{ChosenSpacing, TreeSettings};
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
-use crate::job::GroupUnits;
+use crate::job::Build;
 use crate::octree::{AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{OutputReport, PlannedChoice, SavedBytes};
@@ -69,15 +69,9 @@ pub(crate) trait Output: Debug + Send + Sync {
         None
     }
 
-    /// Builds and writes the dataset. `units`: where a job keeps what its units come to.
-    fn write(
-        &self,
-        cloud: &Cloud<'_>,
-        rt: &Runtime<'_>,
-        to: &StagedDataset,
-        units: Option<GroupUnits<'_>>,
-    ) -> Result<OutputReport, ConvertError> {
-        let _ = (cloud, rt, to, units);
+    /// Builds and writes the dataset.
+    fn write(&self, build: Build<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let _ = (build, to);
         Err(ConvertError::Internal(format!("{} has no writer of its own", self.kind())))
     }
 }
@@ -109,13 +103,7 @@ pub(crate) trait OctreeWriter {
     ///
     /// # Errors
     /// As [`crate::octree::build`].
-    fn build(
-        &self,
-        cloud: &Cloud<'_>,
-        rt: &Runtime<'_>,
-        settings: OctreeSettings,
-        units: Option<GroupUnits<'_>>,
-    ) -> Result<Octree, ConvertError>;
+    fn build(&self, build: Build<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError>;
 
     /// Writes what is around the nodes, and syncs all.
     ///

@@ -3,12 +3,10 @@
 use super::octrees::ChosenSpacing;
 use super::output::{OctreeOutput, OctreeWriter, Target};
 use super::staging::StagedDataset;
-use crate::cloud::Cloud;
 use crate::error::ConvertError;
-use crate::job::GroupUnits;
+use crate::job::Build;
 use crate::octree::{self, AnySink};
 use crate::report::OutputReport;
-use crate::runtime::Runtime;
 
 /// The targets that are built together, by their index: octrees with the same nodes, any other alone. In the order of the
 /// first of each.
@@ -25,19 +23,17 @@ pub(crate) fn groups(targets: &[Target]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Builds and writes the datasets of a group, one for each target. `units`: where a job keeps what its units come to.
+/// Builds and writes the datasets of a group, one for each target.
 pub(crate) fn write(
     targets: &[&Target],
     datasets: &[StagedDataset],
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
-    units: Option<GroupUnits<'_>>,
+    build: Build<'_>,
 ) -> Result<Vec<OutputReport>, ConvertError> {
     let octrees: Vec<&dyn OctreeOutput> = targets.iter().filter_map(|target| target.output().octree()).collect();
     if octrees.len() == targets.len() {
-        return write_octrees(&octrees, datasets, cloud, rt, units);
+        return write_octrees(&octrees, datasets, build);
     }
-    targets.iter().zip(datasets).map(|(target, to)| target.output().write(cloud, rt, to, units)).collect()
+    targets.iter().zip(datasets).map(|(target, to)| target.output().write(build, to)).collect()
 }
 
 /// Builds the tree that `outputs` share, each in its dataset of `datasets`.
@@ -47,20 +43,19 @@ pub(crate) fn write(
 fn write_octrees(
     outputs: &[&dyn OctreeOutput],
     datasets: &[StagedDataset],
-    cloud: &Cloud<'_>,
-    rt: &Runtime<'_>,
-    units: Option<GroupUnits<'_>>,
+    build: Build<'_>,
 ) -> Result<Vec<OutputReport>, ConvertError> {
+    let Build { cloud, rt, .. } = build;
     let Some(tree) = outputs.first().map(|output| output.tree()) else { return Ok(Vec::new()) };
     let spacing = ChosenSpacing::of(tree.sampling, tree.spacing, cloud)?;
     let begun = outputs.iter().zip(datasets).map(|(output, to)| output.begin(cloud, rt, spacing, to));
     let writers: Vec<Box<dyn OctreeWriter>> = begun.collect::<Result<_, _>>()?;
     let settings = tree.of(&spacing, cloud);
     let trees = match &writers[..] {
-        [alone] => vec![alone.build(cloud, rt, settings, units)?],
+        [alone] => vec![alone.build(build, settings)?],
         several => {
             let sinks: Vec<&dyn AnySink> = several.iter().map(|writer| writer.sink()).collect();
-            octree::build_all(cloud, rt, settings, units, &sinks)?
+            octree::build_all(build, settings, &sinks)?
         }
     };
     writers.into_iter().zip(trees).map(|(writer, tree)| writer.finish(tree)).collect()

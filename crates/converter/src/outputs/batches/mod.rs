@@ -32,7 +32,7 @@ use super::recovery::Recovery;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{GroupUnits, UnitLog, make_units, put_back};
+use crate::job::{Build, GroupUnits, UnitLog, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, ScaleChoice, Setting};
 use crate::report::{self, ChoiceReason, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -42,7 +42,7 @@ use content::Content;
 use finish::finish;
 use frame::{Frame, refused};
 use large::WORD_BYTES;
-use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part};
+use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part, To};
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
 
 /// Tasks per thread, so that threads end together; their sizes. Small ones share too much with each other, large ones
@@ -124,19 +124,12 @@ impl Output for BatchesSettings {
         SavedBytes::NoPlane // the finished file tells
     }
 
-    fn write(
-        &self,
-        cloud: &Cloud<'_>,
-        rt: &Runtime<'_>,
-        to: &StagedDataset,
-        units: Option<GroupUnits<'_>>,
-    ) -> Result<OutputReport, ConvertError> {
+    fn write(&self, build: Build<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let Build { cloud, rt, units } = build;
         let (points, per_point) = (cloud.points(), bytes_per_point(cloud.frame.stride));
         let most = rt.budget.task_points(per_point, MAX_TASK_POINTS);
         let task_points = (points / (rt.threads as u64 * TASKS_PER_THREAD)).max(MIN_TASK_POINTS).min(most);
-        // processes that share a job may have other memory and threads: how it is divided must be the same whoever does it
-        let is_shared = units.is_some_and(|units| units.shared().is_some());
-        let task_points = if is_shared { SHARED_TASK_POINTS } else { task_points };
+        let task_points = if build.is_shared() { SHARED_TASK_POINTS } else { task_points };
         let content = Content::choose(cloud);
         let frame = Frame::new(cloud, self.lod_cell)?;
         let attributes: Vec<_> = content.extras.iter().map(|e| e.attribute.clone()).collect();
@@ -145,14 +138,11 @@ impl Output for BatchesSettings {
         let records = job.map(|(_, job)| job.more_records(&rt.temp)).transpose()?.flatten();
         let (records, records_name) = records.unzip();
         let sorted = Store::on(records, rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
-        let divide = || buckets::tasks(cloud, rt, &frame, task_points);
-        let cut = |tasks| large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points);
+        let tasks = build.divided(|| buckets::tasks(cloud, rt, &frame, task_points))?;
+        let cut = || large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points);
         let tasks = match job {
-            Some((units, job)) => {
-                let tasks: Vec<Task> = job.settled(&units.division(), &cloud.store, divide)?;
-                job.settled_in(&format!("{}, cut", units.division()), &sorted, records_name, || cut(tasks))?
-            }
-            None => cut(divide()?)?,
+            Some((units, job)) => job.settled_in(&format!("{}, cut", units.division()), &sorted, records_name, cut)?,
+            None => cut()?,
         };
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
         room.resize(tasks.iter().map(|task| task.segments.bytes() + size_of::<Task>() as u64).sum())?;
@@ -175,7 +165,7 @@ impl Output for BatchesSettings {
         // what is compressed is written raw first, elsewhere
         let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
         let output = BatchFile::new(
-            raw.as_ref().unwrap_or(&file),
+            To::File(raw.as_ref().unwrap_or(&file)),
             &layout,
             means.originals(),
             Recovery::new(cloud),
@@ -239,27 +229,21 @@ impl Means<'_> {
     /// Encodes the tasks of a job that are to be encoded here, each into a file of its own.
     fn units(&self, units: GroupUnits<'_>, tasks: &[Task]) -> Result<(), ConvertError> {
         let points: Vec<u64> = tasks.iter().map(|task| task.points).collect();
-        make_units(
-            units,
-            &points,
-            self.rt,
-            || (),
-            |(), index, file| {
-                let log = UnitLog::begin(file);
-                let came_to: (TaskResults, Part, Vec<u8>) = {
-                    let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
-                    let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
-                    let output = BatchFile::of_unit(&put, self.layout, self.originals(), recovery, origin);
-                    let shop = self.shop(&output);
-                    let mut worker = Worker::new(&shop);
-                    worker.run(index, &tasks[index])?;
-                    let results = worker.finish();
-                    let (part, originals) = output.take_part()?;
-                    (results, part, originals)
-                };
-                log.end(&came_to)
-            },
-        )
+        make_units(units, &points, self.rt, |index, file| {
+            let log = UnitLog::begin(file);
+            let came_to: (TaskResults, Part, Vec<u8>) = {
+                let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
+                let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
+                let output = BatchFile::new(To::Unit(&put), self.layout, self.originals(), recovery, origin);
+                let shop = self.shop(&output);
+                let mut worker = Worker::new(&shop);
+                worker.run(index, &tasks[index])?;
+                let results = worker.finish();
+                let (part, originals) = output.take_part()?;
+                (results, part, originals)
+            };
+            log.end(&came_to)
+        })
     }
 
     /// Takes what all units of a job came to.

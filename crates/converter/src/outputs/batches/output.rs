@@ -31,7 +31,7 @@ pub(super) struct BatchFile<'a> {
 }
 
 /// Where bytes go.
-enum To<'a> {
+pub(super) enum To<'a> {
     File(&'a DiskFile),
     /// Into the file of a unit, to be put into the output later: an offset, and the bytes.
     Unit(&'a PutAt<'a>),
@@ -128,27 +128,12 @@ pub(super) struct Encoder {
 
 impl<'a> BatchFile<'a> {
     pub(super) fn new(
-        file: &'a DiskFile,
+        to: To<'a>,
         layout: &'a Layout,
         originals: Arc<Store>,
         recovery: Recovery,
         origin: [f64; 3],
     ) -> Self {
-        Self::to(To::File(file), layout, originals, recovery, origin)
-    }
-
-    /// What a unit puts into its own file.
-    pub(super) fn of_unit(
-        put: &'a PutAt<'a>,
-        layout: &'a Layout,
-        originals: Arc<Store>,
-        recovery: Recovery,
-        origin: [f64; 3],
-    ) -> Self {
-        Self::to(To::Unit(put), layout, originals, recovery, origin)
-    }
-
-    fn to(to: To<'a>, layout: &'a Layout, originals: Arc<Store>, recovery: Recovery, origin: [f64; 3]) -> Self {
         let batches = if matches!(to, To::File(_)) { layout.batches as usize } else { 0 };
         let state =
             State { records: vec![None; batches], errors: vec![ErrorSums::default(); batches], ..State::default() };

@@ -41,7 +41,7 @@ use super::recovery::Lost;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{GroupUnits, UnitLog, make_units, put_back};
+use crate::job::{Build, GroupUnits, UnitLog, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, FormatErrors, OutputReport, PlannedChoice};
 use crate::runtime::{Consumer, Reservation, Runtime, Sequential};
@@ -118,24 +118,13 @@ impl Output for BintreeSettings {
         ]
     }
 
-    fn write(
-        &self,
-        cloud: &Cloud<'_>,
-        rt: &Runtime<'_>,
-        to: &StagedDataset,
-        units: Option<GroupUnits<'_>>,
-    ) -> Result<OutputReport, ConvertError> {
+    fn write(&self, build: Build<'_>, to: &StagedDataset) -> Result<OutputReport, ConvertError> {
+        let Build { cloud, rt, units } = build;
         let columns = Columns::choose(cloud)?;
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
-        // processes that share a job may have other memory: how it is divided must be the same whoever does it
-        let is_shared = units.is_some_and(|units| units.shared().is_some());
-        let task_points = if is_shared { SHARED_TASK_POINTS } else { task_points };
-        let split = || Ok((upper::split(cloud, rt, self, task_points)?, task_points));
-        let (upper, task_points) = match units.and_then(|units| Some((units, units.shared()?))) {
-            Some((units, job)) => job.settled(&units.division(), &cloud.store, split)?,
-            None => split()?,
-        };
+        let task_points = if build.is_shared() { SHARED_TASK_POINTS } else { task_points };
+        let upper = build.divided(|| upper::split(cloud, rt, self, task_points))?;
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
         room.resize(upper.tasks.iter().map(upper::Task::bytes).sum())?;
         let division: Vec<_> = upper.tasks.iter().map(|task| (task.start, task.points())).collect();
@@ -203,22 +192,16 @@ impl Make<'_> {
     fn units(&self, units: GroupUnits<'_>) -> Result<(), ConvertError> {
         let points: Vec<u64> = self.tasks.iter().map(upper::Task::points).collect();
         let (layout, stride) = (self.settings.layout, self.columns.record.stride());
-        make_units(
-            units,
-            &points,
-            self.rt,
-            || (),
-            |(), index, file| {
-                let log = UnitLog::begin(file);
-                let built = {
-                    let put = |place: Place, records: &[u8]| log.put(place, records);
-                    let leaves = Leaves::of_unit(layout, stride, &put);
-                    let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves);
-                    self.one(&mut builder, index)?
-                };
-                log.end(&built)
-            },
-        )
+        make_units(units, &points, self.rt, |index, file| {
+            let log = UnitLog::begin(file);
+            let built = {
+                let put = |place: Place, records: &[u8]| log.put(place, records);
+                let leaves = Leaves::of_unit(layout, stride, &put);
+                let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves);
+                self.one(&mut builder, index)?
+            };
+            log.end(&built)
+        })
     }
 
     /// Builds all subtrees, in parallel, or takes them from the files of `units`; they come back in order, with what their nodes

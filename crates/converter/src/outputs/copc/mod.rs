@@ -28,7 +28,7 @@ use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants}
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{GroupUnits, decode};
+use crate::job::{Build, decode};
 use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::Plan;
 use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
@@ -200,14 +200,8 @@ impl OctreeWriter for Writer<'_> {
         self
     }
 
-    fn build(
-        &self,
-        cloud: &Cloud<'_>,
-        rt: &Runtime<'_>,
-        settings: OctreeSettings,
-        units: Option<GroupUnits<'_>>,
-    ) -> Result<Octree, ConvertError> {
-        octree::build(cloud, rt, settings, units, self)
+    fn build(&self, build: Build<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError> {
+        octree::build(build, settings, self)
     }
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {

@@ -34,7 +34,7 @@ use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants}
 use super::staging::StagedDataset;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::job::GroupUnits;
+use crate::job::Build;
 use crate::octree::{self, AnySink, Octree, OctreeSettings};
 use crate::plan::{AttributeChoice, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, ChangedAttribute, OutputReport, PlannedChoice};
@@ -158,14 +158,8 @@ impl OctreeWriter for Writer<'_> {
         &self.files
     }
 
-    fn build(
-        &self,
-        cloud: &Cloud<'_>,
-        rt: &Runtime<'_>,
-        settings: OctreeSettings,
-        units: Option<GroupUnits<'_>>,
-    ) -> Result<Octree, ConvertError> {
-        octree::build(cloud, rt, settings, units, &self.files)
+    fn build(&self, build: Build<'_>, settings: OctreeSettings) -> Result<Octree, ConvertError> {
+        octree::build(build, settings, &self.files)
     }
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {
