@@ -308,3 +308,6 @@ impl Side {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
