@@ -44,7 +44,8 @@ impl<'a, P: Serialize> UnitLog<'a, P> {
 }
 
 /// Puts the bytes of a unit where they belong, in the order in which they were noted, a large piece in parts of whole rows of
-/// `row_bytes`: `put` gets the place, where in the piece they begin, and the bytes. Returns what else the unit came to.
+/// `row_bytes`: `put` gets the place, where in the piece they begin, and the bytes. Returns what else the unit
+/// came to. If the file turns out not to be whole, some bytes were put: who makes the unit again puts them there again.
 pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
     unit: &UnitReader,
     row_bytes: u64,
@@ -52,24 +53,22 @@ pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
 ) -> Result<T, ConvertError> {
     let places: Vec<(P, u64)> = unit.get(1)?;
     let came_to = unit.get(2)?;
-    let (file, mut at) = unit.place(0)?;
-    if places.iter().map(|(_, bytes)| u128::from(*bytes)).sum::<u128>() != u128::from(unit.len(0)) {
-        return Err(unit.damaged(at));
-    }
+    let mut reader = unit.reader(0)?;
     let part = (PIECE_BYTES / row_bytes.max(1)).max(1) * row_bytes.max(1);
     let mut buffer = Vec::new();
     for (place, bytes) in &places {
         let mut done = 0;
         while done < *bytes || *bytes == 0 {
             buffer.resize((bytes - done).min(part) as usize, 0);
-            file.read_at(&mut buffer, at, "reading a unit")?;
+            reader.read(&mut buffer)?;
             put(place, done, &buffer)?;
-            (done, at) = (done + buffer.len() as u64, at + buffer.len() as u64);
+            done += buffer.len() as u64;
             if *bytes == 0 {
                 break;
             }
         }
     }
+    reader.end()?;
     Ok(came_to)
 }
 

@@ -226,19 +226,19 @@ impl UnitReader {
 
     /// The file, and where a section begins in it, once its bytes were found whole.
     pub(crate) fn place(&self, index: usize) -> Result<(Arc<DiskFile>, u64), ConvertError> {
-        let section = self.section(index)?;
-        let (mut at, mut sum, mut buffer) = (0, 0, vec![0; CHECK_BYTES]);
-        while at < section.bytes {
-            let part = (section.bytes - at).min(CHECK_BYTES as u64) as usize;
-            self.file.read_at(&mut buffer[..part], section.offset + at, "reading a unit")?;
-            sum = crc32c::crc32c_append(sum, &buffer[..part]);
-            at += part as u64;
+        let mut reader = self.reader(index)?;
+        let mut buffer = vec![0; CHECK_BYTES];
+        while reader.left() > 0 {
+            let part = reader.left().min(CHECK_BYTES as u64) as usize;
+            reader.read(&mut buffer[..part])?;
         }
-        if sum == section.sum {
-            Ok((Arc::clone(&self.file), section.offset))
-        } else {
-            Err(self.damaged(section.offset))
-        }
+        reader.end()?;
+        Ok((Arc::clone(&self.file), self.section(index)?.offset))
+    }
+
+    /// Reads a section from front to back; whether its bytes are those that were written is known at the end.
+    pub(crate) fn reader(&self, index: usize) -> Result<SectionReader<'_>, ConvertError> {
+        Ok(SectionReader { unit: self, section: self.section(index)?, read: 0, sum: 0 })
     }
 
     /// Fails unless every section is whole.
@@ -253,6 +253,39 @@ impl UnitReader {
     /// The error for a file that is not as it was written.
     pub(crate) fn damaged(&self, byte: u64) -> ConvertError {
         JobFault::Damaged { file: self.path.clone(), byte }.into()
+    }
+}
+
+/// A section while it is read.
+pub(crate) struct SectionReader<'a> {
+    unit: &'a UnitReader,
+    section: Section,
+    read: u64,
+    /// Of what was read.
+    sum: u32,
+}
+
+impl SectionReader<'_> {
+    /// Bytes that were not read yet.
+    pub(crate) fn left(&self) -> u64 {
+        self.section.bytes - self.read
+    }
+
+    /// Reads the next bytes, as many as `out` has.
+    pub(crate) fn read(&mut self, out: &mut [u8]) -> Result<(), ConvertError> {
+        if out.len() as u64 > self.left() {
+            return Err(self.unit.damaged(self.section.offset));
+        }
+        self.unit.file.read_at(out, self.section.offset + self.read, "reading a unit")?;
+        self.sum = crc32c::crc32c_append(self.sum, out);
+        self.read += out.len() as u64;
+        Ok(())
+    }
+
+    /// Fails unless all of the section was read and is as it was written.
+    pub(crate) fn end(self) -> Result<(), ConvertError> {
+        let is_whole = self.left() == 0 && self.sum == self.section.sum;
+        if is_whole { Ok(()) } else { Err(self.unit.damaged(self.section.offset)) }
     }
 }
 
