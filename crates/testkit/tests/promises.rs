@@ -52,6 +52,9 @@ const PIECE: u64 = 100;
 const BATCH: u64 = 40;
 const FILE_BYTES: u64 = 5000;
 
+/// A file that exists.
+const THERE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+
 fn fake(fault: Fault) -> Fake {
     let attributes = vec![
         Attribute::new("rgb", AttributeType::UInt16, 3),
@@ -117,7 +120,8 @@ impl Fake {
     fn error(&self) -> Option<ReadError> {
         match self.fault {
             Fault::ErrorOfTwoLines => Some(ReadError::broken("fake", 7, "odd").advise("look at it\nvery closely")),
-            Fault::ErrorWithoutByte => Some(ReadError::broken("fake", None, "odd").advise("look at it")),
+            // of a file that is there: a missing one has no bytes
+            Fault::ErrorWithoutByte => Some(ReadError::broken(THERE, None, "odd").advise("look at it")),
             Fault::ErrorWithoutAdvice => Some(ReadError::broken("fake", 7, "odd")),
             _ => None,
         }
