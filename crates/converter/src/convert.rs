@@ -153,6 +153,7 @@ pub(crate) fn make(
     events.works_in(staged.path());
     let written = write(plan, targets, events, &staged, disk, job, &mut clock);
     let written = written.and_then(|report| verify(&staged.path_of_new()).map(|()| report));
+    let written = written.and_then(|report| job.keeper().map_or(Ok(()), Keeper::part_with_output).map(|()| report));
     events.settling();
     match written {
         Ok(mut report) => {
@@ -258,10 +259,11 @@ fn build(
     staged: &StagedFolder,
     is_only_one: bool,
 ) -> Result<Vec<OutputReport>, ConvertError> {
-    let Build { cloud, rt, .. } = build;
+    let Build { cloud, rt, units } = build;
     let start = Instant::now();
+    let kept_in = units.and_then(|units| units.kept_in());
     let datasets: Vec<_> =
-        targets.iter().map(|target| staged.dataset(target.kind(), is_only_one)).collect::<Result<_, _>>()?;
+        targets.iter().map(|target| staged.dataset(target.kind(), is_only_one, kept_in)).collect::<Result<_, _>>()?;
     let _building = rt.budget.building(&rt.memory, cloud.points())?;
     let mut reports = outputs::write(targets, &datasets, build)?;
     datasets.iter().try_for_each(StagedDataset::sync)?;

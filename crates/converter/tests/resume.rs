@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill_converter::{
-    BatchesSettings, BintreeSettings, Checkpoint, ConvertError, Disk, DiskOperation, JobFault, Plan, Potree2Settings,
-    Silent, Target, convert, convert_on,
+    BatchesSettings, BintreeSettings, Checkpoint, ConvertError, CopcSettings, Disk, DiskOperation, JobFault, Plan,
+    Potree2Settings, Silent, Target, convert, convert_on,
 };
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
@@ -61,10 +61,15 @@ impl Bench {
 
     /// A job with some units.
     fn with_job(&self) {
-        let (operations, _) = self.end_at(&self.plan, &targets(), u64::MAX);
+        self.with_job_of(&targets());
+    }
+
+    /// A job of a run that was about to end.
+    fn with_job_of(&self, targets: &[Target]) {
+        let (operations, _) = self.end_at(&self.plan, targets, u64::MAX);
         fs::remove_dir_all(&self.plan.output).unwrap();
         for at in (0..operations).rev() {
-            let (_, ended) = self.end_at(&self.plan, &targets(), at);
+            let (_, ended) = self.end_at(&self.plan, targets, at);
             if ended.is_err() && self.job().exists() {
                 return;
             }
@@ -98,11 +103,13 @@ fn names(folder: &Path) -> Vec<String> {
 
 #[test]
 fn a_run_that_ends_at_any_operation_is_gone_on_with_to_the_same_bytes() {
-    let formats: [(&str, Vec<Target>, Option<u64>); 4] = [
+    let formats: [(&str, Vec<Target>, Option<u64>); 6] = [
         ("potree2", targets().into(), None),
         ("spilled", targets().into(), Some(0)),
         ("bintree", vec![BintreeSettings::default().into()], Some(0)),
         ("two", vec![Potree2Settings::default().into(), BatchesSettings::default().into()], None),
+        ("one tree", vec![Potree2Settings::default().into(), CopcSettings::default().into()], Some(0)),
+        ("batches", vec![BatchesSettings::default().into()], Some(0)),
     ];
     for (name, targets, waiting) in formats {
         let mut bench = Bench::new();
@@ -187,4 +194,91 @@ fn without_a_job_the_run_begins_anew_and_a_folder_of_others_is_left_alone() {
     fs::write(bench.job().join("letter.txt"), "dear").unwrap();
     assert!(matches!(bench.fault(&bench.plan), JobFault::NoJob { .. }));
     assert_eq!(fs::read(bench.job().join("letter.txt")).unwrap(), b"dear");
+}
+
+/// Outputs whose bytes a job keeps where they belong: the file.
+#[cfg(unix)]
+fn in_place() -> [(Target, &'static str); 4] {
+    [
+        (Potree2Settings::default().into(), "output-potree2-octree.bin"),
+        (CopcSettings::default().into(), "output-copc-points.copc.laz"),
+        (BintreeSettings::default().into(), "output-bintree-leaves.bin"),
+        (BatchesSettings::default().into(), "output-batches-points.qbatch"),
+    ]
+}
+
+/// Bytes of the files of units that were built.
+#[cfg(unix)]
+fn built_bytes(job: &Path) -> u64 {
+    let built = names(job).into_iter().filter(|name| name.starts_with("build-"));
+    built.map(|name| fs::metadata(job.join(name)).unwrap().len()).sum()
+}
+
+#[cfg(unix)]
+#[test]
+fn what_was_built_stays_in_the_file_of_the_output_and_is_built_again_where_that_changed() {
+    for (target, file) in in_place() {
+        let targets = [target];
+        let bench = Bench::new();
+        let plain =
+            Plan { checkpoint: Checkpoint::Never, output: bench.dir.path().join("plain"), ..bench.plan.clone() };
+        convert(&plain, &targets, &Silent).unwrap();
+        let expected = dataset(&plain.output);
+        let kept = bench.job().join(file);
+        let recalled = |change: &dyn Fn(&mut Vec<u8>)| {
+            bench.with_job_of(&targets);
+            let mut bytes = fs::read(&kept).unwrap();
+            assert!(bytes.len() > 100_000, "{file}: {} bytes", bytes.len());
+            assert!(built_bytes(&bench.job()) < bytes.len() as u64 / 4, "{file}: bytes are kept once");
+            change(&mut bytes);
+            fs::write(&kept, bytes).unwrap();
+            let report = convert(&bench.resumed(), &targets, &Silent).unwrap();
+            assert!(dataset(&bench.plan.output) == expected && !bench.job().exists(), "{file}");
+            fs::remove_dir_all(&bench.plan.output).unwrap();
+            report.recalled_units
+        };
+        let all = recalled(&|_| {});
+        assert!(all > 0, "{file}");
+        let middle = recalled(&|bytes| {
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 1;
+        });
+        assert!(middle < all, "{file}: {middle} of {all}");
+        // as after a power failure: zeros, or nothing
+        assert_eq!(recalled(&|bytes| bytes.fill(0)), 0, "{file}");
+        assert!(recalled(&|bytes| bytes.truncate(bytes.len() / 2)) < all, "{file}");
+        assert_eq!(recalled(&Vec::clear), 0, "{file}");
+        // what a run with other settings of resources has left behind the end
+        assert_eq!(recalled(&|bytes| bytes.extend_from_slice(&[7; 100])), all, "{file}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_is_part_of_a_complete_output_is_not_written_to() {
+    for (target, file) in in_place() {
+        let targets = [target];
+        let bench = Bench::new();
+        bench.with_job_of(&targets);
+        // as if the run had been killed between the two: it has given the output its name, and the job is still there
+        let published = bench.dir.path().join("published");
+        fs::hard_link(bench.job().join(file), &published).unwrap();
+        let before = fs::read(&published).unwrap();
+        let report = convert(&bench.resumed(), &targets, &Silent).unwrap();
+        assert_eq!((report.recalled_points, report.recalled_units), (20_000, 0), "{file}");
+        assert!(fs::read(&published).unwrap() == before, "{file}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_that_is_complete_has_no_second_name() {
+    use std::os::unix::fs::MetadataExt as _;
+    for (target, _) in in_place() {
+        let bench = Bench::new();
+        convert(&bench.plan, &[target], &Silent).unwrap();
+        for name in names(&bench.plan.output) {
+            assert_eq!(fs::metadata(bench.plan.output.join(&name)).unwrap().nlink(), 1, "{name}");
+        }
+    }
 }

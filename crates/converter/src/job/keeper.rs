@@ -1,5 +1,7 @@
 //! Where units leave what they have made: a job of one run, or one that several processes share.
 
+use std::path::Path;
+
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -58,6 +60,14 @@ pub(crate) fn settled<T: Serialize + DeserializeOwned>(
 }
 
 impl<'a> Keeper<'a> {
+    /// Parts with files of the output that are about to get their names.
+    pub(crate) fn part_with_output(self) -> Result<(), ConvertError> {
+        match self {
+            Self::Shared(_) => Ok(()),
+            Self::Own(job) => job.part_with_output(),
+        }
+    }
+
     /// The job, if it is one that several processes share.
     pub(crate) fn shared(self) -> Option<&'a SharedJob> {
         match self {
@@ -107,11 +117,24 @@ impl<'a> GroupUnits<'a> {
         job.listed(self.name(number), points, needs.into_iter().map(|n| self.name(n)).collect())
     }
 
-    /// True if a unit is done: of a job that several processes share, if its file is there; else if that is whole, too.
-    pub(crate) fn is_done(&self, number: usize) -> Result<bool, ConvertError> {
+    /// The folder in which a job of one run keeps files of the output.
+    pub(crate) fn kept_in(&self) -> Option<&'a Path> {
+        match self.keeper {
+            Keeper::Shared(_) => None,
+            Keeper::Own(job) => Some(job.folder()),
+        }
+    }
+
+    /// True if a unit is done: of a job that several processes share, if its file is there; else if `check` does not find it
+    /// damaged, either.
+    pub(crate) fn is_done(
+        &self,
+        number: usize,
+        check: impl FnOnce(&UnitReader) -> Result<(), ConvertError>,
+    ) -> Result<bool, ConvertError> {
         match self.keeper {
             Keeper::Shared(job) => Ok(job.is_done(self.name(number))),
-            Keeper::Own(_) => Ok(self.recall(number, UnitReader::check)?.is_some()),
+            Keeper::Own(_) => Ok(self.recall(number, check)?.is_some()),
         }
     }
 
@@ -173,10 +196,23 @@ impl<'a> GroupUnits<'a> {
         match self.keeper {
             Keeper::Shared(job) => job.keep_marked(unit, self.mark, fill),
             Keeper::Own(job) => {
-                let mut file = UnitWriter::create(&job.built_path(unit), unit.label(self.mark), &job.disk)?;
+                let mut file = self.begin_of(job, number)?;
                 fill(&mut file)?;
                 file.finish(false) // what the disk loses is found out by its sums, and made again
             }
         }
+    }
+
+    /// Begins the file of a unit whose bytes are in the output; `None`: processes share the job, each output is made in the end.
+    pub(crate) fn begin(&self, number: usize) -> Result<Option<UnitWriter>, ConvertError> {
+        match self.keeper {
+            Keeper::Shared(_) => Ok(None),
+            Keeper::Own(job) => self.begin_of(job, number).map(Some),
+        }
+    }
+
+    fn begin_of(&self, job: &Job, number: usize) -> Result<UnitWriter, ConvertError> {
+        let unit = self.name(number);
+        UnitWriter::create(&job.built_path(unit), unit.label(self.mark), &job.disk)
     }
 }

@@ -4,6 +4,7 @@
 //! Units are numbered within a pass over the scans. It is removed when the run has made its output.
 
 mod identity;
+mod in_place;
 mod journal;
 mod keeper;
 mod shared;
@@ -17,11 +18,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub(crate) use identity::Identity;
+pub(crate) use in_place::{KeptFile, Place};
 use journal::{Entry, Journal};
 pub(crate) use keeper::{Build, GroupUnits, Keeper, settled};
 use serde::{Deserialize, Serialize};
 pub(crate) use shared::{SharedJob, Task};
-pub(crate) use tasks::{UnitLog, make_units, put_back};
+pub(crate) use tasks::{UnitLog, WriteInPlace, make_units, put_back};
 pub(crate) use unit_file::{UnitReader, UnitWriter};
 
 use crate::error::{ConvertError, JobFault};
@@ -37,6 +39,8 @@ const LOCK: &str = "lock";
 const JOURNAL: &str = "journal";
 const RECORDS: &str = "records-";
 const BUILT: &str = "build-";
+/// How the names begin of files that are part of the output, too.
+pub(crate) const KEPT_OUTPUT: &str = "output-";
 
 /// What a run leaves for another one.
 #[derive(Debug)]
@@ -273,6 +277,19 @@ impl Job {
         self.is_safe()
     }
 
+    /// Parts with the files that are part of the output, too: it is about to get its name, and nothing is to change it from then
+    /// on.
+    pub(crate) fn part_with_output(&self) -> Result<(), ConvertError> {
+        let failed = |e| ConvertError::io(&self.folder, "removing a name of the output", e);
+        for entry in fs::read_dir(&self.folder).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            if entry.file_name().to_string_lossy().starts_with(KEPT_OUTPUT) {
+                fs::remove_file(entry.path()).map_err(failed)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Removes the folder; what there is to say if that cannot be done.
     pub(crate) fn end(self) -> Option<Warning> {
         let _ = self.settle(); // it goes
@@ -323,7 +340,7 @@ fn remove(folder: &Path) -> Result<(), ConvertError> {
 }
 
 fn is_ours(name: &str) -> bool {
-    name == LOCK || name == JOURNAL || name.starts_with(RECORDS) || name.starts_with(BUILT)
+    name == LOCK || name == JOURNAL || [RECORDS, BUILT, KEPT_OUTPUT].iter().any(|begin| name.starts_with(begin))
 }
 
 /// Removes our files, and the folder if nothing else is in it. The journal goes first: without it no run

@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::in_place::{KeptFile, Place};
 use super::keeper::GroupUnits;
 use super::unit_file::{UnitReader, UnitWriter};
 use crate::error::{ConvertError, JobFault};
@@ -14,49 +15,75 @@ use crate::runtime::Runtime;
 /// Bytes that are put back together.
 const PIECE_BYTES: u64 = 4 << 20;
 
-/// What a unit would write into the output, into its file instead: the bytes, and `P` for each piece of them, which says where
-/// they belong.
+/// Sections of the file of a unit: bytes that belong into the output, and where; what else the unit came to; where its bytes are if
+/// they are in the output already.
+const BYTES: usize = 0;
+const BELONG: usize = 1;
+const CAME_TO: usize = 2;
+const IN_PLACE: usize = 3;
+
+/// What a unit writes into the output: into its own file instead, with `P` for each piece of bytes, which says where they belong;
+/// or into the output at once, where a job has that, too.
 pub(crate) struct UnitLog<'a, P> {
-    inner: Mutex<(&'a mut UnitWriter, Vec<(P, u64)>)>,
+    in_place: Option<&'a WriteInPlace<'a, P>>,
+    inner: Mutex<Noted<'a, P>>,
 }
 
+struct Noted<'a, P> {
+    file: &'a mut UnitWriter,
+    belong: Vec<(P, u64)>,
+    in_place: Vec<Place>,
+}
+
+/// Writes bytes where they belong in the output; returns the offset there.
+pub(crate) type WriteInPlace<'a, P> = dyn Fn(&P, &[u8]) -> Result<u64, ConvertError> + Sync + 'a;
+
 impl<'a, P: Serialize> UnitLog<'a, P> {
-    /// Of a unit whose file was just begun.
-    pub(crate) fn begin(file: &'a mut UnitWriter) -> Self {
+    /// Of a unit whose file was just begun. `in_place`: bytes go into the output at once.
+    pub(crate) fn begin(file: &'a mut UnitWriter, in_place: Option<&'a WriteInPlace<'a, P>>) -> Self {
         file.begin();
-        Self { inner: Mutex::new((file, Vec::new())) }
+        Self { in_place, inner: Mutex::new(Noted { file, belong: Vec::new(), in_place: Vec::new() }) }
     }
 
     /// Notes bytes.
     pub(crate) fn put(&self, place: P, bytes: &[u8]) -> Result<(), ConvertError> {
-        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        inner.0.write(bytes)?;
-        inner.1.push((place, bytes.len() as u64));
+        let written = self.in_place.map(|write| write(&place, bytes).map(|at| Place::of(at, bytes))).transpose()?;
+        let mut noted = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        match written {
+            Some(written) => noted.in_place.push(written),
+            None => {
+                noted.file.write(bytes)?;
+                noted.belong.push((place, bytes.len() as u64));
+            }
+        }
         Ok(())
     }
 
     /// Ends the file with what else the unit came to.
     pub(crate) fn end(self, came_to: &impl Serialize) -> Result<(), ConvertError> {
-        let (file, places) = self.inner.into_inner().unwrap_or_else(PoisonError::into_inner);
-        file.put(&places)?;
-        file.put(came_to)
+        let Noted { file, belong, in_place } = self.inner.into_inner().unwrap_or_else(PoisonError::into_inner);
+        file.put(&belong)?;
+        file.put(came_to)?;
+        file.put(&self.in_place.map(|_| in_place))
     }
 }
 
 /// Puts the bytes of a unit where they belong, in the order in which they were noted, a large piece in parts of whole rows of
-/// `row_bytes`: `put` gets the place, where in the piece they begin, and the bytes. Returns what else the unit
-/// came to. If the file turns out not to be whole, some bytes were put: who makes the unit again puts them there again.
+/// `row_bytes`: `put` gets the place, where in the piece they begin, and the bytes. Returns what else the unit came to, and how many
+/// bytes are in the output already. If the file turns out not to be whole, some bytes were put: who makes the unit again puts them
+/// there again.
 pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
     unit: &UnitReader,
     row_bytes: u64,
     mut put: impl FnMut(&P, u64, &[u8]) -> Result<(), ConvertError>,
-) -> Result<T, ConvertError> {
-    let places: Vec<(P, u64)> = unit.get(1)?;
-    let came_to = unit.get(2)?;
-    let mut reader = unit.reader(0)?;
+) -> Result<(T, u64), ConvertError> {
+    let belong: Vec<(P, u64)> = unit.get(BELONG)?;
+    let came_to = unit.get(CAME_TO)?;
+    let in_place: Option<Vec<Place>> = unit.get(IN_PLACE)?;
+    let mut reader = unit.reader(BYTES)?;
     let part = (PIECE_BYTES / row_bytes.max(1)).max(1) * row_bytes.max(1);
     let mut buffer = Vec::new();
-    for (place, bytes) in &places {
+    for (place, bytes) in &belong {
         let mut done = 0;
         while done < *bytes || *bytes == 0 {
             buffer.resize((bytes - done).min(part) as usize, 0);
@@ -69,25 +96,45 @@ pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
         }
     }
     reader.end()?;
-    Ok(came_to)
+    Ok((came_to, in_place.iter().flatten().map(|place| place.bytes).sum()))
 }
 
-/// Does those units that are to be done here, and leaves them in their files. `points`: of each; `make`: fills the file of one.
+/// Fails unless the file of a unit is whole, and so are its bytes in the output, which is `kept`.
+fn check(unit: &UnitReader, kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
+    unit.check()?;
+    let is_there = match unit.get::<Option<Vec<Place>>>(IN_PLACE)? {
+        None => true,
+        Some(places) => kept.map_or(Ok(false), |kept| kept.holds_all(&places))?,
+    };
+    if is_there { Ok(()) } else { Err(unit.damaged(0)) }
+}
+
+/// Does those units that are to be done here, and leaves them in their files. `points`: of each; `kept`: the output, if its bytes
+/// are put there at once; `make`: fills the file of one.
 ///
 /// # Errors
 /// If units of the job are done one by one, how far all of them are: nothing is left to do here then.
 pub(crate) fn make_units(
     of: GroupUnits<'_>,
     points: &[u64],
+    kept: Option<KeptFile<'_>>,
     rt: &Runtime<'_>,
     make: impl Fn(usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
 ) -> Result<(), ConvertError> {
-    let mut wanted = Vec::new();
-    for i in 0..points.len() {
-        if of.in_parts().is_none_or(|job| job.wants(of.name(i))) && !of.is_done(i)? {
-            wanted.push(i);
-        }
-    }
+    let is_wanted = |i: usize| -> Result<bool, ConvertError> {
+        Ok(of.in_parts().is_none_or(|job| job.wants(of.name(i))) && !of.is_done(i, |unit| check(unit, kept))?)
+    };
+    let wanted = rt.in_parallel(
+        points.len(),
+        Vec::new,
+        |wanted, i| {
+            wanted.extend(is_wanted(i)?.then_some(i));
+            Ok(())
+        },
+        |wanted| wanted,
+    )?;
+    let mut wanted: Vec<usize> = wanted.into_iter().flatten().collect();
+    wanted.sort_unstable();
     if of.in_parts().is_none() {
         of.all_done(points.len())?;
     }
@@ -122,14 +169,14 @@ mod tests {
         let large: Vec<u8> = (0..PIECE_BYTES + 5).map(|i| (i % 253) as u8).collect();
         let pieces = [(7u64, &large[..]), (9, &[]), (1, &[1, 2, 3])];
         let mut file = UnitWriter::create(&path, 0, &disk).unwrap();
-        let log = UnitLog::begin(&mut file);
+        let log = UnitLog::begin(&mut file, None);
         pieces.iter().for_each(|(place, bytes)| log.put(*place, bytes).unwrap());
         log.end(&"the end").unwrap();
         file.finish(true).unwrap();
         let open = |path: &Path| DiskFile::open(path, path.to_path_buf(), &disk).unwrap();
         let unit = UnitReader::open(&path, 0, open(&path), std::fs::metadata(&path).unwrap().len()).unwrap();
         let mut found: Vec<(u64, Vec<u8>)> = Vec::new();
-        let came_to: String = put_back(&unit, 3, |place: &u64, from, bytes| {
+        let (came_to, in_place): (String, u64) = put_back(&unit, 3, |place: &u64, from, bytes| {
             assert_eq!(from % 3, 0);
             match found.last_mut() {
                 Some((last, all)) if last == place && from > 0 => all.extend_from_slice(bytes),
@@ -138,7 +185,33 @@ mod tests {
             Ok(())
         })
         .unwrap();
-        assert_eq!(came_to, "the end");
+        assert_eq!((came_to.as_str(), in_place), ("the end", 0));
         assert_eq!(found, pieces.map(|(place, bytes)| (place, bytes.to_vec())));
+        check(&unit, None).unwrap();
+    }
+
+    #[test]
+    fn bytes_that_went_into_the_output_are_looked_for_there() {
+        let dir = tempfile::tempdir().unwrap();
+        let disk: Arc<dyn Disk> = Arc::new(SystemDisk);
+        let [path, out] = ["unit", "out"].map(|name| dir.path().join(name));
+        let out = DiskFile::create(&out, out.clone(), &disk).unwrap();
+        let mut file = UnitWriter::create(&path, 0, &disk).unwrap();
+        let write = |place: &u64, bytes: &[u8]| out.write_at(bytes, 100 + place, "writing").map(|()| *place);
+        let log = UnitLog::begin(&mut file, Some(&write));
+        log.put(7, &[1, 2, 3]).unwrap();
+        log.put(50, &[]).unwrap();
+        log.put(20, &[9; 30]).unwrap();
+        log.end(&1u8).unwrap();
+        file.finish(true).unwrap();
+        let unit = DiskFile::open(&path, path.clone(), &disk).unwrap();
+        let unit = UnitReader::open(&path, 0, unit, std::fs::metadata(&path).unwrap().len()).unwrap();
+        let put = |_: &u64, _, _: &[u8]| panic!("its bytes are there");
+        assert_eq!(put_back::<u64, u8>(&unit, 1, put).unwrap(), (1, 33));
+        let kept = KeptFile { file: &out, start: 100 };
+        check(&unit, Some(kept)).unwrap();
+        assert!(check(&unit, None).is_err() && check(&unit, Some(KeptFile { start: 99, ..kept })).is_err());
+        out.write_at(&[8], 125, "writing").unwrap();
+        assert!(check(&unit, Some(kept)).is_err());
     }
 }

@@ -91,6 +91,13 @@ impl UnitWriter {
         self.write(&bytes)
     }
 
+    /// Holds no memory until it goes on.
+    pub(crate) fn pause(&mut self) -> Result<(), ConvertError> {
+        self.flush()?;
+        self.buffer = Vec::new();
+        Ok(())
+    }
+
     fn append(&mut self, bytes: &[u8]) -> Result<(), ConvertError> {
         if self.buffer.len() + bytes.len() > WRITE_BYTES {
             self.flush()?;

@@ -6,6 +6,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use pointmill_format::NodeKey;
 
 use super::finished::{Piece, Run};
+use super::keep;
 use super::list::{List, Lists};
 use super::raise::{Pending, Points};
 use super::sink::{FinishedNode, points_of};
@@ -13,6 +14,7 @@ use super::sinks::{Encoders, Sinks, Stream};
 use super::unit::BuiltUnit;
 use crate::cloud::{Checksum, Ledger};
 use crate::error::{ConvertError, Unsupported};
+use crate::job::{Place, UnitWriter};
 use crate::runtime::{Consumer, Reservation, Runtime};
 
 /// A finished tree, as one format has it.
@@ -68,12 +70,13 @@ enum Placed {
         stream: usize,
         run: Run,
         offset: u64,
+        /// A job keeps where they are.
+        is_kept: bool,
     },
+    /// The nodes since the last one of these are a unit, which is kept here.
+    Unit(UnitWriter),
     /// In each stream.
-    Large {
-        nodes: Vec<FinishedNode>,
-        points: List,
-    },
+    Large { nodes: Vec<FinishedNode>, points: List },
 }
 
 impl<'a, S: Sinks> Committer<'a, S> {
@@ -145,11 +148,14 @@ impl<'a, S: Sinks> Committer<'a, S> {
             }
         }
         self.changed.notify_all();
+        let mut places = Vec::new();
         for placed in ready {
             match placed {
-                Placed::Nodes { stream, run, offset } => {
-                    let Run { nodes, mut bytes } = run;
+                Placed::Unit(file) => keep::write_places(file, &std::mem::take(&mut places))?,
+                Placed::Nodes { stream, run, offset, is_kept } => {
+                    let Run { nodes, mut bytes, .. } = run;
                     self.sinks.write(stream, &nodes, &bytes, offset)?;
+                    places.extend(is_kept.then(|| Place::of(offset, &bytes)));
                     bytes.clear();
                     let mut state = self.lock();
                     let spare = &mut state.placed[stream].spare;
@@ -216,7 +222,7 @@ impl State {
         encoders: &impl Encoders,
         ready: &mut Vec<Placed>,
     ) -> Result<(), ConvertError> {
-        let BuiltUnit { pieces, root, ledger, written, overfull_leaves, .. } = unit;
+        let BuiltUnit { pieces, root, ledger, written, overfull_leaves, file, .. } = unit;
         self.ledger.merge(&ledger);
         self.placed.iter_mut().zip(&written).for_each(|(stream, sum)| stream.written.merge(sum));
         self.overfull_leaves += overfull_leaves;
@@ -227,8 +233,13 @@ impl State {
                         let offset = stream.bytes;
                         run.nodes.iter_mut().for_each(|n| n.byte_offset += offset);
                         stream.nodes.extend_from_slice(&run.nodes);
+                        if let Some(place) = run.in_place {
+                            stream.bytes += place.bytes;
+                            check_place(offset, &place)?;
+                            continue;
+                        }
                         stream.bytes += run.bytes.len() as u64;
-                        ready.push(Placed::Nodes { stream: i, run, offset });
+                        ready.push(Placed::Nodes { stream: i, run, offset, is_kept: file.is_some() });
                     }
                 }
                 Piece::Large(key, points) => {
@@ -240,6 +251,7 @@ impl State {
                 }
             }
         }
+        ready.extend(file.map(Placed::Unit));
         let nodes: usize = self.placed.iter().map(|stream| stream.nodes.capacity()).sum();
         self.known.resize((nodes * size_of::<FinishedNode>()) as u64)?;
         if let Some(root) = root {
@@ -247,6 +259,12 @@ impl State {
         }
         Ok(())
     }
+}
+
+/// A unit of a run before was put where it belongs: its bytes, and those of all units before it, depend on the tree alone.
+fn check_place(offset: u64, place: &Place) -> Result<(), ConvertError> {
+    let other = || ConvertError::Internal(format!("a unit at byte {offset} was kept at {}", place.offset));
+    if offset == place.offset { Ok(()) } else { Err(other()) }
 }
 
 impl PlacedStream {

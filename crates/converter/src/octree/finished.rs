@@ -7,6 +7,7 @@ use super::sink::{FinishedNode, points_of};
 use super::sinks::{Encoders, Stream};
 use crate::cloud::Checksum;
 use crate::error::ConvertError;
+use crate::job::Place;
 
 /// Finished nodes that have no place in the tree yet.
 pub(super) enum Piece {
@@ -20,6 +21,8 @@ pub(super) enum Piece {
 pub(super) struct Run {
     pub(super) nodes: Vec<FinishedNode>,
     pub(super) bytes: Vec<u8>,
+    /// Where the bytes are if a run before has written them into the output: they are not here then.
+    pub(super) in_place: Option<Place>,
 }
 
 /// The finished nodes of a unit while they are made.
@@ -68,6 +71,7 @@ impl Finished {
         let run = |stream: &mut Stream| Run {
             nodes: std::mem::take(&mut stream.nodes),
             bytes: std::mem::take(&mut stream.bytes),
+            in_place: None,
         };
         self.pieces.push(Piece::Nodes(self.streams.iter_mut().map(run).collect()));
     }

@@ -6,6 +6,9 @@
 //! | 1 | what it has taken near its borders | units that touch it |
 //! | 2 | records of the nodes that are pending, in preorder | the unit above it |
 //! | 3 … | of each piece: the bytes of its nodes, a section for each stream; or the records of a large node | who puts all together |
+//!
+//! If the bytes are in the output already, because a job has that, too, there is one section in the place of those from 3 on: where
+//! they are.
 
 use std::sync::Arc;
 
@@ -19,7 +22,7 @@ use super::sink::FinishedNode;
 use super::unit::{BuiltUnit, Outer};
 use crate::cloud::{Checksum, Ledger};
 use crate::error::ConvertError;
-use crate::job::{UnitReader, UnitWriter};
+use crate::job::{KeptFile, Place, UnitReader, UnitWriter};
 use crate::runtime::DiskFile;
 
 /// Records of a pending node up to this size are taken into memory; larger ones stay in the file.
@@ -32,6 +35,7 @@ const PIECES: usize = 3;
 
 #[derive(Serialize, Deserialize)]
 struct Kept {
+    is_in_place: bool,
     pieces: Vec<KeptPiece>,
     root: Option<KeptNode>,
     ledger: Ledger,
@@ -62,23 +66,7 @@ struct KeptNode {
 
 /// Puts a unit into its file.
 pub(super) fn write(unit: &BuiltUnit, lists: &Lists, file: &mut UnitWriter) -> Result<(), ConvertError> {
-    let piece = |piece: &Piece| match piece {
-        Piece::Nodes(runs) => KeptPiece::Nodes(runs.iter().map(|run| run.nodes.clone()).collect()),
-        Piece::Large(key, list) => {
-            KeptPiece::Large { key: *key, points: list.count(), is_one_place: list.is_one_place }
-        }
-    };
-    file.put(&Kept {
-        pieces: unit.pieces.iter().map(piece).collect(),
-        root: unit.root.as_ref().map(kept_node),
-        ledger: unit.ledger.clone(),
-        written: unit.written.clone(),
-        overfull_leaves: unit.overfull_leaves,
-        notes: unit.notes.clone(),
-    })?;
-    file.put(&unit.outer)?;
-    file.begin();
-    unit.root.iter().try_for_each(|root| write_pending(root, lists, file))?;
+    write_head(unit, false, lists, file)?;
     for piece in &unit.pieces {
         match piece {
             Piece::Nodes(runs) => {
@@ -94,6 +82,39 @@ pub(super) fn write(unit: &BuiltUnit, lists: &Lists, file: &mut UnitWriter) -> R
         }
     }
     Ok(())
+}
+
+/// Puts a unit without large nodes into its file, but for its bytes, which have no place in the output yet.
+pub(super) fn write_first(unit: &BuiltUnit, lists: &Lists, file: &mut UnitWriter) -> Result<(), ConvertError> {
+    write_head(unit, true, lists, file)?;
+    file.pause()
+}
+
+/// Ends what [`write_first`] began; `places`: of each piece, in each stream.
+pub(super) fn write_places(mut file: UnitWriter, places: &[Place]) -> Result<(), ConvertError> {
+    file.put(&places)?;
+    file.finish(false) // what the disk loses is found out by its sums, and made again
+}
+
+fn write_head(unit: &BuiltUnit, is_in_place: bool, lists: &Lists, file: &mut UnitWriter) -> Result<(), ConvertError> {
+    let piece = |piece: &Piece| match piece {
+        Piece::Nodes(runs) => KeptPiece::Nodes(runs.iter().map(|run| run.nodes.clone()).collect()),
+        Piece::Large(key, list) => {
+            KeptPiece::Large { key: *key, points: list.count(), is_one_place: list.is_one_place }
+        }
+    };
+    file.put(&Kept {
+        is_in_place,
+        pieces: unit.pieces.iter().map(piece).collect(),
+        root: unit.root.as_ref().map(kept_node),
+        ledger: unit.ledger.clone(),
+        written: unit.written.clone(),
+        overfull_leaves: unit.overfull_leaves,
+        notes: unit.notes.clone(),
+    })?;
+    file.put(&unit.outer)?;
+    file.begin();
+    unit.root.iter().try_for_each(|root| write_pending(root, lists, file))
 }
 
 fn kept_node(node: &Pending<List>) -> KeptNode {
@@ -115,17 +136,23 @@ fn write_list(list: &List, lists: &Lists, file: &mut UnitWriter) -> Result<(), C
     lists.each(list, |records| file.write(records).map(|()| true))
 }
 
-/// All that a unit has left.
-pub(super) fn read(file: &UnitReader, lists: &Lists) -> Result<BuiltUnit, ConvertError> {
-    let kept: Kept = file.get(KEPT)?;
-    let (mut pieces, mut section) = (Vec::with_capacity(kept.pieces.len()), PIECES);
-    for piece in kept.pieces {
+/// All that a unit has left; `kept`: the output in each stream, if a job has it.
+pub(super) fn read(file: &UnitReader, lists: &Lists, kept: Option<&[KeptFile<'_>]>) -> Result<BuiltUnit, ConvertError> {
+    let unit: Kept = file.get(KEPT)?;
+    let places = if unit.is_in_place { Some(places_of(file, &unit, kept.unwrap_or_default())?) } else { None };
+    let (mut places, mut section) = (places.into_iter().flatten(), PIECES);
+    let mut pieces = Vec::with_capacity(unit.pieces.len());
+    for piece in unit.pieces {
         pieces.push(match piece {
+            KeptPiece::Nodes(runs) if unit.is_in_place => {
+                let run = |nodes| Run { nodes, bytes: Vec::new(), in_place: places.next() };
+                Piece::Nodes(runs.into_iter().map(run).collect())
+            }
             KeptPiece::Nodes(runs) => {
                 let run = |nodes| {
                     let bytes = file.bytes(section)?;
                     section += 1;
-                    Ok(Run { nodes, bytes })
+                    Ok(Run { nodes, bytes, in_place: None })
                 };
                 Piece::Nodes(runs.into_iter().map(run).collect::<Result<_, ConvertError>>()?)
             }
@@ -136,9 +163,30 @@ pub(super) fn read(file: &UnitReader, lists: &Lists) -> Result<BuiltUnit, Conver
             }
         });
     }
-    let root = kept.root.map(|root| read_pending(file, root, lists)).transpose()?;
-    let Kept { ledger, written, overfull_leaves, notes, .. } = Kept { pieces: Vec::new(), root: None, ..kept };
-    Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes, outer: read_outer(file)? })
+    let root = unit.root.map(|root| read_pending(file, root, lists)).transpose()?;
+    let Kept { ledger, written, overfull_leaves, notes, .. } = Kept { pieces: Vec::new(), root: None, ..unit };
+    let outer = read_outer(file)?;
+    Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes, outer, file: None })
+}
+
+/// Where the bytes of a unit are in the output, of each piece in each stream.
+///
+/// # Errors
+/// They are not there any more.
+fn places_of(file: &UnitReader, unit: &Kept, kept: &[KeptFile<'_>]) -> Result<Vec<Place>, ConvertError> {
+    let places: Vec<Place> = file.get(PIECES)?;
+    let streams = unit.pieces.iter().flat_map(|piece| match piece {
+        KeptPiece::Nodes(runs) => 0..runs.len(),
+        KeptPiece::Large { .. } => 0..usize::MAX, // has no place
+    });
+    let mut of = places.iter();
+    for stream in streams {
+        let (Some(place), Some(kept)) = (of.next(), kept.get(stream)) else { return Err(file.damaged(0)) };
+        if !kept.holds(place)? {
+            return Err(file.damaged(0));
+        }
+    }
+    if of.next().is_none() { Ok(places) } else { Err(file.damaged(0)) }
 }
 
 /// What a unit has taken near its borders.

@@ -1,19 +1,22 @@
 //! All units of a tree in one process: each is built in its turn, or taken from what a job has kept of it, and handed in.
 
 use super::commit::Committer;
+use super::finished::Piece;
 use super::keep;
 use super::sample::{Sampler, Sampling};
 use super::sinks::{Encoders, Sinks};
 use super::unit::{BuiltUnit, Shared, UnitBuilder};
 use super::units::{Unit, Work};
 use crate::error::ConvertError;
-use crate::job::GroupUnits;
+use crate::job::{GroupUnits, KeptFile};
 
 /// What all threads share.
 pub(super) struct Making<'a, S> {
     pub(super) units: &'a [Unit],
     /// Where a job keeps what units come to.
     pub(super) kept: Option<GroupUnits<'a>>,
+    /// The files of the output, if the job has them, too: those that are not in memory together are kept apart all the same.
+    pub(super) in_place: Option<&'a [KeptFile<'a>]>,
     pub(super) shared: &'a Shared<'a>,
     pub(super) committer: &'a Committer<'a, S>,
     pub(super) sinks: &'a S,
@@ -26,7 +29,7 @@ impl<S: Sinks> Making<'_, S> {
     /// # Errors
     /// Several processes share the job, and one of the units is not done.
     pub(super) fn all(&self) -> Result<(), ConvertError> {
-        let Self { units, kept, shared, committer, sinks, sampling } = self;
+        let Self { units, kept, shared, committer, sinks, sampling, .. } = self;
         kept.map_or(Ok(()), |of| of.all_done(units.len()))?;
         let builder = || UnitBuilder::new(shared, Sampler::new(*sampling, shared.borders.spacing()), sinks.encoders());
         let one = |builder: &mut _, index| self.one(builder, index);
@@ -40,7 +43,7 @@ impl<S: Sinks> Making<'_, S> {
         self.shared.rt.check_stop()?; // it may have waited long
         let built = match self.kept {
             None => self.build(unit, index, builder, buffers)?,
-            Some(of) => match of.recall(index, |file| keep::read(file, &self.shared.lists))? {
+            Some(of) => match of.recall(index, |file| keep::read(file, &self.shared.lists, self.in_place))? {
                 Some(built) => self.recalled(unit, index, built)?,
                 None if of.shared().is_some() => return Err(of.gone(index)),
                 None => {
@@ -101,7 +104,15 @@ impl<S: Sinks> Making<'_, S> {
         builder: &mut UnitBuilder<'_, E>,
     ) -> Result<BuiltUnit, ConvertError> {
         built.take_notes(&mut builder.encoder)?;
-        of.keep(index, |file| keep::write(&built, &self.shared.lists, file))?;
+        let is_in_memory = built.pieces.iter().all(|piece| matches!(piece, Piece::Nodes(_)));
+        let file = if is_in_memory && self.in_place.is_some() { of.begin(index)? } else { None };
+        match file {
+            Some(mut file) => {
+                keep::write_first(&built, &self.shared.lists, &mut file)?;
+                built.file = Some(file);
+            }
+            None => of.keep(index, |file| keep::write(&built, &self.shared.lists, file))?,
+        }
         Ok(built)
     }
 }

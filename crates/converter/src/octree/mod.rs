@@ -108,7 +108,9 @@ fn build_for<S: Sinks>(build: Build<'_>, settings: OctreeSettings, sinks: &S) ->
         share::share(&units, of, job, &shared, sinks, sampling)?;
     }
     let committer = Committer::new(units.len(), window, sinks, &shared.lists, rt);
-    Making { units: &units, kept, shared: &shared, committer: &committer, sinks, sampling }.all()?;
+    let in_place: Option<Vec<_>> = (0..sinks.count()).map(|stream| sinks.kept(stream)).collect();
+    let in_place = in_place.as_deref();
+    Making { units: &units, kept, in_place, shared: &shared, committer: &committer, sinks, sampling }.all()?;
     let trees = committer.finish()?;
     trees.iter().try_for_each(|tree| tree.ledger.check(&cloud.stats.checksum))?;
     Ok(trees)

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cloud::Checksum;
 use crate::error::ConvertError;
+use crate::job::KeptFile;
 
 /// A node that nothing changes any more, and where its bytes are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,6 +40,9 @@ pub(crate) trait NodeSink: Sync {
     /// # Errors
     /// Notes of something else.
     fn add_notes(&self, notes: &[u8]) -> Result<(), ConvertError>;
+
+    /// The file of the nodes, if a job has it, too; offsets count from the first node of the tree.
+    fn kept(&self) -> Option<KeptFile<'_>>;
 
     /// Takes a part of the bytes of a node that has too many to have them in memory together: those from `at` on. The parts
     /// of a node come in order.

@@ -5,6 +5,7 @@ use pointmill_format::NodeKey;
 use super::sink::{FinishedNode, NodeEncoder, NodeSink};
 use crate::cloud::{Checksum, copy_record};
 use crate::error::ConvertError;
+use crate::job::KeptFile;
 
 /// The bytes that one format has of a unit, while it is made.
 #[derive(Default)]
@@ -44,6 +45,9 @@ pub(super) trait Sinks: Sync {
 
     /// As [`NodeSink::add_notes`], of each stream.
     fn add_notes(&self, notes: &[Vec<u8>]) -> Result<(), ConvertError>;
+
+    /// As [`NodeSink::kept`].
+    fn kept(&self, stream: usize) -> Option<KeptFile<'_>>;
 
     /// As [`NodeSink::write_part`].
     fn write_part(&self, stream: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError>;
@@ -98,6 +102,10 @@ impl<S: NodeSink> Sinks for S {
         notes.iter().try_for_each(|notes| NodeSink::add_notes(self, notes))
     }
 
+    fn kept(&self, _: usize) -> Option<KeptFile<'_>> {
+        NodeSink::kept(self)
+    }
+
     fn write_part(&self, _: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         NodeSink::write_part(self, node, bytes, at)
     }
@@ -146,6 +154,9 @@ pub(crate) trait AnySink: Sync {
     /// As [`NodeSink::add_notes`].
     fn add_any_notes(&self, notes: &[u8]) -> Result<(), ConvertError>;
 
+    /// As [`NodeSink::kept`].
+    fn any_kept(&self) -> Option<KeptFile<'_>>;
+
     /// As [`NodeSink::write_part`].
     fn write_any_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError>;
 }
@@ -183,6 +194,10 @@ impl<S: NodeSink> AnySink for S {
 
     fn add_any_notes(&self, notes: &[u8]) -> Result<(), ConvertError> {
         NodeSink::add_notes(self, notes)
+    }
+
+    fn any_kept(&self) -> Option<KeptFile<'_>> {
+        NodeSink::kept(self)
     }
 
     fn write_any_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
@@ -254,6 +269,10 @@ impl Sinks for Several<'_> {
 
     fn add_notes(&self, notes: &[Vec<u8>]) -> Result<(), ConvertError> {
         notes.iter().enumerate().try_for_each(|(stream, notes)| self.sink(stream)?.add_any_notes(notes))
+    }
+
+    fn kept(&self, stream: usize) -> Option<KeptFile<'_>> {
+        self.sinks.get(stream)?.any_kept()
     }
 
     fn write_part(&self, stream: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {

@@ -14,6 +14,7 @@ use super::sample::Sampler;
 use super::sinks::{Encoders, Stream};
 use crate::cloud::{Checksum, Ledger, TreePoint};
 use crate::error::ConvertError;
+use crate::job::UnitWriter;
 use crate::runtime::{Consumer, Reservation, Runtime, os_hints};
 
 /// A unit, built.
@@ -31,6 +32,8 @@ pub(super) struct BuiltUnit {
     pub(super) notes: Vec<Vec<u8>>,
     /// What was taken near its borders.
     pub(super) outer: Outer,
+    /// Where a job keeps it once its bytes are in the output.
+    pub(super) file: Option<UnitWriter>,
 }
 
 /// Points near the border of a unit, by node.
@@ -160,7 +163,7 @@ impl<'a, E: Encoders> UnitBuilder<'a, E> {
         };
         let (pieces, written) = finished.into_pieces();
         let outer = borders.into_outer();
-        Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes: Vec::new(), outer })
+        Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes: Vec::new(), outer, file: None })
     }
 
     fn nodes<'n>(&'n mut self, borders: &'n mut UnitBorders<'a>, finished: &'n mut Finished) -> ListNodes<'n, 'a, E> {

@@ -109,6 +109,11 @@ impl DiskFile {
         bytes::read_exact_at(&self.file, buf, offset).map_err(|e| self.failed(doing, e))
     }
 
+    /// Bytes of the file.
+    pub(crate) fn len(&self, doing: &'static str) -> Result<u64, ConvertError> {
+        self.file.metadata().map(|meta| meta.len()).map_err(|e| self.failed(doing, e))
+    }
+
     /// Cuts or extends the file.
     pub(crate) fn set_len(&self, bytes: u64, doing: &'static str) -> Result<(), ConvertError> {
         let cut = || {
@@ -243,6 +248,12 @@ pub(crate) fn sync_path(disk: &dyn Disk, path: &Path) -> io::Result<()> {
 pub(crate) fn create_folder(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
     disk.permit(DiskOperation::Create)?;
     fs::create_dir(folder)
+}
+
+/// Gives a file a second name.
+pub(crate) fn link(disk: &dyn Disk, path: &Path, second: &Path) -> io::Result<()> {
+    disk.permit(DiskOperation::Create)?;
+    fs::hard_link(path, second)
 }
 
 /// Gives a folder another name.

@@ -29,10 +29,10 @@ pub use settings::BatchesSettings;
 use super::colour::colour_of;
 use super::output::{DiskSize, Output, Target, Wants};
 use super::recovery::Recovery;
-use super::staging::StagedDataset;
+use super::staging::{OutputFile, StagedDataset};
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{Build, GroupUnits, UnitLog, make_units, put_back};
+use crate::job::{Build, GroupUnits, KeptFile, UnitLog, WriteInPlace, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, ScaleChoice, Setting};
 use crate::report::{self, ChoiceReason, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -42,7 +42,7 @@ use content::Content;
 use finish::finish;
 use frame::{Frame, refused};
 use large::WORD_BYTES;
-use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part, To};
+use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part, To, WRITING};
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
 
 /// Tasks per thread, so that threads end together; their sizes. Small ones share too much with each other, large ones
@@ -158,14 +158,18 @@ impl Output for BatchesSettings {
         };
         let division: Vec<_> = tasks.iter().map(|task| (task.first_point, task.points, task.start)).collect();
         let units = units.map(|units| units.divided(&division)).transpose()?;
-        if let Some(units) = units {
-            means.units(units, &tasks)?;
-        }
-        let file = to.create(self.kind().marker_file())?;
+        let name = self.kind().marker_file();
         // what is compressed is written raw first, elsewhere
-        let raw = self.zstd_level.map(|_| rt.temp.make()).transpose()?;
+        let (made, raw) = match self.zstd_level {
+            None => (to.create_kept(name)?, None),
+            Some(_) => (OutputFile::new(to.create(name)?), Some(rt.temp.make()?)),
+        };
+        if let Some(units) = units {
+            means.units(units, &tasks, made.kept(0))?;
+        }
+        let file = &made.file;
         let output = BatchFile::new(
-            To::File(raw.as_ref().unwrap_or(&file)),
+            To::File(raw.as_ref().unwrap_or(file)),
             &layout,
             means.originals(),
             Recovery::new(cloud),
@@ -178,8 +182,9 @@ impl Output for BatchesSettings {
         results.ledger.check(&cloud.stats.checksum)?;
         let mut finished = finish(cloud, self, &frame, &content, &output, &results)?;
         if let (Some(raw), Some(level)) = (&raw, self.zstd_level) {
-            compress::compress(rt, raw, &file, level, &mut finished)?;
+            compress::compress(rt, raw, file, level, &mut finished)?;
         }
+        file.set_len(finished.bytes, "ending the batches")?;
         file.sync("syncing the batches")?;
         Ok(OutputReport {
             points: results.ledger.points(),
@@ -226,11 +231,14 @@ impl Means<'_> {
         }
     }
 
-    /// Encodes the tasks of a job that are to be encoded here, each into a file of its own.
-    fn units(&self, units: GroupUnits<'_>, tasks: &[Task]) -> Result<(), ConvertError> {
+    /// Encodes the tasks of a job that are to be encoded here, each into a file of its own, or into the output if a job has it.
+    fn units(&self, units: GroupUnits<'_>, tasks: &[Task], kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = tasks.iter().map(|task| task.points).collect();
-        make_units(units, &points, self.rt, |index, file| {
-            let log = UnitLog::begin(file);
+        let write =
+            kept.map(|kept| move |at: &u64, bytes: &[u8]| kept.file.write_at(bytes, *at, WRITING).map(|()| *at));
+        let write = write.as_ref().map(|write| write as &WriteInPlace<'_, u64>);
+        make_units(units, &points, kept, self.rt, |index, file| {
+            let log = UnitLog::begin(file, write);
             let came_to: (TaskResults, Part, Vec<u8>) = {
                 let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
                 let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
@@ -259,7 +267,7 @@ impl Means<'_> {
             |(encoder, all), index| {
                 let put = |at: &u64, from: u64, bytes: &[u8]| output.write(bytes, at + from);
                 let unit = units.recall(index, |unit| put_back::<u64, (TaskResults, Part, Vec<u8>)>(unit, 1, put))?;
-                let (results, part, originals) = unit.ok_or_else(|| units.gone(index))?;
+                let ((results, part, originals), _) = unit.ok_or_else(|| units.gone(index))?;
                 output.add_part(part, originals, encoder)?;
                 all.push(results);
                 Ok(())

@@ -15,6 +15,8 @@ use crate::error::ConvertError;
 use crate::outputs::recovery::{Lost, Recovery};
 use crate::runtime::DiskFile;
 
+pub(super) const WRITING: &str = "writing the batches";
+
 /// Bytes of an entry of the originals: storage index and colour word.
 pub(super) const ORIGINAL_BYTES: usize = 8;
 
@@ -212,7 +214,7 @@ impl<'a> BatchFile<'a> {
 
     pub(super) fn write(&self, bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
         match self.to {
-            To::File(file) => file.write_at(bytes, offset, "writing the batches"),
+            To::File(file) => file.write_at(bytes, offset, WRITING),
             To::Unit(put) => put(offset, bytes),
         }
     }

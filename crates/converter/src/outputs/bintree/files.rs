@@ -7,8 +7,11 @@ use pointmill_format::bintree::{Layout, PACKED_FILE, leaf_file_name};
 use serde::{Deserialize, Serialize};
 
 use crate::error::ConvertError;
-use crate::outputs::staging::StagedDataset;
-use crate::runtime::{DiskFile, Runtime};
+use crate::job::KeptFile;
+use crate::outputs::staging::{OutputFile, StagedDataset};
+use crate::runtime::Runtime;
+
+pub(super) const WRITING: &str = "writing a leaf";
 
 /// The leaves of a dataset; any number of threads put them.
 pub(super) struct Leaves<'a> {
@@ -21,7 +24,7 @@ pub(super) struct Leaves<'a> {
 /// Where the leaves go.
 enum To<'a> {
     /// Into the one file for all.
-    File(DiskFile),
+    File(OutputFile),
     Files {
         staged: &'a StagedDataset,
         /// Names of the files of leaves, to be synced when all are written: write-back is then on its way.
@@ -44,10 +47,17 @@ pub(super) struct Place {
     from: u64,
 }
 
+impl Place {
+    /// Where it begins in a packed file.
+    pub(super) fn offset(&self, stride: u64) -> u64 {
+        (self.start + self.from) * stride
+    }
+}
+
 impl<'a> Leaves<'a> {
     pub(super) fn new(layout: Layout, stride: usize, staged: &'a StagedDataset) -> Result<Self, ConvertError> {
         let to = match layout {
-            Layout::Packed => To::File(staged.create(PACKED_FILE)?),
+            Layout::Packed => To::File(staged.create_kept(PACKED_FILE)?),
             Layout::Files => To::Files { staged, written: Mutex::default() },
         };
         Ok(Self::to(to, layout, stride))
@@ -79,18 +89,31 @@ impl<'a> Leaves<'a> {
         self.bytes.fetch_add(records.len() as u64, Ordering::Relaxed);
         let (staged, written) = match &self.to {
             To::Unit(put) => return put(Place { path: path.to_vec(), start, from }, records),
-            To::File(file) => return file.write_at(records, (start + from) * self.stride, "writing a leaf"),
+            To::File(to) => return to.file.write_at(records, (start + from) * self.stride, WRITING),
             To::Files { staged, written } => (staged, written),
         };
         let name = leaf_file_name(path.iter().copied());
         if from > 0 {
-            return staged.open(&name)?.write_at(records, from * self.stride, "writing a leaf");
+            return staged.open(&name)?.write_at(records, from * self.stride, WRITING);
         }
-        staged.create(&name)?.write_at(records, 0, "writing a leaf")?;
+        staged.create(&name)?.write_at(records, 0, WRITING)?;
         if let Ok(mut written) = written.lock() {
             written.push(name);
         }
         Ok(())
+    }
+
+    /// The file, if a job has it, too.
+    pub(super) fn kept(&self) -> Option<KeptFile<'_>> {
+        match &self.to {
+            To::File(file) => file.kept(0),
+            _ => None,
+        }
+    }
+
+    /// Counts bytes that are there already.
+    pub(super) fn count(&self, bytes: u64) {
+        self.bytes.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// Bytes of a point.
@@ -107,7 +130,10 @@ impl<'a> Leaves<'a> {
     pub(super) fn finish(self, rt: &Runtime<'_>) -> Result<u64, ConvertError> {
         match self.to {
             To::Unit(_) => {}
-            To::File(file) => file.sync("syncing the leaves")?,
+            To::File(OutputFile { file, .. }) => {
+                file.set_len(self.bytes.load(Ordering::Relaxed), "ending the leaves")?;
+                file.sync("syncing the leaves")?;
+            }
             To::Files { staged, written } => {
                 let written = written.into_inner().unwrap_or_default();
                 staged.sync_all(rt, written.len(), |leaf| written[leaf].clone(), &[])?;

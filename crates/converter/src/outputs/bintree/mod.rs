@@ -30,7 +30,7 @@ use serde_json::{Map, Value};
 pub use self::settings::BintreeSettings;
 
 use self::assemble::{assemble, figures};
-use self::files::{Leaves, Place};
+use self::files::{Leaves, Place, WRITING};
 use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
 use self::subtree::{Builder, Built};
@@ -41,7 +41,7 @@ use super::recovery::Lost;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{Build, GroupUnits, UnitLog, make_units, put_back};
+use crate::job::{Build, GroupUnits, KeptFile, UnitLog, WriteInPlace, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, FormatErrors, OutputReport, PlannedChoice};
 use crate::runtime::{Consumer, Reservation, Runtime, Sequential};
@@ -130,10 +130,10 @@ impl Output for BintreeSettings {
         let division: Vec<_> = upper.tasks.iter().map(|task| (task.start, task.points())).collect();
         let units = units.map(|units| units.divided(&division)).transpose()?;
         let make = Make { cloud, rt, settings: self, columns: &columns, tasks: &upper.tasks, task_points };
-        if let Some(units) = units {
-            make.units(units)?;
-        }
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
+        if let Some(units) = units {
+            make.units(units, leaves.kept())?;
+        }
         let (built, _known) = make.all(units, &leaves)?;
         let leaf_bytes = leaves.finish(rt)?;
 
@@ -188,12 +188,20 @@ struct Make<'a> {
 }
 
 impl Make<'_> {
-    /// Builds the subtrees of a job that are to be built here, each into a file of its own.
-    fn units(&self, units: GroupUnits<'_>) -> Result<(), ConvertError> {
+    /// Builds the subtrees of a job that are to be built here, each into a file of its own; their leaves into the output if a job
+    /// has it.
+    fn units(&self, units: GroupUnits<'_>, kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = self.tasks.iter().map(upper::Task::points).collect();
         let (layout, stride) = (self.settings.layout, self.columns.record.stride());
-        make_units(units, &points, self.rt, |index, file| {
-            let log = UnitLog::begin(file);
+        let write = kept.map(|kept| {
+            move |place: &Place, records: &[u8]| {
+                let at = place.offset(stride as u64);
+                kept.file.write_at(records, at, WRITING).map(|()| at)
+            }
+        });
+        let write = write.as_ref().map(|write| write as &WriteInPlace<'_, Place>);
+        make_units(units, &points, kept, self.rt, |index, file| {
+            let log = UnitLog::begin(file, write);
             let built = {
                 let put = |place: Place, records: &[u8]| log.put(place, records);
                 let leaves = Leaves::of_unit(layout, stride, &put);
@@ -256,7 +264,9 @@ fn recalled(units: GroupUnits<'_>, index: usize, leaves: &Leaves<'_>) -> Result<
     let built = units.recall(index, |unit| {
         put_back(unit, leaves.stride(), |place, byte, records| leaves.put_back(place, byte, records))
     })?;
-    built.ok_or_else(|| units.gone(index))
+    let (built, in_place) = built.ok_or_else(|| units.gone(index))?;
+    leaves.count(in_place);
+    Ok(built)
 }
 
 fn write_index(

@@ -25,14 +25,14 @@ use super::attributes::changed;
 use super::octrees::{self, ChosenSpacing, TreeSettings, UNIT_BYTES, tree_report};
 use super::origin::own_key;
 use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants};
-use super::staging::StagedDataset;
+use super::staging::{OutputFile, StagedDataset};
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{Build, decode};
+use crate::job::{Build, KeptFile, decode};
 use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::Plan;
 use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
-use crate::runtime::{DiskFile, Runtime};
+use crate::runtime::Runtime;
 use crate::sources::{ResolvedCrs, Schema};
 use crate::warning::Warning;
 
@@ -120,7 +120,7 @@ impl OctreeOutput for CopcSettings {
         heading.wkt = cloud.facts.crs.wkt_text().map(Cow::into_owned);
         let chunks_start = heading.chunks_start().map_err(|e| failed(&e))?;
         let chunks = ChunkEncoder::new(&content.layout).map_err(|e| failed(&e))?;
-        let file = to.create(self.kind().marker_file())?;
+        let file = to.create_kept(self.kind().marker_file())?;
         let encoding = Encoding { content, chunks, counted: Mutex::default(), events: rt.events() };
         Ok(Box::new(Writer {
             settings: self,
@@ -159,7 +159,7 @@ struct Writer<'a> {
     spacing: ChosenSpacing,
     heading: Heading,
     chunks_start: u64,
-    file: DiskFile,
+    file: OutputFile,
     /// Whose turn it is to write: threads that wait for the lock of a file in the kernel do not sleep.
     turn: Mutex<()>,
     encoding: Encoding<'a>,
@@ -178,9 +178,9 @@ impl NodeSink for Writer<'_> {
     fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
         let at = self.chunks_start + offset;
         let turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        self.file.write_at(bytes, at, WRITING)?;
+        self.file.file.write_at(bytes, at, WRITING)?;
         drop(turn);
-        self.file.start_write_back(at, bytes.len());
+        self.file.file.start_write_back(at, bytes.len());
         Ok(())
     }
 
@@ -188,6 +188,10 @@ impl NodeSink for Writer<'_> {
         let notes = decode(notes)?;
         self.encoding.counted.lock().unwrap_or_else(PoisonError::into_inner).merge(&notes);
         Ok(())
+    }
+
+    fn kept(&self) -> Option<KeptFile<'_>> {
+        self.file.kept(self.chunks_start)
     }
 
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
@@ -205,7 +209,9 @@ impl OctreeWriter for Writer<'_> {
     }
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {
-        let Self { settings, cloud, spacing, mut heading, chunks_start, file, encoding, .. } = *self;
+        let Self {
+            settings, cloud, spacing, mut heading, chunks_start, file: OutputFile { file, .. }, encoding, ..
+        } = *self;
         let Encoding { content, chunks, counted, .. } = encoding;
         let Counted { tally, changes } = counted.into_inner().unwrap_or_else(PoisonError::into_inner);
         let summary = tally.summary(&content.lattice);
@@ -217,6 +223,7 @@ impl OctreeWriter for Writer<'_> {
         let ending = heading.finish(info(cloud, &spacing), &summary, &mut nodes, &table).map_err(|e| failed(&e))?;
         file.write_at(&ending.tail, ending.tail_start, "writing the hierarchy")?;
         file.write_at(&ending.head, 0, "writing the header")?;
+        file.set_len(ending.tail_start + ending.tail.len() as u64, "ending the file")?;
         file.sync("syncing the file")?;
 
         let (kind, schema) = (settings.kind(), cloud.schema());

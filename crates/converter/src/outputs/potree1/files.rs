@@ -9,7 +9,7 @@ use pointmill_format::potree1::Metadata;
 use super::archive::{ARCHIVE_FILE, Archive};
 use super::encoder::{Encoding, RecordEncoder};
 use crate::error::ConvertError;
-use crate::job::decode;
+use crate::job::{KeptFile, decode};
 use crate::octree::{FinishedNode, NodeSink};
 use crate::outputs::staging::StagedDataset;
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -143,6 +143,10 @@ impl NodeSink for NodeFiles<'_> {
         let notes = decode(notes)?;
         self.encoding.tally.lock().unwrap_or_else(PoisonError::into_inner).merge(&notes);
         Ok(())
+    }
+
+    fn kept(&self) -> Option<KeptFile<'_>> {
+        None // a file for each node
     }
 
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {

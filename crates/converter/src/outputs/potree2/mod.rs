@@ -24,14 +24,14 @@ use self::watch::{AllSeen, Watch};
 use super::attributes::{Choice, changed, choose};
 use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, errors, tree_report};
 use super::output::{DiskSize, OctreeOutput, OctreeWriter, Output, Target, Wants};
-use super::staging::StagedDataset;
+use super::staging::{OutputFile, StagedDataset};
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{Build, decode};
+use crate::job::{Build, KeptFile, decode};
 use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
-use crate::runtime::{DiskFile, Events, Runtime};
+use crate::runtime::{Events, Runtime};
 use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
 use crate::warning::Warning;
 
@@ -143,7 +143,7 @@ impl OctreeOutput for Potree2Settings {
             return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());
         }
         Ok(Box::new(Payloads {
-            file: to.create("octree.bin")?,
+            file: to.create_kept("octree.bin")?,
             turn: Mutex::default(),
             layout: OutputLayout::new(schema, &choice.kept, &cloud.frame),
             events: rt.events(),
@@ -176,7 +176,7 @@ fn entry(node: &FinishedNode) -> NodeEntry {
 /// A dataset while its nodes are made.
 struct Payloads<'a> {
     /// `octree.bin`
-    file: DiskFile,
+    file: OutputFile,
     /// Whose turn it is to write: threads that wait for the lock of a file in the kernel do not sleep.
     turn: Mutex<()>,
     layout: OutputLayout,
@@ -203,15 +203,19 @@ impl NodeSink for Payloads<'_> {
 
     fn write(&self, _: &[FinishedNode], bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
         let turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        self.file.write_at(bytes, offset, "writing node payloads")?;
+        self.file.file.write_at(bytes, offset, "writing node payloads")?;
         drop(turn);
-        self.file.start_write_back(offset, bytes.len());
+        self.file.file.start_write_back(offset, bytes.len());
         Ok(())
     }
 
     fn add_notes(&self, notes: &[u8]) -> Result<(), ConvertError> {
         self.seen.add(&decode(notes)?);
         Ok(())
+    }
+
+    fn kept(&self) -> Option<KeptFile<'_>> {
+        self.file.kept(0)
     }
 
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
@@ -229,7 +233,9 @@ impl OctreeWriter for Payloads<'_> {
     }
 
     fn finish(self: Box<Self>, tree: Octree) -> Result<OutputReport, ConvertError> {
-        self.file.sync("syncing the payloads")?;
+        let file = &self.file.file;
+        file.set_len(tree.bytes, "ending the payloads")?;
+        file.sync("syncing the payloads")?;
         let Self { seen, settings, cloud, spacing, choice, to, .. } = *self;
         let (kind, schema) = (settings.kind(), cloud.schema());
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();

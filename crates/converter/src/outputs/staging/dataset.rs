@@ -1,5 +1,6 @@
 //! A dataset on its way into the output.
 
+use std::fs;
 use std::io::{self, BufWriter, Write as _};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,7 +8,9 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::error::ConvertError;
-use crate::runtime::disk::{create_folder, sync_file_system, sync_folder, sync_path};
+use crate::job::KeptFile;
+use crate::runtime::disk::{create_folder, link, sync_file_system, sync_folder, sync_path};
+use crate::runtime::os_files::is_only_name;
 use crate::runtime::{Disk, DiskFile, Runtime, Sequential};
 
 /// Bytes of JSON that are written at once.
@@ -24,6 +27,27 @@ pub(crate) struct StagedDataset {
     pub(super) shown: PathBuf,
     pub(super) name: &'static str,
     pub(super) disk: Arc<dyn Disk>,
+    /// How the names begin that a job gives to files of the dataset, so that they outlive the run.
+    pub(super) kept_as: Option<PathBuf>,
+}
+
+/// A file of a dataset while it is written.
+pub(crate) struct OutputFile {
+    pub(crate) file: DiskFile,
+    /// A job has it, too.
+    is_kept: bool,
+}
+
+impl OutputFile {
+    /// One that no job has.
+    pub(crate) fn new(file: DiskFile) -> Self {
+        Self { file, is_kept: false }
+    }
+
+    /// The file as a job has it, if that is so; offsets count from `start`.
+    pub(crate) fn kept(&self, start: u64) -> Option<KeptFile<'_>> {
+        self.is_kept.then_some(KeptFile { file: &self.file, start })
+    }
 }
 
 impl StagedDataset {
@@ -35,6 +59,30 @@ impl StagedDataset {
     /// Makes a file; whoever writes it syncs it.
     pub(crate) fn create(&self, name: &str) -> Result<DiskFile, ConvertError> {
         DiskFile::create(&self.folder.join(name), self.shown.join(name), &self.disk)
+    }
+
+    /// The same for a file whose bytes a job keeps: one that a run before has left, as it is, or a new one. Whoever writes it cuts
+    /// it in the end.
+    ///
+    /// The job has the file under a second name. A file with more names than this one is part of an output that is complete,
+    /// or of a hidden folder that could not be removed: it is left alone.
+    pub(crate) fn create_kept(&self, name: &str) -> Result<OutputFile, ConvertError> {
+        let second = |kept_as: &PathBuf| {
+            let mut second = kept_as.clone().into_os_string();
+            second.push(name);
+            PathBuf::from(second)
+        };
+        let Some(kept) = self.kept_as.as_ref().filter(|_| cfg!(unix)).map(second) else {
+            return self.create(name).map(OutputFile::new);
+        };
+        let path = self.folder.join(name);
+        if is_only_name(&kept) && link(&*self.disk, &kept, &path).is_ok() {
+            return Ok(OutputFile { file: self.open(name)?, is_kept: true });
+        }
+        let _ = fs::remove_file(&kept); // what stays is not written to
+        let file = self.create(name)?;
+        let is_kept = link(&*self.disk, &path, &kept).is_ok();
+        Ok(OutputFile { file, is_kept })
     }
 
     /// Opens a file that was made before, to write more.

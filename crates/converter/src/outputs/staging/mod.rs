@@ -20,10 +20,11 @@ use pointmill_format::DatasetKind;
 use serde::Serialize;
 
 use crate::error::ConvertError;
+use crate::job::KEPT_OUTPUT;
 use crate::runtime::disk::{create_folder, sync_folder};
 use crate::runtime::{Disk, Events, Replacing};
 use crate::warning::Warning;
-pub(crate) use dataset::StagedDataset;
+pub(crate) use dataset::{OutputFile, StagedDataset};
 pub(crate) use file::StagedFile;
 pub use files::StagedFiles;
 use hidden::HiddenFolder;
@@ -81,9 +82,16 @@ impl StagedFolder {
         self.hidden.path_of_new()
     }
 
-    /// The place of a dataset: the folder itself if it is the only one, else a folder in it.
-    pub(crate) fn dataset(&self, kind: DatasetKind, is_only_one: bool) -> Result<StagedDataset, ConvertError> {
+    /// The place of a dataset: the folder itself if it is the only one, else a folder in it. `kept_in`: the folder of a job that
+    /// keeps its large files.
+    pub(crate) fn dataset(
+        &self,
+        kind: DatasetKind,
+        is_only_one: bool,
+        kept_in: Option<&Path>,
+    ) -> Result<StagedDataset, ConvertError> {
         let mut dataset = self.whole();
+        dataset.kept_as = kept_in.map(|folder| folder.join(format!("{KEPT_OUTPUT}{}-", kind.name())));
         if !is_only_one {
             dataset.name = kind.name();
             dataset.folder.push(dataset.name);
@@ -101,7 +109,7 @@ impl StagedFolder {
 
     fn whole(&self) -> StagedDataset {
         let (folder, shown) = (self.hidden.path_of_new(), self.place.given.clone());
-        StagedDataset { folder, shown, name: "", disk: Arc::clone(&self.disk) }
+        StagedDataset { folder, shown, name: "", disk: Arc::clone(&self.disk), kept_as: None }
     }
 
     /// Gives the folder its final name; whatever fails before it has it is undone. What stood there goes afterwards.

@@ -1,0 +1,102 @@
+//! Bytes of units that are in the output already. A run that keeps a job gives the file that it writes a second name in the job's
+//! folder: the bytes outlive the run without being written twice, and a unit leaves no more than where they are, and their sums.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::ConvertError;
+use crate::runtime::DiskFile;
+
+/// Bytes that are read back together.
+const READ_BYTES: u64 = 1 << 20;
+
+/// Where bytes are in the output, and their CRC-32C.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Place {
+    pub(crate) offset: u64,
+    pub(crate) bytes: u64,
+    sum: u32,
+}
+
+impl Place {
+    /// Of bytes that are written at `offset`.
+    pub(crate) fn of(offset: u64, bytes: &[u8]) -> Self {
+        Self { offset, bytes: bytes.len() as u64, sum: crc32c::crc32c(bytes) }
+    }
+}
+
+/// A file of the output that a job has, too; offsets count from `start`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct KeptFile<'a> {
+    pub(crate) file: &'a DiskFile,
+    pub(crate) start: u64,
+}
+
+impl KeptFile<'_> {
+    /// True if the bytes are there as they were written. Nothing has waited until they were safe.
+    pub(crate) fn holds(&self, place: &Place) -> Result<bool, ConvertError> {
+        let begin = self.start.checked_add(place.offset);
+        let end = begin.and_then(|begin| begin.checked_add(place.bytes));
+        let (Some(mut at), Some(end)) = (begin, end) else { return Ok(false) };
+        if end > self.file.len("looking at what was built")? {
+            return Ok(false);
+        }
+        let (mut buffer, mut sum) = (vec![0; READ_BYTES.min(place.bytes) as usize], 0);
+        while at < end {
+            let part = (end - at).min(READ_BYTES);
+            let part_of_buffer = &mut buffer[..part as usize];
+            self.file.read_at(part_of_buffer, at, "looking at what was built")?;
+            sum = crc32c::crc32c_append(sum, part_of_buffer);
+            at += part;
+        }
+        Ok(sum == place.sum)
+    }
+
+    /// True if that is so of all of them.
+    pub(crate) fn holds_all(&self, places: &[Place]) -> Result<bool, ConvertError> {
+        for place in places {
+            if !self.holds(place)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::runtime::{Disk, SystemDisk};
+
+    #[test]
+    fn bytes_that_changed_or_are_missing_are_not_held() {
+        let dir = tempfile::tempdir().unwrap();
+        let (path, disk): (_, Arc<dyn Disk>) = (dir.path().join("file"), Arc::new(SystemDisk));
+        let file = DiskFile::create(&path, path.clone(), &disk).unwrap();
+        let bytes: Vec<u8> = (0..READ_BYTES + 77).map(|i| (i % 251) as u8).collect();
+        file.write_at(&bytes, 10 + 5, "writing").unwrap();
+        let kept = KeptFile { file: &file, start: 10 };
+        let place = Place::of(5, &bytes);
+        assert!(kept.holds(&place).unwrap() && kept.holds(&Place::of(7, &[])).unwrap());
+        assert!(kept.holds_all(&[place, Place::of(5, &bytes[..9])]).unwrap());
+        for other in [
+            Place { offset: 4, ..place },
+            Place { offset: u64::MAX, ..place },
+            Place { bytes: place.bytes + 1, ..place },
+            Place { bytes: u64::MAX, ..place },
+            Place { sum: place.sum ^ 1, ..place },
+        ] {
+            assert!(!kept.holds(&other).unwrap() && !kept.holds_all(&[place, other]).unwrap(), "{other:?}");
+        }
+        for at in [15, 15 + READ_BYTES, 15 + place.bytes - 1] {
+            let was = bytes[(at - 15) as usize];
+            file.write_at(&[was ^ 8], at, "writing").unwrap();
+            assert!(!kept.holds(&place).unwrap(), "byte {at}");
+            file.write_at(&[was], at, "writing").unwrap();
+        }
+        assert!(kept.holds(&place).unwrap());
+        file.set_len(15 + place.bytes - 1, "cutting").unwrap();
+        assert!(!kept.holds(&place).unwrap(), "cut");
+    }
+}
