@@ -1,5 +1,6 @@
 //! A run that ends anywhere leaves what the next one goes on with, and that one ends in the same bytes.
 
+use std::cell::RefCell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use pointmill_converter::{
     BatchesSettings, BintreeSettings, Checkpoint, ConvertError, CopcSettings, Disk, DiskOperation, JobFault, Plan,
     Potree2Settings, Silent, Target, convert, convert_on,
 };
+use pointmill_format::bintree::Layout;
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 
@@ -36,14 +38,19 @@ struct Bench {
 impl Bench {
     /// Five scans, read in units of two.
     fn new() -> Self {
+        Self::of(4000)
+    }
+
+    /// The same of so many points each.
+    fn of(points: usize) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let scan = |seed: u64| {
             let path = dir.path().join(format!("{seed}.las"));
-            fs::write(&path, Las::terrain(4000, seed).bytes()).unwrap();
+            fs::write(&path, Las::terrain(points, seed).bytes()).unwrap();
             path
         };
         let mut plan = Plan::new((1..=5).map(scan).collect(), dir.path().join("out"));
-        (plan.threads, plan.checkpoint, plan.checkpoint_points) = (2, Checkpoint::Always, 8000);
+        (plan.threads, plan.checkpoint, plan.checkpoint_points) = (2, Checkpoint::Always, 2 * points as u64);
         plan.name = "cloud".into();
         Self { dir, plan }
     }
@@ -61,21 +68,22 @@ impl Bench {
 
     /// A job with some units.
     fn with_job(&self) {
-        self.with_job_of(&targets());
+        self.with_job_of(&targets(), "journal", |_| true);
     }
 
-    /// A job of a run that was about to end.
-    fn with_job_of(&self, targets: &[Target]) {
+    /// A job of the run that ended as late as possible, with a file whose name begins so, if it `suits`.
+    fn with_job_of(&self, targets: &[Target], file: &str, suits: impl Fn(&Self) -> bool) {
         let (operations, _) = self.end_at(&self.plan, targets, u64::MAX);
         fs::remove_dir_all(&self.plan.output).unwrap();
         for at in (0..operations).rev() {
             let (_, ended) = self.end_at(&self.plan, targets, at);
-            if ended.is_err() && self.job().exists() {
+            let has = |names: Vec<String>| names.iter().any(|name| name.starts_with(file));
+            if ended.is_err() && self.job().exists() && has(names(&self.job())) && suits(self) {
                 return;
             }
             let _ = fs::remove_dir_all(&self.plan.output);
         }
-        panic!("no run left a job");
+        panic!("no run left a job with {file}");
     }
 
     fn resumed(&self) -> Plan {
@@ -196,22 +204,42 @@ fn without_a_job_the_run_begins_anew_and_a_folder_of_others_is_left_alone() {
     assert_eq!(fs::read(bench.job().join("letter.txt")).unwrap(), b"dear");
 }
 
-/// Outputs whose bytes a job keeps where they belong: the file.
+/// Outputs whose bytes a job keeps where they belong, and how the names begin of the files.
 #[cfg(unix)]
-fn in_place() -> [(Target, &'static str); 4] {
+fn in_place() -> [(Target, &'static str); 5] {
+    let bintree = |layout| BintreeSettings { layout, ..BintreeSettings::default() };
     [
         (Potree2Settings::default().into(), "output-potree2-octree.bin"),
         (CopcSettings::default().into(), "output-copc-points.copc.laz"),
-        (BintreeSettings::default().into(), "output-bintree-leaves.bin"),
+        (bintree(Layout::Packed).into(), "output-bintree-leaves.bin"),
+        (bintree(Layout::Files).into(), "output-bintree-n"),
         (BatchesSettings::default().into(), "output-batches-points.qbatch"),
     ]
 }
 
-/// Bytes of the files of units that were built.
+/// A job that can be put back as it was.
 #[cfg(unix)]
-fn built_bytes(job: &Path) -> u64 {
-    let built = names(job).into_iter().filter(|name| name.starts_with("build-"));
-    built.map(|name| fs::metadata(job.join(name)).unwrap().len()).sum()
+#[derive(Clone)]
+struct Job {
+    folder: PathBuf,
+    files: Vec<(String, Vec<u8>)>,
+}
+
+#[cfg(unix)]
+impl Job {
+    fn new(folder: PathBuf) -> Self {
+        let files = names(&folder).into_iter().map(|name| (name.clone(), fs::read(folder.join(name)).unwrap()));
+        Self { files: files.collect(), folder }
+    }
+
+    fn put_back(&self) {
+        fs::create_dir(&self.folder).unwrap();
+        self.files.iter().for_each(|(name, bytes)| fs::write(self.folder.join(name), bytes).unwrap());
+    }
+
+    fn bytes(&self, begin: &str) -> usize {
+        self.files.iter().filter(|(name, _)| name.starts_with(begin)).map(|(_, bytes)| bytes.len()).sum()
+    }
 }
 
 #[cfg(unix)]
@@ -219,19 +247,30 @@ fn built_bytes(job: &Path) -> u64 {
 fn what_was_built_stays_in_the_file_of_the_output_and_is_built_again_where_that_changed() {
     for (target, file) in in_place() {
         let targets = [target];
-        let bench = Bench::new();
+        let bench = Bench::of(20_000);
         let plain =
             Plan { checkpoint: Checkpoint::Never, output: bench.dir.path().join("plain"), ..bench.plan.clone() };
         convert(&plain, &targets, &Silent).unwrap();
         let expected = dataset(&plain.output);
-        let kept = bench.job().join(file);
+        let job = RefCell::new(None);
+        bench.with_job_of(&targets, file, |bench| {
+            let kept = job.borrow_mut().insert(Job::new(bench.job())).clone();
+            let units = convert(&bench.resumed(), &targets, &Silent).unwrap().recalled_units;
+            fs::remove_dir_all(&bench.plan.output).unwrap();
+            kept.put_back();
+            units > 0 // the end of batches changes what units have written
+        });
+        let job = job.into_inner().unwrap();
+        let (kept, built) = (job.bytes(file), job.bytes("build-"));
+        assert!(kept > 500_000 && built < kept / 3 * 2, "{file}: {built} beside {kept} bytes");
+        fs::remove_dir_all(bench.job()).unwrap();
         let recalled = |change: &dyn Fn(&mut Vec<u8>)| {
-            bench.with_job_of(&targets);
-            let mut bytes = fs::read(&kept).unwrap();
-            assert!(bytes.len() > 100_000, "{file}: {} bytes", bytes.len());
-            assert!(built_bytes(&bench.job()) < bytes.len() as u64 / 4, "{file}: bytes are kept once");
-            change(&mut bytes);
-            fs::write(&kept, bytes).unwrap();
+            job.put_back();
+            for (name, bytes) in job.files.iter().filter(|(name, _)| name.starts_with(file)) {
+                let mut bytes = bytes.clone();
+                change(&mut bytes);
+                fs::write(bench.job().join(name), bytes).unwrap();
+            }
             let report = convert(&bench.resumed(), &targets, &Silent).unwrap();
             assert!(dataset(&bench.plan.output) == expected && !bench.job().exists(), "{file}");
             fs::remove_dir_all(&bench.plan.output).unwrap();
@@ -248,7 +287,7 @@ fn what_was_built_stays_in_the_file_of_the_output_and_is_built_again_where_that_
         assert_eq!(recalled(&|bytes| bytes.fill(0)), 0, "{file}");
         assert!(recalled(&|bytes| bytes.truncate(bytes.len() / 2)) < all, "{file}");
         assert_eq!(recalled(&Vec::clear), 0, "{file}");
-        // what a run with other settings of resources has left behind the end
+        // whatever a run has left behind the end
         assert_eq!(recalled(&|bytes| bytes.extend_from_slice(&[7; 100])), all, "{file}");
     }
 }
@@ -259,14 +298,18 @@ fn a_file_that_is_part_of_a_complete_output_is_not_written_to() {
     for (target, file) in in_place() {
         let targets = [target];
         let bench = Bench::new();
-        bench.with_job_of(&targets);
+        bench.with_job_of(&targets, file, |_| true);
         // as if the run had been killed between the two: it has given the output its name, and the job is still there
-        let published = bench.dir.path().join("published");
-        fs::hard_link(bench.job().join(file), &published).unwrap();
-        let before = fs::read(&published).unwrap();
+        let kept = names(&bench.job()).into_iter().filter(|name| name.starts_with(file));
+        let published = kept.map(|name| {
+            let published = bench.dir.path().join(&name);
+            fs::hard_link(bench.job().join(name), &published).unwrap();
+            (published.clone(), fs::read(published).unwrap())
+        });
+        let published: Vec<_> = published.collect();
         let report = convert(&bench.resumed(), &targets, &Silent).unwrap();
         assert_eq!((report.recalled_points, report.recalled_units), (20_000, 0), "{file}");
-        assert!(fs::read(&published).unwrap() == before, "{file}");
+        assert!(published.iter().all(|(path, before)| fs::read(path).unwrap() == *before), "{file}");
     }
 }
 

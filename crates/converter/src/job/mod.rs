@@ -18,12 +18,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub(crate) use identity::Identity;
-pub(crate) use in_place::{KeptFile, Place};
+pub(crate) use in_place::{InPlace, KeptFile, Place};
 use journal::{Entry, Journal};
 pub(crate) use keeper::{Build, GroupUnits, Keeper, settled};
 use serde::{Deserialize, Serialize};
 pub(crate) use shared::{SharedJob, Task};
-pub(crate) use tasks::{UnitLog, WriteInPlace, make_units, put_back};
+pub(crate) use tasks::{UnitLog, make_units, put_back};
 pub(crate) use unit_file::{UnitReader, UnitWriter};
 
 use crate::error::{ConvertError, JobFault};

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::in_place::{KeptFile, Place};
+use super::in_place::{InPlace, Place};
 use super::keeper::GroupUnits;
 use super::unit_file::{UnitReader, UnitWriter};
 use crate::error::{ConvertError, JobFault};
@@ -25,32 +25,30 @@ const IN_PLACE: usize = 3;
 /// What a unit writes into the output: into its own file instead, with `P` for each piece of bytes, which says where they belong;
 /// or into the output at once, where a job has that, too.
 pub(crate) struct UnitLog<'a, P> {
-    in_place: Option<&'a WriteInPlace<'a, P>>,
+    in_place: Option<&'a dyn InPlace<P>>,
     inner: Mutex<Noted<'a, P>>,
 }
 
 struct Noted<'a, P> {
     file: &'a mut UnitWriter,
     belong: Vec<(P, u64)>,
-    in_place: Vec<Place>,
+    in_place: Vec<(P, Place)>,
 }
-
-/// Writes bytes where they belong in the output; returns the offset there.
-pub(crate) type WriteInPlace<'a, P> = dyn Fn(&P, &[u8]) -> Result<u64, ConvertError> + Sync + 'a;
 
 impl<'a, P: Serialize> UnitLog<'a, P> {
     /// Of a unit whose file was just begun. `in_place`: bytes go into the output at once.
-    pub(crate) fn begin(file: &'a mut UnitWriter, in_place: Option<&'a WriteInPlace<'a, P>>) -> Self {
+    pub(crate) fn begin(file: &'a mut UnitWriter, in_place: Option<&'a dyn InPlace<P>>) -> Self {
         file.begin();
         Self { in_place, inner: Mutex::new(Noted { file, belong: Vec::new(), in_place: Vec::new() }) }
     }
 
     /// Notes bytes.
     pub(crate) fn put(&self, place: P, bytes: &[u8]) -> Result<(), ConvertError> {
-        let written = self.in_place.map(|write| write(&place, bytes).map(|at| Place::of(at, bytes))).transpose()?;
+        let write = |to: &dyn InPlace<P>| to.write(&place, bytes).map(|at| Place::of(at, bytes));
+        let written = self.in_place.map(write).transpose()?;
         let mut noted = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         match written {
-            Some(written) => noted.in_place.push(written),
+            Some(written) => noted.in_place.push((place, written)),
             None => {
                 noted.file.write(bytes)?;
                 noted.belong.push((place, bytes.len() as u64));
@@ -69,17 +67,18 @@ impl<'a, P: Serialize> UnitLog<'a, P> {
 }
 
 /// Puts the bytes of a unit where they belong, in the order in which they were noted, a large piece in parts of whole rows of
-/// `row_bytes`: `put` gets the place, where in the piece they begin, and the bytes. Returns what else the unit came to, and how many
-/// bytes are in the output already. If the file turns out not to be whole, some bytes were put: who makes the unit again puts them
-/// there again.
+/// `row_bytes`: `put` gets the place, where in the piece they begin, and the bytes. `there` is told of bytes that are in the output
+/// already. Returns what else the unit came to. If the file turns out not to be whole, some bytes were put: who makes the unit again
+/// puts them there again.
 pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
     unit: &UnitReader,
     row_bytes: u64,
     mut put: impl FnMut(&P, u64, &[u8]) -> Result<(), ConvertError>,
-) -> Result<(T, u64), ConvertError> {
+    mut there: impl FnMut(P, Place),
+) -> Result<T, ConvertError> {
     let belong: Vec<(P, u64)> = unit.get(BELONG)?;
     let came_to = unit.get(CAME_TO)?;
-    let in_place: Option<Vec<Place>> = unit.get(IN_PLACE)?;
+    let in_place: Option<Vec<(P, Place)>> = unit.get(IN_PLACE)?;
     let mut reader = unit.reader(BYTES)?;
     let part = (PIECE_BYTES / row_bytes.max(1)).max(1) * row_bytes.max(1);
     let mut buffer = Vec::new();
@@ -96,33 +95,35 @@ pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
         }
     }
     reader.end()?;
-    Ok((came_to, in_place.iter().flatten().map(|place| place.bytes).sum()))
+    in_place.into_iter().flatten().for_each(|(place, at)| there(place, at));
+    Ok(came_to)
 }
 
-/// Fails unless the file of a unit is whole, and so are its bytes in the output, which is `kept`.
-fn check(unit: &UnitReader, kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
+/// Fails unless the file of a unit is whole, and so are its bytes in the output.
+fn check<P: DeserializeOwned>(unit: &UnitReader, output: Option<&dyn InPlace<P>>) -> Result<(), ConvertError> {
     unit.check()?;
-    let is_there = match unit.get::<Option<Vec<Place>>>(IN_PLACE)? {
-        None => true,
-        Some(places) => kept.map_or(Ok(false), |kept| kept.holds_all(&places))?,
-    };
-    if is_there { Ok(()) } else { Err(unit.damaged(0)) }
+    for (belong, place) in unit.get::<Option<Vec<(P, Place)>>>(IN_PLACE)?.into_iter().flatten() {
+        if !output.map_or(Ok(false), |output| output.holds(&belong, &place))? {
+            return Err(unit.damaged(0));
+        }
+    }
+    Ok(())
 }
 
-/// Does those units that are to be done here, and leaves them in their files. `points`: of each; `kept`: the output, if its bytes
-/// are put there at once; `make`: fills the file of one.
+/// Does those units that are to be done here, and leaves them in their files. `points`: of each; `output`: if their bytes are put
+/// there at once; `make`: fills the file of one.
 ///
 /// # Errors
 /// If units of the job are done one by one, how far all of them are: nothing is left to do here then.
-pub(crate) fn make_units(
+pub(crate) fn make_units<P: DeserializeOwned>(
     of: GroupUnits<'_>,
     points: &[u64],
-    kept: Option<KeptFile<'_>>,
+    output: Option<&dyn InPlace<P>>,
     rt: &Runtime<'_>,
     make: impl Fn(usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
 ) -> Result<(), ConvertError> {
     let is_wanted = |i: usize| -> Result<bool, ConvertError> {
-        Ok(of.in_parts().is_none_or(|job| job.wants(of.name(i))) && !of.is_done(i, |unit| check(unit, kept))?)
+        Ok(of.in_parts().is_none_or(|job| job.wants(of.name(i))) && !of.is_done(i, |unit| check(unit, output))?)
     };
     let wanted = rt.in_parallel(
         points.len(),
@@ -159,6 +160,7 @@ mod tests {
     use std::path::Path;
     use std::sync::Arc;
 
+    use super::super::in_place::KeptFile;
     use super::*;
     use crate::runtime::{Disk, DiskFile, SystemDisk};
 
@@ -176,18 +178,18 @@ mod tests {
         let open = |path: &Path| DiskFile::open(path, path.to_path_buf(), &disk).unwrap();
         let unit = UnitReader::open(&path, 0, open(&path), std::fs::metadata(&path).unwrap().len()).unwrap();
         let mut found: Vec<(u64, Vec<u8>)> = Vec::new();
-        let (came_to, in_place): (String, u64) = put_back(&unit, 3, |place: &u64, from, bytes| {
+        let put = |place: &u64, from: u64, bytes: &[u8]| {
             assert_eq!(from % 3, 0);
             match found.last_mut() {
                 Some((last, all)) if last == place && from > 0 => all.extend_from_slice(bytes),
                 _ => found.push((*place, bytes.to_vec())),
             }
             Ok(())
-        })
-        .unwrap();
-        assert_eq!((came_to.as_str(), in_place), ("the end", 0));
+        };
+        let came_to: String = put_back(&unit, 3, put, |_, _| panic!("nothing is there")).unwrap();
+        assert_eq!(came_to, "the end");
         assert_eq!(found, pieces.map(|(place, bytes)| (place, bytes.to_vec())));
-        check(&unit, None).unwrap();
+        check::<u64>(&unit, None).unwrap();
     }
 
     #[test]
@@ -197,8 +199,8 @@ mod tests {
         let [path, out] = ["unit", "out"].map(|name| dir.path().join(name));
         let out = DiskFile::create(&out, out.clone(), &disk).unwrap();
         let mut file = UnitWriter::create(&path, 0, &disk).unwrap();
-        let write = |place: &u64, bytes: &[u8]| out.write_at(bytes, 100 + place, "writing").map(|()| *place);
-        let log = UnitLog::begin(&mut file, Some(&write));
+        let kept = KeptFile { file: &out, start: 100 };
+        let log = UnitLog::begin(&mut file, Some(&kept));
         log.put(7, &[1, 2, 3]).unwrap();
         log.put(50, &[]).unwrap();
         log.put(20, &[9; 30]).unwrap();
@@ -206,12 +208,16 @@ mod tests {
         file.finish(true).unwrap();
         let unit = DiskFile::open(&path, path.clone(), &disk).unwrap();
         let unit = UnitReader::open(&path, 0, unit, std::fs::metadata(&path).unwrap().len()).unwrap();
-        let put = |_: &u64, _, _: &[u8]| panic!("its bytes are there");
-        assert_eq!(put_back::<u64, u8>(&unit, 1, put).unwrap(), (1, 33));
-        let kept = KeptFile { file: &out, start: 100 };
-        check(&unit, Some(kept)).unwrap();
-        assert!(check(&unit, None).is_err() && check(&unit, Some(KeptFile { start: 99, ..kept })).is_err());
+        let (mut found, put) = (Vec::new(), |_: &u64, _, _: &[u8]| panic!("its bytes are there"));
+        let came_to: u8 = put_back(&unit, 1, put, |belong, at| {
+            found.push((belong, at.offset, at.bytes));
+        })
+        .unwrap();
+        assert_eq!((came_to, found), (1, vec![(7, 7, 3), (50, 50, 0), (20, 20, 30)]));
+        check::<u64>(&unit, Some(&kept)).unwrap();
+        assert!(check::<u64>(&unit, None).is_err());
+        assert!(check::<u64>(&unit, Some(&KeptFile { start: 99, ..kept })).is_err());
         out.write_at(&[8], 125, "writing").unwrap();
-        assert!(check(&unit, Some(kept)).is_err());
+        assert!(check::<u64>(&unit, Some(&kept)).is_err());
     }
 }

@@ -32,7 +32,7 @@ use super::recovery::Recovery;
 use super::staging::{OutputFile, StagedDataset};
 use crate::cloud::{Cloud, Store};
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{Build, GroupUnits, KeptFile, UnitLog, WriteInPlace, make_units, put_back};
+use crate::job::{Build, GroupUnits, InPlace, KeptFile, UnitLog, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, ScaleChoice, Setting};
 use crate::report::{self, ChoiceReason, OutputReport, PlannedChoice, SavedBytes};
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -42,7 +42,7 @@ use content::Content;
 use finish::finish;
 use frame::{Frame, refused};
 use large::WORD_BYTES;
-use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part, To, WRITING};
+use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part, To};
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
 
 /// Tasks per thread, so that threads end together; their sizes. Small ones share too much with each other, large ones
@@ -234,11 +234,9 @@ impl Means<'_> {
     /// Encodes the tasks of a job that are to be encoded here, each into a file of its own, or into the output if a job has it.
     fn units(&self, units: GroupUnits<'_>, tasks: &[Task], kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = tasks.iter().map(|task| task.points).collect();
-        let write =
-            kept.map(|kept| move |at: &u64, bytes: &[u8]| kept.file.write_at(bytes, *at, WRITING).map(|()| *at));
-        let write = write.as_ref().map(|write| write as &WriteInPlace<'_, u64>);
-        make_units(units, &points, kept, self.rt, |index, file| {
-            let log = UnitLog::begin(file, write);
+        let output = kept.as_ref().map(|kept| kept as &dyn InPlace<u64>);
+        make_units(units, &points, output, self.rt, |index, file| {
+            let log = UnitLog::begin(file, output);
             let came_to: (TaskResults, Part, Vec<u8>) = {
                 let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
                 let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
@@ -266,8 +264,9 @@ impl Means<'_> {
             || (Encoder::default(), Vec::new()),
             |(encoder, all), index| {
                 let put = |at: &u64, from: u64, bytes: &[u8]| output.write(bytes, at + from);
-                let unit = units.recall(index, |unit| put_back::<u64, (TaskResults, Part, Vec<u8>)>(unit, 1, put))?;
-                let ((results, part, originals), _) = unit.ok_or_else(|| units.gone(index))?;
+                let unit = units.recall(index, |unit| put_back(unit, 1, put, |_, _| ()))?;
+                let came_to: (TaskResults, Part, Vec<u8>) = unit.ok_or_else(|| units.gone(index))?;
+                let (results, part, originals) = came_to;
                 output.add_part(part, originals, encoder)?;
                 all.push(results);
                 Ok(())

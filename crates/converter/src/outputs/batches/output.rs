@@ -15,8 +15,6 @@ use crate::error::ConvertError;
 use crate::outputs::recovery::{Lost, Recovery};
 use crate::runtime::DiskFile;
 
-pub(super) const WRITING: &str = "writing the batches";
-
 /// Bytes of an entry of the originals: storage index and colour word.
 pub(super) const ORIGINAL_BYTES: usize = 8;
 
@@ -214,7 +212,7 @@ impl<'a> BatchFile<'a> {
 
     pub(super) fn write(&self, bytes: &[u8], offset: u64) -> Result<(), ConvertError> {
         match self.to {
-            To::File(file) => file.write_at(bytes, offset, WRITING),
+            To::File(file) => file.write_at(bytes, offset, "writing the batches"),
             To::Unit(put) => put(offset, bytes),
         }
     }

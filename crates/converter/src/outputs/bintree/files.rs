@@ -1,17 +1,18 @@
 //! Where the bytes of leaves go: one file each, or one for all.
 
-use std::sync::Mutex;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use pointmill_format::bintree::{Layout, PACKED_FILE, leaf_file_name};
 use serde::{Deserialize, Serialize};
 
 use crate::error::ConvertError;
-use crate::job::KeptFile;
+use crate::job::{self, InPlace};
 use crate::outputs::staging::{OutputFile, StagedDataset};
 use crate::runtime::Runtime;
 
-pub(super) const WRITING: &str = "writing a leaf";
+const WRITING: &str = "writing a leaf";
 
 /// The leaves of a dataset; any number of threads put them.
 pub(super) struct Leaves<'a> {
@@ -48,9 +49,40 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Where it begins in a packed file.
-    pub(super) fn offset(&self, stride: u64) -> u64 {
-        (self.start + self.from) * stride
+    /// The leaf, if each has a file of its own.
+    fn file_name(&self) -> String {
+        leaf_file_name(self.path.iter().copied())
+    }
+}
+
+impl InPlace<Place> for Leaves<'_> {
+    fn write(&self, place: &Place, records: &[u8]) -> Result<u64, ConvertError> {
+        let (at, at_of_all) = (place.from * self.stride, (place.start + place.from) * self.stride);
+        match &self.to {
+            To::Unit(_) => return Err(ConvertError::Internal("a unit holds no leaves".into())),
+            To::File(to) => {
+                to.file.write_at(records, at_of_all, WRITING)?;
+                return Ok(at_of_all);
+            }
+            To::Files { staged, .. } if place.from > 0 => {
+                staged.open(&place.file_name())?.write_at(records, at, WRITING)
+            }
+            To::Files { staged, .. } => {
+                let OutputFile { file, .. } = staged.create_kept(&place.file_name())?;
+                file.set_len(0, WRITING)?;
+                file.write_at(records, 0, WRITING)
+            }
+        }?;
+        Ok(at)
+    }
+
+    fn holds(&self, place: &Place, at: &job::Place) -> Result<bool, ConvertError> {
+        let holds = |file: &OutputFile| file.kept(0).map_or(Ok(false), |kept| kept.holds(at));
+        match &self.to {
+            To::Unit(_) => Ok(false),
+            To::File(file) => holds(file),
+            To::Files { staged, .. } => holds(&staged.create_kept(&place.file_name())?),
+        }
     }
 }
 
@@ -86,34 +118,44 @@ impl<'a> Leaves<'a> {
 
     /// [`Self::put`] for a part of the records of a leaf: those after the first `from`. The first part comes first.
     pub(super) fn put_part(&self, path: &[bool], start: u64, from: u64, records: &[u8]) -> Result<(), ConvertError> {
-        self.bytes.fetch_add(records.len() as u64, Ordering::Relaxed);
-        let (staged, written) = match &self.to {
-            To::Unit(put) => return put(Place { path: path.to_vec(), start, from }, records),
-            To::File(to) => return to.file.write_at(records, (start + from) * self.stride, WRITING),
-            To::Files { staged, written } => (staged, written),
-        };
-        let name = leaf_file_name(path.iter().copied());
-        if from > 0 {
-            return staged.open(&name)?.write_at(records, from * self.stride, WRITING);
+        let place = Place { path: path.to_vec(), start, from };
+        if let To::Unit(put) = &self.to {
+            return put(place, records);
         }
-        staged.create(&name)?.write_at(records, 0, WRITING)?;
-        if let Ok(mut written) = written.lock() {
-            written.push(name);
-        }
+        self.write(&place, records)?;
+        self.count(&place, records.len() as u64);
         Ok(())
     }
 
-    /// The file, if a job has it, too.
-    pub(super) fn kept(&self) -> Option<KeptFile<'_>> {
-        match &self.to {
-            To::File(file) => file.kept(0),
-            _ => None,
+    /// Counts bytes that are there.
+    fn count(&self, place: &Place, bytes: u64) {
+        self.bytes.fetch_add(bytes, Ordering::Relaxed);
+        if let (To::Files { written, .. }, 0) = (&self.to, place.from) {
+            written.lock().unwrap_or_else(PoisonError::into_inner).push(place.file_name());
         }
     }
 
-    /// Counts bytes that are there already.
-    pub(super) fn count(&self, bytes: u64) {
-        self.bytes.fetch_add(bytes, Ordering::Relaxed);
+    /// Takes over leaves of a unit that are there already: where each part begins in its file, and its bytes.
+    pub(super) fn take(&self, parts: &[(Place, u64, u64)]) -> Result<(), ConvertError> {
+        let mut ends: BTreeMap<String, u64> = BTreeMap::new();
+        for (place, offset, bytes) in parts {
+            self.count(place, *bytes);
+            let end = ends.entry(place.file_name()).or_default();
+            *end = (*end).max(offset + bytes);
+        }
+        let To::Files { staged, .. } = &self.to else { return Ok(()) };
+        // a run before may have left more
+        ends.iter().try_for_each(|(name, end)| staged.open(name)?.set_len(*end, "ending a leaf"))
+    }
+
+    /// Where units of a job put leaves at once, so that they outlive the run.
+    pub(super) fn in_place(&self) -> Option<&dyn InPlace<Place>> {
+        let is_kept = match &self.to {
+            To::Unit(_) => false,
+            To::File(file) => file.kept(0).is_some(),
+            To::Files { staged, .. } => staged.can_keep(),
+        };
+        is_kept.then_some(self)
     }
 
     /// Bytes of a point.

@@ -30,7 +30,7 @@ use serde_json::{Map, Value};
 pub use self::settings::BintreeSettings;
 
 use self::assemble::{assemble, figures};
-use self::files::{Leaves, Place, WRITING};
+use self::files::{Leaves, Place};
 use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
 use self::subtree::{Builder, Built};
@@ -41,7 +41,7 @@ use super::recovery::Lost;
 use super::staging::StagedDataset;
 use crate::cloud::{Cloud, Ledger};
 use crate::error::{ConvertError, Unsupported};
-use crate::job::{Build, GroupUnits, KeptFile, UnitLog, WriteInPlace, make_units, put_back};
+use crate::job::{self, Build, GroupUnits, InPlace, UnitLog, make_units, put_back};
 use crate::plan::{AttributeChoice, Duplicates, Plan, PlanError, PlanFault, Setting};
 use crate::report::{self, FormatErrors, OutputReport, PlannedChoice};
 use crate::runtime::{Consumer, Reservation, Runtime, Sequential};
@@ -132,7 +132,7 @@ impl Output for BintreeSettings {
         let make = Make { cloud, rt, settings: self, columns: &columns, tasks: &upper.tasks, task_points };
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
         if let Some(units) = units {
-            make.units(units, leaves.kept())?;
+            make.units(units, leaves.in_place())?;
         }
         let (built, _known) = make.all(units, &leaves)?;
         let leaf_bytes = leaves.finish(rt)?;
@@ -190,18 +190,11 @@ struct Make<'a> {
 impl Make<'_> {
     /// Builds the subtrees of a job that are to be built here, each into a file of its own; their leaves into the output if a job
     /// has it.
-    fn units(&self, units: GroupUnits<'_>, kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
+    fn units(&self, units: GroupUnits<'_>, output: Option<&dyn InPlace<Place>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = self.tasks.iter().map(upper::Task::points).collect();
         let (layout, stride) = (self.settings.layout, self.columns.record.stride());
-        let write = kept.map(|kept| {
-            move |place: &Place, records: &[u8]| {
-                let at = place.offset(stride as u64);
-                kept.file.write_at(records, at, WRITING).map(|()| at)
-            }
-        });
-        let write = write.as_ref().map(|write| write as &WriteInPlace<'_, Place>);
-        make_units(units, &points, kept, self.rt, |index, file| {
-            let log = UnitLog::begin(file, write);
+        make_units(units, &points, output, self.rt, |index, file| {
+            let log = UnitLog::begin(file, output);
             let built = {
                 let put = |place: Place, records: &[u8]| log.put(place, records);
                 let leaves = Leaves::of_unit(layout, stride, &put);
@@ -261,11 +254,12 @@ impl Make<'_> {
 
 /// A subtree that a unit has built, its leaves put where they belong.
 fn recalled(units: GroupUnits<'_>, index: usize, leaves: &Leaves<'_>) -> Result<Built, ConvertError> {
-    let built = units.recall(index, |unit| {
-        put_back(unit, leaves.stride(), |place, byte, records| leaves.put_back(place, byte, records))
-    })?;
-    let (built, in_place) = built.ok_or_else(|| units.gone(index))?;
-    leaves.count(in_place);
+    let mut there = Vec::new();
+    let put = |place: &Place, byte: u64, records: &[u8]| leaves.put_back(place, byte, records);
+    let note = |place: Place, at: job::Place| there.push((place, at.offset, at.bytes));
+    let built = units.recall(index, |unit| put_back(unit, leaves.stride(), put, note))?;
+    let built = built.ok_or_else(|| units.gone(index))?;
+    leaves.take(&there)?;
     Ok(built)
 }
 

@@ -1,6 +1,6 @@
 //! A dataset on its way into the output.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write as _};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::error::ConvertError;
 use crate::job::KeptFile;
 use crate::runtime::disk::{create_folder, link, sync_file_system, sync_folder, sync_path};
-use crate::runtime::os_files::is_only_name;
+use crate::runtime::os_files::{is_only_name, is_same_file};
 use crate::runtime::{Disk, DiskFile, Runtime, Sequential};
 
 /// Bytes of JSON that are written at once.
@@ -67,22 +67,31 @@ impl StagedDataset {
     /// The job has the file under a second name. A file with more names than this one is part of an output that is complete,
     /// or of a hidden folder that could not be removed: it is left alone.
     pub(crate) fn create_kept(&self, name: &str) -> Result<OutputFile, ConvertError> {
-        let second = |kept_as: &PathBuf| {
-            let mut second = kept_as.clone().into_os_string();
-            second.push(name);
-            PathBuf::from(second)
-        };
-        let Some(kept) = self.kept_as.as_ref().filter(|_| cfg!(unix)).map(second) else {
-            return self.create(name).map(OutputFile::new);
-        };
+        let Some(kept) = self.second_name(name) else { return self.create(name).map(OutputFile::new) };
         let path = self.folder.join(name);
-        if is_only_name(&kept) && link(&*self.disk, &kept, &path).is_ok() {
+        let is_there = || File::open(&path).is_ok_and(|file| is_same_file(&file, &kept));
+        if is_there() || is_only_name(&kept) && link(&*self.disk, &kept, &path).is_ok() {
             return Ok(OutputFile { file: self.open(name)?, is_kept: true });
         }
         let _ = fs::remove_file(&kept); // what stays is not written to
         let file = self.create(name)?;
         let is_kept = link(&*self.disk, &path, &kept).is_ok();
         Ok(OutputFile { file, is_kept })
+    }
+
+    /// True if [`Self::create_kept`] makes files that a job has, too: not if it is on another file system, or on one without
+    /// second names.
+    pub(crate) fn can_keep(&self) -> bool {
+        let (name, path) = ("probe", self.folder.join("probe"));
+        let Some(second) = self.second_name(name) else { return false };
+        let is_kept = self.create_kept(name).is_ok_and(|probe| probe.is_kept);
+        is_kept & fs::remove_file(path).is_ok() & fs::remove_file(second).is_ok()
+    }
+
+    fn second_name(&self, name: &str) -> Option<PathBuf> {
+        let mut second = self.kept_as.as_ref().filter(|_| cfg!(unix))?.clone().into_os_string();
+        second.push(name);
+        Some(second.into())
     }
 
     /// Opens a file that was made before, to write more.
