@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use serde::{Deserialize, Serialize};
 
 use super::segments::Segment;
-use crate::error::ConvertError;
+use crate::error::{ConvertError, JobFault};
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
 
 /// Blocks grow to this size: a few large pages, and one long write when they go to disk.
@@ -77,6 +77,8 @@ struct Kept {
     sum: u32,
     /// Where else it is while it is in memory.
     copy: Option<u64>,
+    /// Another run has written it, and nobody has looked yet whether it is as it was.
+    is_unseen: bool,
 }
 
 #[derive(Clone)]
@@ -182,7 +184,7 @@ impl Store {
         for &SafeBlock { source, offset, bytes, sum } in safe {
             let remaining = bytes / self.stride as u64 * u64::from(self.uses);
             if self.is_kept {
-                kept.push(Kept { bytes, sum, copy: None });
+                kept.push(Kept { bytes, sum, copy: None, is_unseen: start == 0 });
             }
             blocks.push(Block { source, remaining, place: Place::Disk { offset: start + offset } });
         }
@@ -212,8 +214,25 @@ impl Store {
         Ok(file)
     }
 
+    /// Looks whether a block that another run has written is in the file as it was, before the first of its records is used.
+    fn look_at(&self, index: u32, source: u32, offset: u64) -> Result<(), ConvertError> {
+        if !self.is_kept {
+            return Ok(());
+        }
+        let kept = || self.kept.lock().map_err(|_| poisoned());
+        let Some(Kept { bytes, sum, .. }) = kept()?.get(index as usize).copied().filter(|kept| kept.is_unseen) else {
+            return Ok(());
+        };
+        if !self.is_whole(&SafeBlock { source, offset, bytes, sum })? {
+            let file = self.spill_file()?.path().to_path_buf();
+            return Err(JobFault::Damaged { file, byte: offset }.into());
+        }
+        kept()?[index as usize].is_unseen = false;
+        Ok(())
+    }
+
     /// True if a block is in the file as it was written.
-    pub(crate) fn is_whole(&self, block: &SafeBlock) -> Result<bool, ConvertError> {
+    fn is_whole(&self, block: &SafeBlock) -> Result<bool, ConvertError> {
         let (mut at, mut sum, mut part) = (0, 0, vec![0; CHECK_BYTES.min(block.bytes as usize)]);
         while at < block.bytes {
             let part = &mut part[..CHECK_BYTES.min((block.bytes - at) as usize)];
@@ -272,7 +291,7 @@ impl Store {
         let remaining = bytes / self.stride as u64 * u64::from(uses);
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         if self.is_kept {
-            self.kept.lock().map_err(|_| poisoned())?[block as usize] = Kept { bytes, sum, copy: None };
+            self.kept.lock().map_err(|_| poisoned())?[block as usize] = Kept { bytes, sum, ..Kept::default() };
         }
         let slot = &mut blocks[block as usize];
         (slot.remaining, slot.place) = (remaining, place);
@@ -363,6 +382,7 @@ impl Store {
         match place {
             Place::Memory(bytes) => out.extend_from_slice(&bytes[start..start + len]),
             Place::Disk { offset } => {
+                self.look_at(segment.block, source, offset)?;
                 let at = out.len();
                 os_hints::reserve(out, len);
                 out.resize(at + len, 0);

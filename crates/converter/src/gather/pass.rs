@@ -184,7 +184,7 @@ impl<'a> Pass<'a> {
             }
             None => return self.read_pairs(&pairs),
         };
-        if let Some(unit) = read_unit::recall(job, &self.context, number, &pairs, self.rt)? {
+        if let Some(unit) = read_unit::recall(job, &self.context, number, &pairs)? {
             let points = unit.seen.iter().map(|(_, seen)| seen.read).sum();
             self.rt.advance(points);
             job.count_recalled(points);

@@ -125,26 +125,15 @@ pub(super) fn name(pass: u32, number: u64) -> UnitName {
     UnitName { stage: Stage::Read { pass }, number }
 }
 
-/// What a job has of a unit, its records in the store; `None`: nothing.
+/// What a job has of a unit, its records in the store, which looks at them when they are needed; `None`: nothing.
 pub(super) fn recall(
     job: &Job,
     context: &Context<'_>,
     number: u64,
     pairs: &Range<usize>,
-    rt: &Runtime<'_>,
 ) -> Result<Option<Unit>, ConvertError> {
     let Some(kept) = job.unit::<Kept>(context.pass, number)? else { return Ok(None) };
     let first = context.store.adopt(&kept.blocks)?;
-    let blocks = &kept.blocks;
-    rt.in_parallel(
-        blocks.len(),
-        || (),
-        |(), i| match context.store.is_whole(&blocks[i])? {
-            true => Ok(()),
-            false => Err(job.damaged_records(context.pass, blocks[i].offset)),
-        },
-        |()| (),
-    )?;
     kept.taken(context, pairs, first).map(Some)
 }
 

@@ -225,11 +225,6 @@ impl Job {
         self.folder.join(format!("{RECORDS}{pass}"))
     }
 
-    /// The error for records that are not as they were written.
-    pub(crate) fn damaged_records(&self, pass: u32, byte: u64) -> ConvertError {
-        JobFault::Damaged { file: self.records_path(pass), byte }.into()
-    }
-
     /// Where a unit leaves what it has built.
     fn built_path(&self, unit: UnitName) -> PathBuf {
         self.folder.join(unit.to_string())

@@ -109,6 +109,11 @@ impl DiskFile {
         bytes::read_exact_at(&self.file, buf, offset).map_err(|e| self.failed(doing, e))
     }
 
+    /// What errors call it.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Bytes of the file.
     pub(crate) fn len(&self, doing: &'static str) -> Result<u64, ConvertError> {
         self.file.metadata().map(|meta| meta.len()).map_err(|e| self.failed(doing, e))

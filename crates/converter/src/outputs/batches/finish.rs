@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use pointmill_format::Attribute;
 use pointmill_format::batches::{
-    AttributeEntry, Averaging, BATCH_POINTS, BatchRecord, Description, ErrorSums, Finish, Layout, Precision, lod_of,
-    rgb_of,
+    AttributeEntry, Averaging, BATCH_POINTS, BatchRecord, Description, ErrorSums, Finish, Layout, Precision,
+    SECTION_ALIGNMENT, lod_of, rgb_of,
 };
 use serde_json::json;
 
@@ -99,6 +99,7 @@ pub(super) fn finish(
         layout = layout.with_precision(needed);
         output.cut(layout.end_of_points())?;
     }
+    clear_gaps(output, &layout)?;
     output.write(&record_bytes(&records), layout.records.offset)?;
     let changes = |when: usize| patches.values().filter(|patch| patch.changes()[when]).count() as u64;
     let averaging = Averaging::of(results.changed - changes(0) + changes(1), settings.originals);
@@ -114,6 +115,16 @@ pub(super) fn finish(
     let (precision, lost) = (layout.precision(), state.lost);
     let spared = planes.spared;
     Ok(Finished { precision, spared, records, errors, lost, lod_points, layout, averaging, end, bytes })
+}
+
+/// Zeros between the sections: the file may be one that a run before has left.
+fn clear_gaps(output: &BatchFile<'_>, layout: &Layout) -> Result<(), ConvertError> {
+    let zeros = [0; SECTION_ALIGNMENT as usize];
+    let ends = layout.sections().map(|s| s.section.end()).chain([layout.records.end()]);
+    ends.into_iter().try_for_each(|end| {
+        let gap = end.next_multiple_of(SECTION_ALIGNMENT) - end;
+        output.write(&zeros[..gap as usize], end)
+    })
 }
 
 /// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.
