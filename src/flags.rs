@@ -30,7 +30,7 @@ fn advice(advice: &Advice) -> String {
     match advice {
         Advice::ReplaceOutput => "choose another output, or pass --overwrite".to_owned(),
         Advice::RaiseMemory { mib } => format!("pass --memory {mib}MiB or more"),
-        Advice::StartAnew => "leave out --resume to begin anew".to_owned(),
+        Advice::StartAnew => "begin anew: leave out --resume, or plan the job in another folder".to_owned(),
         Advice::FreeTemporaryDisk => {
             "free some space there, or put temporary files elsewhere with --temp-dir".to_owned()
         }

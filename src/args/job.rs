@@ -66,6 +66,9 @@ pub(crate) struct JobRunArgs {
     /// each share, as in an array of Slurm
     #[arg(long, value_name = "I/N")]
     pub(crate) share: Option<Share>,
+    /// After so many seconds without news of any unit, a share does those of others, which may have died or never begun
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, requires = "share")]
+    pub(crate) patience: u64,
     #[command(flatten)]
     pub(crate) resources: JobResources,
     #[command(flatten)]

@@ -4,9 +4,11 @@
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use pointmill_converter::{JobUnits, Plan, Report, Target, UnitName, finish_job, job_units, plan_job, run_units};
+use pointmill_converter::{
+    ConvertError, JobFault, JobUnits, Plan, Report, Target, UnitName, finish_job, job_units, plan_job, run_units,
+};
 use serde::{Deserialize, Serialize};
 
 use super::convert::{after_all, protect_inputs, tell};
@@ -66,6 +68,10 @@ fn plan(args: &JobPlanArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(format!(
             "{folder}: the job would be inside of the output {output}; choose another folder"
         )));
+    }
+    let report = job.convert.report.as_ref().map(|file| std::path::absolute(file).unwrap_or_else(|_| file.clone()));
+    if report.is_some_and(|report| report.starts_with(&job.folder)) {
+        return Err(Failure::Usage("--report: the folder of the job goes once it is finished; choose another".into()));
     }
     let progress = Progress::new(&job.convert.talk, Some(stop_flag()));
     let units = plan_job(&job.plan, &job.targets, &job.folder, &progress);
@@ -244,8 +250,8 @@ fn run_some(args: &JobRunArgs) -> Result<(), Failure> {
     let job = Job::open(&args.job, &args.resources)?;
     let progress = Progress::new(&args.talk, Some(stop_flag()));
     let done = match args.share {
-        Some(share) => run_share(&job, share, &progress),
-        None => run_units(&job.plan, &job.targets, &job.folder, &args.units, false, &progress).map_err(Into::into),
+        Some(share) => run_share(&job, share, Duration::from_secs(args.patience), &progress),
+        None => run_units(&job.plan, &job.targets, &job.folder, &args.units, None, &progress).map_err(Into::into),
     };
     no_more_checks();
     if progress.end()
@@ -256,23 +262,41 @@ fn run_some(args: &JobRunArgs) -> Result<(), Failure> {
     done.map(drop)
 }
 
-/// Does a share of all units, stage by stage.
-fn run_share(job: &Job, share: Share, progress: &Progress) -> Result<JobUnits, Failure> {
+/// Does a share of all units, stage by stage; and what others should do, but do not.
+fn run_share(job: &Job, share: Share, patience: Duration, progress: &Progress) -> Result<JobUnits, Failure> {
+    let run = |units: &[UnitName], waits| run_units(&job.plan, &job.targets, &job.folder, units, waits, progress);
+    let mut news = (Vec::new(), Instant::now());
     loop {
         let known = job_units(&job.plan, &job.targets, &job.folder, progress)?;
         if known.complete {
             return Ok(known);
         }
+        let state: Vec<(UnitName, bool)> = known.units.iter().map(|unit| (unit.name, unit.done)).collect();
+        if state != news.0 {
+            news = (state, Instant::now());
+        }
         let is_mine = |i: usize| i as u64 % share.of == share.index;
         let open = known.units.iter().enumerate().filter(|(i, unit)| !unit.done && is_mine(*i));
         let mine: Vec<UnitName> = open.map(|(_, unit)| unit.name).collect();
-        if mine.is_empty() {
-            if stop_flag().load(std::sync::atomic::Ordering::Relaxed) {
-                return Err(Failure::Interrupted("interrupted".to_owned()));
+        let is_stuck = news.1.elapsed() >= patience;
+        let ready = known.ready().map(|unit| unit.name).collect::<Vec<_>>();
+        // shares that lose patience together begin with different units
+        let of_others = ready.get((share.index as usize).checked_rem(ready.len()).unwrap_or(0)).filter(|_| is_stuck);
+        let done = match (of_others, mine.is_empty()) {
+            (Some(unit), _) => run(&[*unit], None),
+            (None, false) => run(&mine, Some(patience)),
+            (None, true) => {
+                if stop_flag().load(std::sync::atomic::Ordering::Relaxed) {
+                    return Err(Failure::Interrupted("interrupted".to_owned()));
+                }
+                std::thread::sleep(PAUSE);
+                continue;
             }
-            std::thread::sleep(PAUSE);
-        } else {
-            run_units(&job.plan, &job.targets, &job.folder, &mine, true, progress)?;
+        };
+        match done {
+            // it needs what others have not done
+            Ok(_) | Err(ConvertError::Job(JobFault::NoUnit { .. })) => {}
+            Err(other) => return Err(other.into()),
         }
     }
 }

@@ -58,6 +58,45 @@ fn processes_with_a_share_each_make_the_bytes_of_one_even_if_one_is_killed() {
 }
 
 #[test]
+fn a_share_whose_others_never_begin_does_their_units_too() {
+    let dir = stage();
+    plan(&dir);
+    // one of three, alone
+    dir.succeed(["job", "run", "the.job", "-q", "--share", "2/3", "--patience", "1"]);
+    let foreign = "the.job/units/notes.txt";
+    dir.write(foreign, b"mine");
+    dir.succeed(["job", "finish", "the.job", "-q"]);
+    assert_same_dataset(&dataset(&dir.path("out")), &dataset(&dir.path("plain")), "a job");
+    assert_eq!(std::fs::read(dir.path(foreign)).unwrap(), b"mine", "files of others stay");
+    let units = std::fs::read_dir(dir.path("the.job/units")).unwrap().count();
+    assert_eq!((units, dir.names()), (1, ["out", "plain", "scans", "the.job"].map(String::from).to_vec()));
+}
+
+#[test]
+fn who_looks_at_a_job_writes_nothing_into_it() {
+    let dir = stage();
+    plan(&dir);
+    let changed = || std::fs::metadata(dir.path("the.job")).unwrap().modified().unwrap();
+    let before = changed();
+    dir.succeed(["job", "units", "the.job"]);
+    dir.succeed(["job", "status", "the.job"]);
+    assert_eq!(changed(), before);
+    // a unit that is not whole is not done, and stays as it is for whoever looks
+    dir.succeed(["job", "run", "the.job", "read-1-0"]);
+    let unit = dir.path("the.job/units/read-1-0");
+    let bytes = std::fs::read(&unit).unwrap();
+    std::fs::write(&unit, &bytes[..bytes.len() / 2]).unwrap();
+    dir.succeed(["job", "run", "the.job", "read-1-1", "read-1-2", "read-1-3"]);
+    assert!(dir.succeed(["job", "units", "the.job"]).stdout().contains("read-1-0"));
+    // records that are gone are named
+    dir.succeed(["job", "run", "the.job", "read-1-0"]);
+    let units = dir.path("the.job/units");
+    let names = std::fs::read_dir(units).unwrap().map(|e| e.unwrap().path());
+    names.filter(|p| p.extension().is_some_and(|e| e == "records")).for_each(|p| std::fs::write(p, "").unwrap());
+    dir.run(["job", "run", "the.job", "settle-1-0"]).failed_with(3, &["the.job", ".records", "plan the job anew"]);
+}
+
+#[test]
 fn units_are_listed_for_people_and_for_programs() {
     let dir = stage();
     plan(&dir);
@@ -92,6 +131,8 @@ fn mistakes_are_one_line_and_leave_the_job_alone() {
     dir.run(["job", "plan", "scans", "-o", "plain", "--job", "the.job"]).failed_with(2, &["plain", "--overwrite"]);
     dir.run(["job", "plan", "scans", "-o", "out", "--job", "the.job", "--resume"]).failed_with(2, &["--resume"]);
     dir.run(["job", "plan", "scans", "-o", "out"]).failed_with(2, &["--job"]);
+    let inside = ["job", "plan", "scans", "-o", "out", "--job", "the.job", "--report", "the.job/report.json"];
+    dir.run(inside).failed_with(2, &["--report", "folder of the job"]);
     assert_eq!(dir.names(), ["plain", "scans"]);
     plan(&dir);
     dir.run(["job", "plan", "scans", "-o", "out", "--job", "the.job"]).failed_with(2, &["the.job", "not empty"]);

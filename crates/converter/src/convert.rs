@@ -78,6 +78,12 @@ fn run(
             Ok(report)
         }
         Err(error) => {
+            let error = match (error, &job) {
+                (ConvertError::Internal(what), Some(job)) if !job.is_new() => {
+                    JobFault::Unfit { folder: job.folder().to_path_buf(), what }.into()
+                }
+                (error, _) => error,
+            };
             match job {
                 Some(job) if job.has_units() => events.checkpoint(job.folder()),
                 Some(job) => job.end().iter().for_each(|left| events.warning(left)),

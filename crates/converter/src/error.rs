@@ -258,6 +258,13 @@ pub enum JobFault {
         /// How that was found.
         what: String,
     },
+    /// What an unfinished run has left does not fit together.
+    Unfit {
+        /// Its folder.
+        folder: PathBuf,
+        /// How that was found.
+        what: String,
+    },
     /// Units are not done: those that are known, in order.
     Unfinished {
         /// All units of the stage that the job has reached.
@@ -294,19 +301,22 @@ impl fmt::Display for JobFault {
             Self::NoJob { folder } => {
                 write!(f, "{}: the folder for an unfinished run holds other files", folder.display())
             }
-            Self::Version { was } => write!(f, "the unfinished run is of version {was}, this is another one"),
+            Self::Version { was } => write!(f, "what is to go on was begun by version {was}, this is another one"),
             Self::Setting { name, was, now } => {
-                write!(f, "the unfinished run had another {name}: {was}, now {now}")
+                write!(f, "what is to go on was begun with another {name}: {was}, now {now}")
             }
-            Self::ChangedInput { path } => write!(f, "{}: changed since the unfinished run read it", path.display()),
+            Self::ChangedInput { path } => write!(f, "{}: changed since the work was begun", path.display()),
             Self::OtherInputs { path } => {
-                write!(f, "{}: not an input of both this and the unfinished run", path.display())
+                write!(f, "{}: not an input of both this command and what is to go on", path.display())
             }
             Self::NotEmpty { folder } => write!(f, "{}: the folder for a job is not empty", folder.display()),
             Self::NotThere { folder } => write!(f, "{}: not the folder of a planned job", folder.display()),
             Self::NoUnit { unit } => write!(f, "{unit}: the job has no such unit, or not yet"),
             Self::Mixed { folder, what } => {
                 write!(f, "{}: files of the job were changed or exchanged ({what})", folder.display())
+            }
+            Self::Unfit { folder, what } => {
+                write!(f, "{}: what the unfinished run has left does not fit together ({what})", folder.display())
             }
             Self::Unfinished { units } => {
                 let open = units.iter().filter(|unit| !unit.done);

@@ -5,6 +5,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::convert::{JobOf, Verify, make};
 use crate::error::{ConvertError, JobFault};
@@ -45,7 +46,8 @@ pub fn job_units(
     in_parts(&SharedJob::open(folder, Task::Look, &disk)?, plan, targets, &Unwarned(events), &disk)
 }
 
-/// Does some units of a job; those that are done already are not done again. `waits`: for units that others do and these need.
+/// Does some units of a job; those that are done already are not done again. `waits`: for units that others do and these need,
+/// so long without news of any.
 /// Returns the units that are known afterwards.
 ///
 /// # Errors
@@ -55,7 +57,7 @@ pub fn run_units(
     targets: &[Target],
     folder: &Path,
     units: &[UnitName],
-    waits: bool,
+    waits: Option<Duration>,
     events: &dyn Events,
 ) -> Result<JobUnits, ConvertError> {
     let disk = disk();
@@ -92,6 +94,9 @@ pub fn finish_job(
 fn mixed(error: ConvertError, folder: &Path) -> ConvertError {
     match error {
         ConvertError::Internal(what) => JobFault::Mixed { folder: folder.to_path_buf(), what }.into(),
+        ConvertError::Job(damaged @ JobFault::Damaged { .. }) => {
+            JobFault::Mixed { folder: folder.to_path_buf(), what: damaged.to_string() }.into()
+        }
         other => other,
     }
 }

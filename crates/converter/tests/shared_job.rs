@@ -49,7 +49,7 @@ impl Bench {
     }
 
     fn run(&self, units: &[UnitName]) -> Result<JobUnits, ConvertError> {
-        run_units(&self.plan, &self.targets, &self.job(), units, false, &Silent)
+        run_units(&self.plan, &self.targets, &self.job(), units, None, &Silent)
     }
 
     fn finish(&self) -> Result<Report, ConvertError> {
@@ -230,7 +230,7 @@ fn what_does_not_go_is_refused_and_the_job_stays() {
     let other = Plan { scale: pointmill_converter::ScaleChoice::Fixed(0.1), ..bench.plan.clone() };
     let name = first.units[0].name;
     assert!(matches!(
-        bench.fault(run_units(&other, &bench.targets, &job, &[name], false, &Silent)),
+        bench.fault(run_units(&other, &bench.targets, &job, &[name], None, &Silent)),
         JobFault::Setting { .. }
     ));
     bench.run(&[name]).unwrap();

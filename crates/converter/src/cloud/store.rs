@@ -1,6 +1,6 @@
 //! Where records wait between being read and being built into nodes: memory first, one spill file when it must.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -196,7 +196,11 @@ impl Store {
         let (file, within) = (offset >> OFFSET_BITS, offset & ((1 << OFFSET_BITS) - 1));
         match file.checked_sub(1) {
             None => self.spill_file()?.read_at(out, within, doing),
-            Some(index) => self.adopted_file(index as usize)?.read_at(out, within, doing),
+            Some(index) => {
+                let file = self.adopted_file(index as usize)?;
+                let read = file.read_at(out, within, doing);
+                read.map_err(|error| if is_missing(&error) { damaged(file.path(), within) } else { error })
+            }
         }
     }
 
@@ -206,7 +210,9 @@ impl Store {
             return Ok(Arc::clone(file));
         }
         let path = adopted.paths.get(index).ok_or_else(|| ConvertError::Internal("records of no file".into()))?;
-        let file = Arc::new(self.temp.read(path)?);
+        let opened = self.temp.read(path);
+        let file = opened.map_err(|error| if is_missing(&error) { damaged(path, 0) } else { error })?;
+        let file = Arc::new(file);
         if adopted.open.len() >= MOST_OPEN {
             adopted.open.remove(0);
         }
@@ -224,8 +230,7 @@ impl Store {
             return Ok(());
         };
         if !self.is_whole(&SafeBlock { source, offset, bytes, sum })? {
-            let file = self.spill_file()?.path().to_path_buf();
-            return Err(JobFault::Damaged { file, byte: offset }.into());
+            return Err(damaged(self.spill_file()?.path(), offset));
         }
         kept()?[index as usize].is_unseen = false;
         Ok(())
@@ -238,9 +243,7 @@ impl Store {
             let part = &mut part[..CHECK_BYTES.min((block.bytes - at) as usize)];
             match self.read_disk(part, block.offset + at, "reading the records") {
                 Ok(()) => sum = crc32c::crc32c_append(sum, part),
-                Err(ConvertError::Io { error, .. }) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
-                    return Ok(false);
-                }
+                Err(error) if is_missing(&error) => return Ok(false),
                 Err(other) => return Err(other),
             }
             at += part.len() as u64;
@@ -417,6 +420,16 @@ impl Store {
         }
         Ok(Arc::clone(spill.insert(Arc::new(self.temp.make()?))))
     }
+}
+
+/// True if a file, or the end of it, is not there.
+fn is_missing(error: &ConvertError) -> bool {
+    use std::io::ErrorKind;
+    matches!(error, ConvertError::Io { error, .. } if matches!(error.kind(), ErrorKind::UnexpectedEof | ErrorKind::NotFound))
+}
+
+fn damaged(file: &Path, byte: u64) -> ConvertError {
+    JobFault::Damaged { file: file.to_path_buf(), byte }.into()
 }
 
 impl Evict for Store {

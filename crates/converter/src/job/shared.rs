@@ -6,6 +6,7 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -35,8 +36,8 @@ pub(crate) enum Task {
     /// Does these.
     Run {
         units: HashSet<UnitName>,
-        /// Units that others do are waited for.
-        waits: bool,
+        /// Units that others do are waited for, so long without news.
+        waits: Option<Duration>,
     },
     /// Puts the results of all units together.
     Finish,
@@ -131,9 +132,17 @@ impl SharedJob {
         is_asked && !is_too_early && !self.is_done(unit)
     }
 
-    /// True if units that others do are waited for.
-    pub(crate) fn waits(&self) -> bool {
-        matches!(self.task, Task::Run { waits: true, .. })
+    /// How long units that others do are waited for, without news of them.
+    pub(crate) fn waits(&self) -> Option<Duration> {
+        match self.task {
+            Task::Run { waits, .. } => waits,
+            _ => None,
+        }
+    }
+
+    /// Units that are done, as far as was seen.
+    pub(crate) fn done(&self) -> usize {
+        self.lock_done().len()
     }
 
     /// True if the unit is done.
@@ -169,7 +178,9 @@ impl SharedJob {
         match self.read(&path, unit.label(mark)).and_then(|reader| take(&reader)) {
             Ok(value) => Ok(Some(value)),
             Err(ConvertError::Job(JobFault::Damaged { .. })) => {
-                fs::remove_file(&path).map_err(|e| ConvertError::io(&path, "removing a broken unit", e))?;
+                if !matches!(self.task, Task::Look) {
+                    fs::remove_file(&path).map_err(|e| ConvertError::io(&path, "removing a broken unit", e))?;
+                }
                 self.lock_done().remove(&unit);
                 Ok(None)
             }
@@ -316,7 +327,9 @@ impl SharedJob {
             let entry = entry.map_err(fail)?;
             let name = entry.file_name();
             let name = name.to_string_lossy();
-            if name == UNITS || name.starts_with(WORK) {
+            if name == UNITS {
+                remove_units(&entry.path()).map_err(fail)?;
+            } else if name.starts_with(WORK) {
                 fs::remove_dir_all(entry.path()).map_err(fail)?;
             } else if name.starts_with(IDENTITY) {
                 fs::remove_file(entry.path()).map_err(fail)?;
@@ -325,10 +338,11 @@ impl SharedJob {
         sync_folder(&*self.disk, &self.folder).map_err(fail)
     }
 
-    /// A folder to work in, which is removed when it is dropped.
+    /// A folder to work in, which is removed when it is dropped. Who only looks leaves the folder of the job as it is.
     pub(crate) fn work(&self) -> Result<tempfile::TempDir, ConvertError> {
-        let fail = |e| ConvertError::io(&self.folder, "making a folder to work in", e);
-        tempfile::Builder::new().prefix(WORK).tempdir_in(&self.folder).map_err(fail)
+        let folder = if matches!(self.task, Task::Look) { std::env::temp_dir() } else { self.folder.clone() };
+        let fail = |e| ConvertError::io(&folder, "making a folder to work in", e);
+        tempfile::Builder::new().prefix(WORK).tempdir_in(&folder).map_err(fail)
     }
 
     fn path(&self, unit: UnitName) -> PathBuf {
@@ -359,6 +373,21 @@ fn done_in(units: &Path) -> Result<HashSet<UnitName>, ConvertError> {
         done.extend(name.to_str().and_then(|name| name.parse::<UnitName>().ok()));
     }
     Ok(done)
+}
+
+/// Removes units, their records, and what of them was never complete; the folder, too, if nothing else is in it.
+fn remove_units(units: &Path) -> std::io::Result<()> {
+    let is_ours = |name: &str| name.split('.').next().is_some_and(|unit| unit.parse::<UnitName>().is_ok());
+    for entry in fs::read_dir(units)? {
+        let entry = entry?;
+        if entry.file_name().to_str().is_some_and(is_ours) {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    match fs::remove_dir(units) {
+        Err(e) if e.kind() == std::io::ErrorKind::DirectoryNotEmpty => Ok(()),
+        other => other,
+    }
 }
 
 fn settle(pass: u32) -> UnitName {

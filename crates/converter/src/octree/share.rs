@@ -2,7 +2,7 @@
 //! it comes to goes into one of its own.
 
 use std::collections::{BTreeSet, HashMap};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pointmill_format::NodeKey;
 
@@ -30,13 +30,18 @@ pub(super) fn share<S: Sinks>(
 ) -> Result<(), ConvertError> {
     let needs = needs(units);
     let mut open: Vec<usize> = (0..units.len()).filter(|i| job.wants(of.name(*i))).collect();
+    let mut news = (job.done(), Instant::now());
     loop {
         let is_ready = |i: &usize| needs[*i].iter().all(|need| job.is_done(of.name(*need)));
         let (ready, others): (Vec<usize>, Vec<usize>) = open.iter().partition(|i| is_ready(i));
-        if ready.is_empty() && job.waits() && !others.is_empty() {
+        let is_worth_it = |patience| news.1.elapsed() < patience;
+        if ready.is_empty() && !others.is_empty() && job.waits().is_some_and(is_worth_it) {
             shared.rt.check_stop()?;
             std::thread::sleep(PAUSE);
             job.look_again()?;
+            if job.done() != news.0 {
+                news = (job.done(), Instant::now());
+            }
             continue;
         }
         if ready.is_empty() {
@@ -48,7 +53,7 @@ pub(super) fn share<S: Sinks>(
             |builder, i| one(ready[i], units, &needs, of, shared, builder),
             |_| (),
         )?;
-        open = others;
+        (open, news) = (others, (job.done(), Instant::now()));
     }
     let points = |i: usize| units[i].points();
     let listed = (0..units.len()).zip(needs).map(|(i, needs)| of.listed(job, i, points(i), needs)).collect();
