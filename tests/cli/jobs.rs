@@ -93,7 +93,7 @@ fn who_looks_at_a_job_writes_nothing_into_it() {
     let units = dir.path("the.job/units");
     let names = std::fs::read_dir(units).unwrap().map(|e| e.unwrap().path());
     names.filter(|p| p.extension().is_some_and(|e| e == "records")).for_each(|p| std::fs::write(p, "").unwrap());
-    dir.run(["job", "run", "the.job", "settle-1-0"]).failed_with(3, &["the.job", ".records", "plan the job anew"]);
+    dir.run(["job", "run", "the.job", "settle-1-0"]).failed_with(2, &["the.job", ".records", "plan the job anew"]);
 }
 
 #[test]
