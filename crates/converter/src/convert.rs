@@ -85,6 +85,8 @@ fn run(
                 (error, _) => error,
             };
             match job {
+                // what another run would do the same with is not offered
+                Some(_) if matches!(error, ConvertError::Job(_) | ConvertError::Refused { .. }) => {}
                 Some(job) if job.has_units() => events.checkpoint(job.folder()),
                 Some(job) => job.end().iter().for_each(|left| events.warning(left)),
                 None => {}
@@ -267,7 +269,8 @@ fn build(
 ) -> Result<Vec<OutputReport>, ConvertError> {
     let Build { cloud, rt, units } = build;
     let start = Instant::now();
-    let kept_in = units.and_then(|units| units.kept_in());
+    let is_in_place = targets.iter().all(|target| target.output().stays_in_place());
+    let kept_in = units.and_then(|units| units.kept_in()).filter(|_| is_in_place);
     let datasets: Vec<_> =
         targets.iter().map(|target| staged.dataset(target.kind(), is_only_one, kept_in)).collect::<Result<_, _>>()?;
     let _building = rt.budget.building(&rt.memory, cloud.points())?;

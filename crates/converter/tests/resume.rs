@@ -292,7 +292,8 @@ fn what_was_built_stays_in_the_file_of_the_output_and_is_built_again_where_that_
         assert!(recalled(&|bytes| bytes.truncate(bytes.len() / 2)) < all, "{file}");
         assert_eq!(recalled(&Vec::clear), 0, "{file}");
         // whatever a run has left behind the end
-        assert_eq!(recalled(&|bytes| bytes.extend_from_slice(&[7; 100])), all, "{file}");
+        let behind = recalled(&|bytes| bytes.resize(bytes.len() + (1 << 20), 0xaa));
+        assert_eq!(behind, all, "{file}");
     }
 }
 
@@ -314,6 +315,46 @@ fn a_file_that_is_part_of_a_complete_output_is_not_written_to() {
         let report = convert(&bench.resumed(), &targets, &Silent).unwrap();
         assert_eq!((report.recalled_points, report.recalled_units), (20_000, 0), "{file}");
         assert!(published.iter().all(|(path, before)| fs::read(path).unwrap() == *before), "{file}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_gone_on_with_is_made_anew_and_modes_are_those_of_a_new_file() {
+    use std::os::unix::fs::PermissionsExt as _;
+    for (target, file) in in_place() {
+        let targets = [target];
+        let bench = Bench::new();
+        let plain =
+            Plan { checkpoint: Checkpoint::Never, output: bench.dir.path().join("plain"), ..bench.plan.clone() };
+        convert(&plain, &targets, &Silent).unwrap();
+        let mode = |folder: &Path, name: &str| fs::metadata(folder.join(name)).unwrap().permissions().mode();
+        for fault in ["mode", "folder", "link", "nothing"] {
+            bench.with_job_of(&targets, file, |_| true);
+            let victim = bench.dir.path().join("victim");
+            fs::write(&victim, "a letter").unwrap();
+            for name in names(&bench.job()).into_iter().filter(|name| name.starts_with(file)) {
+                let kept = bench.job().join(name);
+                if fault == "mode" {
+                    fs::set_permissions(&kept, fs::Permissions::from_mode(0o600)).unwrap();
+                    continue;
+                }
+                fs::remove_file(&kept).unwrap();
+                match fault {
+                    "folder" => fs::create_dir(&kept).unwrap(),
+                    "link" => std::os::unix::fs::symlink(&victim, &kept).unwrap(),
+                    _ => {}
+                }
+            }
+            convert(&bench.resumed(), &targets, &Silent).unwrap();
+            assert!(dataset(&bench.plan.output) == dataset(&plain.output), "{file}, {fault}");
+            assert_eq!(fs::read(&victim).unwrap(), b"a letter");
+            for name in names(&plain.output) {
+                assert_eq!(mode(&bench.plan.output, &name), mode(&plain.output, &name), "{name}, {fault}");
+            }
+            fs::remove_dir_all(&bench.plan.output).unwrap();
+            let _ = fs::remove_dir_all(bench.job());
+        }
     }
 }
 

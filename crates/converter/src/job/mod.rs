@@ -21,6 +21,8 @@ pub(crate) use identity::Identity;
 pub(crate) use in_place::{InPlace, KeptFile, Place};
 use journal::{Entry, Journal};
 pub(crate) use keeper::{Build, GroupUnits, Keeper, settled};
+use pointmill_format::DatasetKind;
+use pointmill_format::bintree::PACKED_FILE;
 use serde::{Deserialize, Serialize};
 pub(crate) use shared::{SharedJob, Task};
 pub(crate) use tasks::{UnitLog, make_units, put_back};
@@ -41,6 +43,8 @@ const RECORDS: &str = "records-";
 const BUILT: &str = "build-";
 /// How the names begin of files that are part of the output, too.
 pub(crate) const KEPT_OUTPUT: &str = "output-";
+/// A file that is made to see whether that is possible.
+pub(crate) const PROBE: &str = "probe";
 
 /// What a run leaves for another one.
 #[derive(Debug)]
@@ -278,7 +282,8 @@ impl Job {
         let failed = |e| ConvertError::io(&self.folder, "removing a name of the output", e);
         for entry in fs::read_dir(&self.folder).map_err(failed)? {
             let entry = entry.map_err(failed)?;
-            if entry.file_name().to_string_lossy().starts_with(KEPT_OUTPUT) {
+            let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+            if is_file && is_output(&entry.file_name().to_string_lossy()) {
                 fs::remove_file(entry.path()).map_err(failed)?;
             }
         }
@@ -321,8 +326,9 @@ fn lock(folder: &Path, take: impl FnOnce(&Path) -> std::io::Result<Locked>) -> R
 
 /// Removes a job whose run is over, and nothing that is none.
 fn remove(folder: &Path) -> Result<(), ConvertError> {
-    let names = || fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
-    if !names().all(|name| is_ours(&name.to_string_lossy())) {
+    let names: Vec<_> = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
+    let is_job = names.is_empty() || names.iter().any(|name| name == LOCK || name == JOURNAL);
+    if !is_job || !names.iter().all(|name| is_ours(&name.to_string_lossy())) {
         return Err(JobFault::NoJob { folder: folder.to_path_buf() }.into());
     }
     let held = match folder.join(LOCK).is_file() {
@@ -335,7 +341,31 @@ fn remove(folder: &Path) -> Result<(), ConvertError> {
 }
 
 fn is_ours(name: &str) -> bool {
-    name == LOCK || name == JOURNAL || [RECORDS, BUILT, KEPT_OUTPUT].iter().any(|begin| name.starts_with(begin))
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let is_records = name.strip_prefix(RECORDS).is_some_and(is_number);
+    // of one that was not complete something follows
+    let unit = name.split('.').next().filter(|unit| unit.starts_with(BUILT));
+    let is_built = unit.is_some_and(|unit| unit.parse::<UnitName>().is_ok());
+    name == LOCK || name == JOURNAL || is_records || is_built || is_output(name)
+}
+
+/// True if a job gives files of outputs such a name.
+fn is_output(name: &str) -> bool {
+    let of_kind = |kind: &DatasetKind| name.strip_prefix(KEPT_OUTPUT)?.strip_prefix(kind.name())?.strip_prefix('-');
+    DatasetKind::ALL.iter().any(|kind| of_kind(kind).is_some_and(|file| is_kept_file(*kind, file)))
+}
+
+/// True if a job keeps a file of that name of datasets of that kind.
+fn is_kept_file(kind: DatasetKind, file: &str) -> bool {
+    let is_leaf = |name: &str| name.bytes().all(|b| matches!(b, b'0' | b'1'));
+    match kind {
+        DatasetKind::Potree2 => file == "octree.bin",
+        DatasetKind::Bintree => {
+            let leaf = file.strip_prefix('n').and_then(|rest| rest.strip_suffix(".bin"));
+            file == PACKED_FILE || file == PROBE || leaf.is_some_and(is_leaf)
+        }
+        _ => file == kind.marker_file(),
+    }
 }
 
 /// Removes our files, and the folder if nothing else is in it. The journal goes first: without it no run
@@ -350,4 +380,50 @@ fn remove_files(folder: &Path) -> Result<(), ConvertError> {
         fs::remove_dir(folder)
     };
     remove().map_err(|e| ConvertError::io(folder, "removing the job folder", e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_a_job_are_known_by_their_whole_names() {
+        for name in [
+            "lock",
+            "journal",
+            "records-1",
+            "build-0-12",
+            "build-0-12.7e23-18ebf1a1141aaac6-0",
+            "output-potree2-octree.bin",
+            "output-copc-points.copc.laz",
+            "output-batches-points.qbatch",
+            "output-bintree-leaves.bin",
+            "output-bintree-n.bin",
+            "output-bintree-n0110.bin",
+        ] {
+            assert!(is_ours(name), "{name}");
+        }
+        for name in [
+            "output-results.csv",
+            "output-",
+            "output-potree2-notes.txt",
+            "output-bintree-notes.bin",
+            "output-bintree-n02.bin",
+            "output-potree2-octree.bin.bak",
+            "records-of-may.txt",
+            "records-",
+            "build-log",
+            "build-0-x",
+            "read-1-0",
+            "lock.txt",
+        ] {
+            assert!(!is_ours(name), "{name}");
+        }
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("records-1"), "of mine").unwrap();
+        assert!(matches!(remove(dir.path()), Err(ConvertError::Job(JobFault::NoJob { .. }))), "no journal, no lock");
+        fs::write(dir.path().join("journal"), "").unwrap();
+        remove(dir.path()).unwrap();
+        assert!(!dir.path().exists());
+    }
 }

@@ -53,6 +53,11 @@ pub(crate) trait Output: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// True if what is built stays where it is written, in few files, so that a job can keep these.
+    fn stays_in_place(&self) -> bool {
+        true
+    }
+
     /// True if points of the lattice come back as they are, but for the rounding of doubles.
     fn keeps_lattice(&self) -> bool {
         false

@@ -109,6 +109,11 @@ impl DiskFile {
         bytes::read_exact_at(&self.file, buf, offset).map_err(|e| self.failed(doing, e))
     }
 
+    /// What the file system says of it.
+    pub(crate) fn metadata(&self) -> io::Result<fs::Metadata> {
+        self.file.metadata()
+    }
+
     /// What errors call it.
     pub(crate) fn path(&self) -> &Path {
         &self.path

@@ -50,16 +50,17 @@ fn is_unable(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::Unsupported
 }
 
-/// True if the file has this name and no other; false where the system does not tell.
-pub(crate) fn is_only_name(path: &Path) -> bool {
+/// True if it is a file of this name and no other, of the same owner as `ours`; false where the system does not tell.
+pub(crate) fn is_only_name(path: &Path, ours: &fs::Metadata) -> bool {
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt as _;
-        fs::symlink_metadata(path).is_ok_and(|meta| meta.is_file() && meta.nlink() == 1)
+        let is_ours = |meta: fs::Metadata| meta.is_file() && meta.nlink() == 1 && meta.uid() == ours.uid();
+        fs::symlink_metadata(path).is_ok_and(is_ours)
     }
     #[cfg(not(unix))]
     {
-        let _ = path;
+        let _ = (path, ours);
         false
     }
 }

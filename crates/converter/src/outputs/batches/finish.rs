@@ -97,8 +97,8 @@ pub(super) fn finish(
     let planes = planes::needed(cloud, settings.planes, &records, frame.lattice.scale, &errors);
     if let Some(needed) = planes.needed.filter(|needed| *needed < layout.precision()) {
         layout = layout.with_precision(needed);
-        output.cut(layout.end_of_points())?;
     }
+    output.cut(layout.end_of_points())?; // what a run before has left there, and planes that are not needed
     clear_gaps(output, &layout)?;
     output.write(&record_bytes(&records), layout.records.offset)?;
     let changes = |when: usize| patches.values().filter(|patch| patch.changes()[when]).count() as u64;

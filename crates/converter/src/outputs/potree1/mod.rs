@@ -72,6 +72,10 @@ impl Output for Potree1Settings {
         wants
     }
 
+    fn stays_in_place(&self) -> bool {
+        false // a file for each node
+    }
+
     fn least_points(&self) -> u64 {
         u64::from(self.capacity())
     }

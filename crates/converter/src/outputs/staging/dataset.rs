@@ -2,13 +2,13 @@
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Serialize;
 
 use crate::error::ConvertError;
-use crate::job::KeptFile;
+use crate::job::{KeptFile, PROBE};
 use crate::runtime::disk::{create_folder, link, sync_file_system, sync_folder, sync_path};
 use crate::runtime::os_files::{is_only_name, is_same_file};
 use crate::runtime::{Disk, DiskFile, Runtime, Sequential};
@@ -69,20 +69,43 @@ impl StagedDataset {
     pub(crate) fn create_kept(&self, name: &str) -> Result<OutputFile, ConvertError> {
         let Some(kept) = self.second_name(name) else { return self.create(name).map(OutputFile::new) };
         let path = self.folder.join(name);
-        let is_there = || File::open(&path).is_ok_and(|file| is_same_file(&file, &kept));
-        if is_there() || is_only_name(&kept) && link(&*self.disk, &kept, &path).is_ok() {
+        if File::open(&path).is_ok_and(|file| is_same_file(&file, &kept)) {
             return Ok(OutputFile { file: self.open(name)?, is_kept: true });
         }
-        let _ = fs::remove_file(&kept); // what stays is not written to
         let file = self.create(name)?;
+        if file.metadata().is_ok_and(|new| is_only_name(&kept, &new)) {
+            if let Ok(file) = self.take_over(&kept, name, &file) {
+                return Ok(OutputFile { file, is_kept: true });
+            }
+            drop(file);
+            let _ = fs::remove_file(&path); // it may be that of the job
+            let _ = fs::remove_file(&kept); // what stays is not written to
+            let file = self.create(name)?;
+            let is_kept = link(&*self.disk, &path, &kept).is_ok();
+            return Ok(OutputFile { file, is_kept });
+        }
+        let _ = fs::remove_file(&kept);
         let is_kept = link(&*self.disk, &path, &kept).is_ok();
         Ok(OutputFile { file, is_kept })
+    }
+
+    /// Gives the file of a job the name of one that was just made, and the mode of that: it is part of an output like any other.
+    fn take_over(&self, kept: &Path, name: &str, new: &DiskFile) -> Result<DiskFile, ConvertError> {
+        let path = self.folder.join(name);
+        let renamed = || {
+            let mode = new.metadata()?.permissions();
+            fs::remove_file(&path)?;
+            link(&*self.disk, kept, &path)?;
+            fs::set_permissions(&path, mode)
+        };
+        renamed().map_err(|e| ConvertError::io(self.shown.join(name), "going on with the file", e))?;
+        self.open(name)
     }
 
     /// True if [`Self::create_kept`] makes files that a job has, too: not if it is on another file system, or on one without
     /// second names.
     pub(crate) fn can_keep(&self) -> bool {
-        let (name, path) = ("probe", self.folder.join("probe"));
+        let (name, path) = (PROBE, self.folder.join(PROBE));
         let Some(second) = self.second_name(name) else { return false };
         let is_kept = self.create_kept(name).is_ok_and(|probe| probe.is_kept);
         is_kept & fs::remove_file(path).is_ok() & fs::remove_file(second).is_ok()
