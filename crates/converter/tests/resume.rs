@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill_converter::{
-    BatchesSettings, BintreeSettings, Checkpoint, ConvertError, CopcSettings, Disk, DiskOperation, JobFault, Plan,
-    Potree2Settings, Silent, Target, convert, convert_on,
+    BatchesSettings, BintreeSettings, Checkpoint, ConvertError, CopcSettings, Disk, DiskOperation, Events, JobFault,
+    Phase, Plan, Potree2Settings, Silent, Target, convert, convert_on,
 };
 use pointmill_format::bintree::Layout;
 use pointmill_testkit::files::dataset;
@@ -197,6 +197,24 @@ fn records_that_changed_are_found_where_they_are_needed() {
     built.iter().for_each(|(bytes, path)| fs::write(path, bytes).unwrap());
     let report = convert(&bench.resumed(), &targets(), &Silent).unwrap();
     assert_eq!(report.recalled_units, u64::from(cfg!(unix)));
+}
+
+/// Removes the job when all is built.
+struct Removing(PathBuf);
+
+impl Events for Removing {
+    fn phase(&self, phase: Phase, _: u64) {
+        if phase == Phase::Finish {
+            fs::remove_dir_all(&self.0).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_run_whose_job_somebody_removes_ends_well() {
+    let bench = Bench::new();
+    convert(&bench.plan, &targets(), &Removing(bench.job())).unwrap();
+    assert_eq!(names(bench.dir.path()), ["1.las", "2.las", "3.las", "4.las", "5.las", "out"]);
 }
 
 #[test]

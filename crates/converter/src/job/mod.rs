@@ -280,7 +280,11 @@ impl Job {
     /// on.
     pub(crate) fn part_with_output(&self) -> Result<(), ConvertError> {
         let failed = |e| ConvertError::io(&self.folder, "removing a name of the output", e);
-        for entry in fs::read_dir(&self.folder).map_err(failed)? {
+        let entries = match fs::read_dir(&self.folder) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()), // somebody has removed all of it
+            entries => entries.map_err(failed)?,
+        };
+        for entry in entries {
             let entry = entry.map_err(failed)?;
             let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
             if is_file && is_output(&entry.file_name().to_string_lossy()) {
