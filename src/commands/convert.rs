@@ -45,6 +45,7 @@ pub(super) fn planned(args: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure
     }
     let mut plan = plan(args, inputs)?;
     plan.overwrite |= args.append;
+    plan.append = args.append;
     if args.append {
         if args.name.is_none() {
             plan.name = name_from(&[], std::slice::from_ref(&args.output));

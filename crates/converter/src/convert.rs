@@ -11,7 +11,8 @@ use crate::job::{Build, GroupUnits, Identity, Job, Keeper, SharedJob};
 use crate::memory::peak_resident_bytes;
 use crate::outputs::{self, StagedDataset, StagedFolder, Target};
 use crate::plan::Plan;
-use crate::report::{self, Account, OtherFilesReport, OutputReport, Report};
+use crate::reason::BuiltAnew;
+use crate::report::{self, Account, OtherFilesReport, OutputReport, Report, TakenOver};
 use crate::runtime::{Budget, Clock, Disk, Events, Least, Phase, Runtime, SystemDisk, TempFiles};
 use crate::sources::{Sources, resolve_crs_of_all};
 use crate::warning::Warning;
@@ -280,6 +281,10 @@ fn build(
         report.warnings.iter().for_each(|w| rt.events().warning(w));
         report.format = targets[i].kind().name().into();
         report.folder = dataset.name().into();
+        if cloud.plan.append {
+            let taken = report.taken_over.get_or_insert_with(|| TakenOver::nothing(BuiltAnew::Format));
+            taken.why_not = taken.why_not.or((taken.nodes == 0).then_some(BuiltAnew::AllTouched));
+        }
         let others = targets.iter().filter(|target| target.kind() != targets[i].kind());
         report.built_with = others.map(|target| target.kind().name().to_owned()).collect();
         let (kind, saved) = (targets[i].kind(), report.saved.unwrap_or_else(|| targets[i].output().saved_bytes()));

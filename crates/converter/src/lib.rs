@@ -68,11 +68,12 @@ pub use plan::{
     AttributeChoice, Checkpoint, Duplicates, ExportFormat, Filter, LengthUnit, OnFault, OriginPoints, Outliers, Plan,
     PlanError, PlanFault, PositionPrecision, RgbDepth, ScaleChoice, Setting,
 };
-pub use reason::{AxisReason, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
+pub use reason::{AxisReason, BuiltAnew, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
     Accuracy, AttributeReport, ChangedAttribute, ChangedValues, ChoiceReason, DropReason, DroppedAttribute, Estimate,
     GridReport, How, InputReport, Integers, Merged, Metres, MissingValues, OtherFilesReport, OutputReport, PhaseReport,
-    PlannedChoice, PointsReport, PositionErrors, PrecisionReport, Report, SavedBytes, SharedPlaceReport, TreeReport,
+    PlannedChoice, PointsReport, PositionErrors, PrecisionReport, Report, SavedBytes, SharedPlaceReport, TakenOver,
+    TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
 pub use shared_job::{finish_job, job_units, plan_job, run_units};

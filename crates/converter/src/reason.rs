@@ -1,4 +1,4 @@
-//! Why a lattice is the one that it is, as data.
+//! Why a lattice is the one that it is, and why a dataset that scans were added to was built anew, as data.
 
 use std::fmt;
 
@@ -175,6 +175,56 @@ impl fmt::Display for GridReason {
 }
 
 impl Serialize for GridReason {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+/// Why nothing of a dataset that scans were added to could be taken over. `Display` is for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BuiltAnew {
+    /// One new point may change all of such a dataset, or nobody has looked into it.
+    Format,
+    /// The dataset has no report, or that of another version or of other settings.
+    OtherMaking,
+    /// The root cube is another one.
+    Cube,
+    /// The coordinate step is another one.
+    Step,
+    /// The attributes differ, or are not stored as they are read.
+    Attributes,
+    /// The spacing of the root is another one.
+    Spacing,
+    /// Subtrees have another size, or too small leaves.
+    Units,
+    /// Looking into it would take more memory than there is.
+    Memory,
+    /// The dataset cannot be opened a second time.
+    Unreadable,
+    /// The new points touch every part.
+    AllTouched,
+}
+
+impl fmt::Display for BuiltAnew {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Format => "in this format one new point may change all of it",
+            Self::OtherMaking => "it was made by another version or with other settings",
+            Self::Cube => "with the new points the root cube is another one",
+            Self::Step => "with the new points the coordinate step is another one",
+            Self::Attributes => {
+                "with the new points its attributes are others, or they are not stored as they are read"
+            }
+            Self::Spacing => "with the new points the spacing of the root is another one",
+            Self::Units => "its subtrees have another size, or its leaves are too small",
+            Self::Memory => "looking into it takes more memory than there is",
+            Self::Unreadable => "it cannot be opened a second time",
+            Self::AllTouched => "the new points touch every part of it",
+        })
+    }
+}
+
+impl Serialize for BuiltAnew {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }

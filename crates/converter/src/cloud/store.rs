@@ -308,18 +308,29 @@ impl Store {
         Ok(source)
     }
 
+    /// [`Self::take`] of records that an output has from elsewhere: nobody looks at them.
+    pub(crate) fn pass_over(&self, segment: Segment) -> Result<(), ConvertError> {
+        let emptied = self.count_uses(segment, 1)?;
+        emptied.inspect(|bytes| self.give(bytes.capacity() as u64));
+        Ok(())
+    }
+
     /// Also returns the bytes of a block all of which was taken; they still count.
     fn take_uses(&self, segment: Segment, uses: u32, out: &mut Vec<u8>) -> Result<(u32, Emptied), ConvertError> {
         let source = self.read(segment, out)?;
+        Ok((source, self.count_uses(segment, uses)?))
+    }
+
+    fn count_uses(&self, segment: Segment, uses: u32) -> Result<Emptied, ConvertError> {
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let block = &mut blocks[segment.block as usize];
         block.remaining = block.remaining.saturating_sub(u64::from(segment.count) * u64::from(uses));
         if block.remaining == 0
             && let Place::Memory(bytes) = std::mem::replace(&mut block.place, Place::Gone)
         {
-            return Ok((source, Some(bytes)));
+            return Ok(Some(bytes));
         }
-        Ok((source, None))
+        Ok(None)
     }
 
     /// [`Self::take`] of records that are put back in another order: by [`Self::fill`] if `uses` are those of all outputs, by

@@ -53,7 +53,7 @@ impl Borders {
     }
 
     /// Hands the points of a node to `add`.
-    fn get(&self, key: NodeKey, mut add: impl FnMut(TreePoint)) -> Result<(), ConvertError> {
+    pub(super) fn get(&self, key: NodeKey, mut add: impl FnMut(TreePoint)) -> Result<(), ConvertError> {
         let nodes = self.nodes.read().unwrap_or_else(PoisonError::into_inner);
         match nodes.get(&key) {
             None => Ok(()),
@@ -189,31 +189,31 @@ fn cube_of(node: NodeKey) -> ([i64; 3], i64) {
 }
 
 /// A node and what is closer to it than a distance, along each axis.
-struct Surroundings {
+pub(super) struct Surroundings {
     low: [i64; 3],
     width: u64,
 }
 
 impl Surroundings {
-    fn of(node: NodeKey, reach: u32) -> Self {
+    pub(super) fn of(node: NodeKey, reach: u32) -> Self {
         let (corner, side) = cube_of(node);
         Self { low: corner.map(|c| c - i64::from(reach)), width: side as u64 + 2 * u64::from(reach) }
     }
 
     #[inline]
-    fn hold(&self, t: TreePoint) -> bool {
+    pub(super) fn hold(&self, t: TreePoint) -> bool {
         (0..3).all(|a| ((i64::from(t[a]) - self.low[a]) as u64) < self.width)
     }
 }
 
 /// What is farther from the border of a node than a distance, inside; of the faces of the root nobody is on the other side.
-struct Inside {
+pub(super) struct Inside {
     low: [i64; 3],
     high: [i64; 3],
 }
 
 impl Inside {
-    fn of(node: NodeKey, reach: u32) -> Self {
+    pub(super) fn of(node: NodeKey, reach: u32) -> Self {
         let (corner, side) = cube_of(node);
         let (reach, end) = (i64::from(reach), 1i64 << TREE_BITS);
         let low = corner.map(|c| if c == 0 { 0 } else { c + reach });
@@ -221,7 +221,7 @@ impl Inside {
     }
 
     #[inline]
-    fn holds(&self, t: TreePoint) -> bool {
+    pub(super) fn holds(&self, t: TreePoint) -> bool {
         (0..3).all(|a| (self.low[a]..self.high[a]).contains(&i64::from(t[a])))
     }
 }

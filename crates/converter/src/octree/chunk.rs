@@ -12,7 +12,7 @@ use super::order::{OrderScratch, Point, order};
 use super::raise::{Nodes, Pairs, Pending, Points, stays};
 use super::sample::Sampler;
 use super::sinks::Encoders;
-use crate::cloud::{Cloud, Ledger, morton};
+use crate::cloud::{Cloud, Ledger, RecordFrame, morton};
 use crate::error::ConvertError;
 use crate::plan::Duplicates;
 use crate::runtime::os_hints;
@@ -56,6 +56,23 @@ impl ChunkMemory {
             self.drop_duplicates(plan, ledger);
         }
         Ok(())
+    }
+
+    /// A buffer for the records of a chunk.
+    pub(super) fn buffer(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.records)
+    }
+
+    /// Takes it back.
+    pub(super) fn give_back(&mut self, buffer: Vec<u8>) {
+        self.records = buffer;
+    }
+
+    /// Records below a node of `level` in the order of [`order`].
+    pub(super) fn in_order(&mut self, records: &[u8], frame: &RecordFrame, level: u8) -> Vec<u8> {
+        order(records, frame, level, &mut self.scratch, &mut self.points);
+        let of = |point: &Point| &records[point.record as usize * frame.stride..][..frame.stride];
+        self.points.iter().flat_map(of).copied().collect()
     }
 
     /// Builds the nodes of the chunk that was loaded; returns its root, and the number of leaves above the capacity.

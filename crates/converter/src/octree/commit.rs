@@ -15,6 +15,7 @@ use super::unit::BuiltUnit;
 use crate::cloud::{Checksum, Ledger};
 use crate::error::{ConvertError, Unsupported};
 use crate::job::{Place, UnitWriter};
+use crate::report::TakenOver;
 use crate::runtime::{Consumer, Reservation, Runtime};
 
 /// A finished tree, as one format has it.
@@ -25,6 +26,10 @@ pub(crate) struct Octree {
     pub(crate) ledger: Ledger,
     /// Leaves above the capacity, because their points share one place.
     pub(crate) overfull_leaves: u64,
+    /// [`super::OctreeSettings::unit_points`].
+    pub(crate) unit_points: u64,
+    /// What was taken from an earlier tree.
+    pub(crate) taken_over: TakenOver,
 }
 
 /// Where workers hand in their units. A worker may be a few units ahead of the oldest unfinished one, no more: that bounds
@@ -49,6 +54,7 @@ struct State {
     /// But for what was written, which each stream has of its own.
     ledger: Ledger,
     overfull_leaves: u64,
+    taken_over: TakenOver,
     /// Units above this one are not built any more.
     last: usize,
 }
@@ -89,6 +95,7 @@ impl<'a, S: Sinks> Committer<'a, S> {
             known: Reservation::new(&rt.memory, Consumer::Nodes),
             ledger: Ledger::default(),
             overfull_leaves: 0,
+            taken_over: TakenOver::default(),
             last: usize::MAX,
         };
         Self { sinks, lists, window, units, state: Mutex::new(state), changed: Condvar::new() }
@@ -196,16 +203,16 @@ impl<'a, S: Sinks> Committer<'a, S> {
     }
 
     /// The tree as each format has it, once all units were handed in.
-    pub(super) fn finish(self) -> Result<Vec<Octree>, ConvertError> {
+    pub(super) fn finish(self, unit_points: u64) -> Result<Vec<Octree>, ConvertError> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if state.next != self.units || !state.roots.is_empty() {
             return Err(ConvertError::Internal("the tree was not finished".into()));
         }
-        let State { placed, ledger, overfull_leaves, .. } = state;
+        let State { placed, ledger, overfull_leaves, taken_over, .. } = state;
         let tree = |PlacedStream { nodes, bytes, written, .. }| {
             let mut ledger = ledger.clone();
             ledger.written = written;
-            Octree { nodes, bytes, ledger, overfull_leaves }
+            Octree { nodes, bytes, ledger, overfull_leaves, unit_points, taken_over }
         };
         Ok(placed.into_iter().map(tree).collect())
     }
@@ -222,13 +229,17 @@ impl State {
         encoders: &impl Encoders,
         ready: &mut Vec<Placed>,
     ) -> Result<(), ConvertError> {
-        let BuiltUnit { pieces, root, ledger, written, overfull_leaves, file, .. } = unit;
+        let BuiltUnit { pieces, root, ledger, written, overfull_leaves, file, is_taken_over, .. } = unit;
         self.ledger.merge(&ledger);
         self.placed.iter_mut().zip(&written).for_each(|(stream, sum)| stream.written.merge(sum));
         self.overfull_leaves += overfull_leaves;
         for piece in pieces {
             match piece {
                 Piece::Nodes(runs) => {
+                    for run in runs.iter().filter(|_| is_taken_over) {
+                        self.taken_over.nodes += run.nodes.len() as u64;
+                        self.taken_over.points += run.nodes.iter().map(|node| u64::from(node.points)).sum::<u64>();
+                    }
                     for (i, (stream, mut run)) in self.placed.iter_mut().zip(runs).enumerate() {
                         let offset = stream.bytes;
                         run.nodes.iter_mut().for_each(|n| n.byte_offset += offset);

@@ -166,7 +166,7 @@ pub(super) fn read(file: &UnitReader, lists: &Lists, kept: Option<&[KeptFile<'_>
     let root = unit.root.map(|root| read_pending(file, root, lists)).transpose()?;
     let Kept { ledger, written, overfull_leaves, notes, .. } = Kept { pieces: Vec::new(), root: None, ..unit };
     let outer = read_outer(file)?;
-    Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes, outer, file: None })
+    Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes, outer, file: None, is_taken_over: false })
 }
 
 /// Where the bytes of a unit are in the output, of each piece in each stream.

@@ -1,6 +1,7 @@
 //! All units of a tree in one process: each is built in its turn, or taken from what a job has kept of it, and handed in.
 
 use super::commit::Committer;
+use super::earlier::{Earlier, Taken};
 use super::finished::Piece;
 use super::keep;
 use super::sample::{Sampler, Sampling};
@@ -17,6 +18,8 @@ pub(super) struct Making<'a, S> {
     pub(super) kept: Option<GroupUnits<'a>>,
     /// The files of the output, if the job has them, too: those that are not in memory together are kept apart all the same.
     pub(super) in_place: Option<&'a [KeptFile<'a>]>,
+    /// The tree that nodes are taken from.
+    pub(super) earlier: Option<&'a Earlier<'a>>,
     pub(super) shared: &'a Shared<'a>,
     pub(super) committer: &'a Committer<'a, S>,
     pub(super) sinks: &'a S,
@@ -54,6 +57,9 @@ impl<S: Sinks> Making<'_, S> {
         };
         let Some(mut built) = built else { return Ok(()) };
         self.sinks.add_notes(&built.notes)?;
+        if let Some(earlier) = self.earlier {
+            earlier.note(index, &built.outer, built.is_taken_over);
+        }
         self.shared.borders.publish(std::mem::take(&mut built.outer))?;
         self.committer.submit(index, built, &mut builder.encoder)?;
         if self.kept.is_some() {
@@ -69,9 +75,16 @@ impl<S: Sinks> Making<'_, S> {
         unit: &Unit,
         index: usize,
         builder: &mut UnitBuilder<'_, E>,
-        buffers: Vec<Vec<u8>>,
+        mut buffers: Vec<Vec<u8>>,
     ) -> Result<Option<BuiltUnit>, ConvertError> {
         let wait = || self.committer.wait_for(index, unit.class_start);
+        if let (Some(earlier), Work::Subtree(chunks)) = (self.earlier, &unit.work) {
+            match builder.take_over(earlier, index, chunks, buffers, wait)? {
+                Taken::Over(unit) => return Ok(Some(unit)),
+                Taken::Stopped => return Ok(None),
+                Taken::Not(unused) => buffers = unused,
+            }
+        }
         match &unit.work {
             Work::Subtree(chunks) => builder.subtree(unit.key, chunks, buffers, wait),
             Work::Above(children) if wait() => {

@@ -9,6 +9,7 @@
 //! 4. [`commit`] puts the finished nodes of the units behind one another.
 //! 5. With a job, what a unit comes to is kept ([`keep`]), so that another run, or another process, need not build it; units that
 //!    several processes [`share`] are built one by one.
+//! 6. Where points are added to a tree, units that they do not touch are taken from the [`earlier`] one.
 //!
 //! Finished nodes go to a [`sink`], behind which a format stands, or to several ([`sinks`]), each with its own bytes. The order of nodes depends on the tree alone: within a
 //! unit, a node's children are written, in order, once the node can no longer be asked for a point; the root comes last.
@@ -17,6 +18,7 @@ mod borders;
 mod chunk;
 mod commit;
 mod divide;
+mod earlier;
 mod finished;
 mod keep;
 mod list;
@@ -39,7 +41,7 @@ pub(crate) use order::{OrderScratch, Point, order};
 pub(crate) use sample::Sampler;
 pub use sample::Sampling;
 pub(crate) use sample::Spacing;
-pub(crate) use sink::{FinishedNode, NodeEncoder, NodeSink};
+pub(crate) use sink::{EarlierTree, FinishedNode, NodeEncoder, NodeSink};
 pub(crate) use sinks::AnySink;
 use sinks::{Several, Sinks};
 
@@ -48,6 +50,7 @@ use crate::job::Build;
 use borders::Borders;
 use chunk::ChunkPlan;
 use commit::Committer;
+use earlier::Earlier;
 use list::Lists;
 use make::Making;
 use unit::Shared;
@@ -107,11 +110,15 @@ fn build_for<S: Sinks>(build: Build<'_>, settings: OctreeSettings, sinks: &S) ->
     if let Some((of, job)) = kept.and_then(|of| Some((of, of.in_parts()?))) {
         share::share(&units, of, job, &shared, sinks, sampling)?;
     }
+    let earlier = sinks.earlier().map(|tree| Earlier::of(tree, unit_points, &units, &shared)).transpose()?;
+    let built_anew = earlier.as_ref().and_then(|earlier| earlier.as_ref().err()).copied();
+    let earlier = earlier.as_ref().and_then(|earlier| earlier.as_ref().ok());
     let committer = Committer::new(units.len(), window, sinks, &shared.lists, rt);
     let in_place: Option<Vec<_>> = (0..sinks.count()).map(|stream| sinks.kept(stream)).collect();
     let in_place = in_place.as_deref();
-    Making { units: &units, kept, in_place, shared: &shared, committer: &committer, sinks, sampling }.all()?;
-    let trees = committer.finish()?;
+    Making { units: &units, kept, in_place, earlier, shared: &shared, committer: &committer, sinks, sampling }.all()?;
+    let mut trees = committer.finish(unit_points)?;
+    trees.iter_mut().for_each(|tree| tree.taken_over.why_not = built_anew);
     trees.iter().try_for_each(|tree| tree.ledger.check(&cloud.stats.checksum))?;
     Ok(trees)
 }

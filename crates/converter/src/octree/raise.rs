@@ -14,7 +14,7 @@ use crate::error::ConvertError;
 
 /// An inner node that keeps at least this many points whatever its parent takes can serve every ancestor that may ask
 /// later (one point each, at most 31 of them); everything below it is then final.
-const ENOUGH_FOR_ALL_ANCESTORS: usize = 32;
+pub(super) const ENOUGH_FOR_ALL_ANCESTORS: usize = 32;
 
 /// A node whose points are not final; `L`: a list of points.
 #[derive(Debug)]

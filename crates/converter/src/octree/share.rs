@@ -109,7 +109,7 @@ impl BuiltUnit {
 
 /// For each unit those before it that it must see: the children of a node, and units that touch it and have nodes of the same
 /// levels.
-fn needs(units: &[Unit]) -> Vec<Vec<usize>> {
+pub(super) fn needs(units: &[Unit]) -> Vec<Vec<usize>> {
     let by_key: HashMap<NodeKey, usize> = units.iter().enumerate().map(|(i, unit)| (unit.key, i)).collect();
     let levels: BTreeSet<u8> = units.iter().map(|unit| unit.key.level).collect();
     let is_above = |i: usize| matches!(units[i].work, Work::Above(_));

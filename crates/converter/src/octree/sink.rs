@@ -1,6 +1,6 @@
 //! Where finished nodes go: the octree knows no format.
 
-use pointmill_format::NodeKey;
+use pointmill_format::{NodeKey, NodePoints};
 use serde::{Deserialize, Serialize};
 
 use crate::cloud::Checksum;
@@ -44,12 +44,42 @@ pub(crate) trait NodeSink: Sync {
     /// The file of the nodes, if a job has it, too; offsets count from the first node of the tree.
     fn kept(&self) -> Option<KeptFile<'_>>;
 
+    /// The tree that nodes may be taken from.
+    fn earlier(&self) -> Option<&dyn EarlierTree> {
+        None
+    }
+
     /// Takes a part of the bytes of a node that has too many to have them in memory together: those from `at` on. The parts
     /// of a node come in order.
     ///
     /// # Errors
     /// As [`Self::write`].
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError>;
+}
+
+/// A tree that was made before, in the same cube and with the same settings, in the bytes of the same format: what no new
+/// point touches is taken from it ([`super::earlier`]).
+pub(crate) trait EarlierTree: Sync {
+    /// All nodes.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    fn nodes(&self) -> Result<Vec<FinishedNode>, ConvertError>;
+
+    /// [`super::OctreeSettings::unit_points`] of that tree.
+    fn unit_points(&self) -> u64;
+
+    /// Fills `out` with the bytes from `offset` on.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    fn read(&self, offset: u64, out: &mut [u8]) -> Result<(), ConvertError>;
+
+    /// Appends the points of a node to `out`, as stored records of the run.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    fn records(&self, node: &FinishedNode, points: &mut NodePoints, out: &mut Vec<u8>) -> Result<(), ConvertError>;
 }
 
 /// Makes the bytes of nodes.
@@ -72,6 +102,9 @@ pub(crate) trait NodeEncoder {
     /// # Errors
     /// It cannot be put into bytes.
     fn take_notes(&mut self) -> Result<Vec<u8>, ConvertError>;
+
+    /// Notices of stored records what [`Self::encode`] does, where their bytes are there already ([`NodeSink::earlier`]).
+    fn notice(&mut self, _records: &mut [u8]) {}
 
     /// Bytes of a point, if the bytes of a node are those of its points one after the other, so that they may be encoded in
     /// parts.

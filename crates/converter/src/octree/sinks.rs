@@ -2,7 +2,7 @@
 
 use pointmill_format::NodeKey;
 
-use super::sink::{FinishedNode, NodeEncoder, NodeSink};
+use super::sink::{EarlierTree, FinishedNode, NodeEncoder, NodeSink};
 use crate::cloud::{Checksum, copy_record};
 use crate::error::ConvertError;
 use crate::job::KeptFile;
@@ -49,6 +49,9 @@ pub(super) trait Sinks: Sync {
     /// As [`NodeSink::kept`].
     fn kept(&self, stream: usize) -> Option<KeptFile<'_>>;
 
+    /// As [`NodeSink::earlier`]; never of several streams.
+    fn earlier(&self) -> Option<&dyn EarlierTree>;
+
     /// As [`NodeSink::write_part`].
     fn write_part(&self, stream: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError>;
 }
@@ -68,6 +71,9 @@ pub(super) trait Encoders {
 
     /// As [`NodeEncoder::take_notes`], of each stream.
     fn take_notes(&mut self) -> Result<Vec<Vec<u8>>, ConvertError>;
+
+    /// As [`NodeEncoder::notice`]; never of several streams.
+    fn notice(&mut self, records: &mut [u8]);
 
     /// Bytes of a node that is encoded in parts.
     fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64>;
@@ -106,6 +112,10 @@ impl<S: NodeSink> Sinks for S {
         NodeSink::kept(self)
     }
 
+    fn earlier(&self) -> Option<&dyn EarlierTree> {
+        NodeSink::earlier(self)
+    }
+
     fn write_part(&self, _: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         NodeSink::write_part(self, node, bytes, at)
     }
@@ -128,6 +138,10 @@ impl<E: NodeEncoder> Encoders for E {
 
     fn take_notes(&mut self) -> Result<Vec<Vec<u8>>, ConvertError> {
         Ok(vec![NodeEncoder::take_notes(self)?])
+    }
+
+    fn notice(&mut self, records: &mut [u8]) {
+        NodeEncoder::notice(self, records);
     }
 
     fn large_bytes(&self, _: usize, key: NodeKey, points: u64) -> Option<u64> {
@@ -275,6 +289,10 @@ impl Sinks for Several<'_> {
         self.sinks.get(stream)?.any_kept()
     }
 
+    fn earlier(&self) -> Option<&dyn EarlierTree> {
+        None
+    }
+
     fn write_part(&self, stream: usize, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         self.sink(stream)?.write_any_part(node, bytes, at)
     }
@@ -316,6 +334,8 @@ impl Encoders for SeveralEncoders<'_> {
     fn take_notes(&mut self) -> Result<Vec<Vec<u8>>, ConvertError> {
         self.encoders.iter_mut().map(|encoder| encoder.take_any_notes()).collect()
     }
+
+    fn notice(&mut self, _: &mut [u8]) {}
 
     fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64> {
         self.encoders.get(stream)?.any_large_bytes(key, points)

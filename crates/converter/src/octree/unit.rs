@@ -34,6 +34,8 @@ pub(super) struct BuiltUnit {
     pub(super) outer: Outer,
     /// Where a job keeps it once its bytes are in the output.
     pub(super) file: Option<UnitWriter>,
+    /// Its nodes are those of an earlier tree.
+    pub(super) is_taken_over: bool,
 }
 
 /// Points near the border of a unit, by node.
@@ -53,10 +55,10 @@ pub(super) struct Shared<'a> {
 
 /// One thread's means to build units.
 pub(super) struct UnitBuilder<'a, E> {
-    shared: &'a Shared<'a>,
+    pub(super) shared: &'a Shared<'a>,
     pub(super) encoder: E,
-    sampler: Sampler,
-    chunk: ChunkMemory,
+    pub(super) sampler: Sampler,
+    pub(super) chunk: ChunkMemory,
     lists: ListMemory,
 }
 
@@ -163,7 +165,8 @@ impl<'a, E: Encoders> UnitBuilder<'a, E> {
         };
         let (pieces, written) = finished.into_pieces();
         let outer = borders.into_outer();
-        Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes: Vec::new(), outer, file: None })
+        let (notes, file, is_taken_over) = (Vec::new(), None, false);
+        Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes, outer, file, is_taken_over })
     }
 
     fn nodes<'n>(&'n mut self, borders: &'n mut UnitBorders<'a>, finished: &'n mut Finished) -> ListNodes<'n, 'a, E> {

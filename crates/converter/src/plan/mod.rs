@@ -41,6 +41,8 @@ pub struct Plan {
     pub threads: usize,
     /// Maximum points of a unit of work; `None`: what the memory allows. Changes nothing in the output.
     pub task_points: Option<u64>,
+    /// Maximum points of a subtree of an octree that is built as one; `None`: by the bytes of a point. Shapes the output.
+    pub subtree_points: Option<u64>,
     /// Maximum bytes of points that wait in memory between being read and being built; `None`: what the ceiling leaves. More
     /// go through temporary files. Changes nothing in the output.
     pub waiting_bytes: Option<u64>,
@@ -62,6 +64,9 @@ pub struct Plan {
     pub crs: Option<String>,
     /// Replace an existing output.
     pub overwrite: bool,
+    /// The output is one of the inputs: scans are added to it, and what they do not touch need not be built again. Changes
+    /// nothing in the output.
+    pub append: bool,
     /// Whether the run leaves what another one can go on with.
     pub checkpoint: Checkpoint,
     /// Points, about, after which what was read is safe. Changes nothing in the output.
@@ -233,6 +238,8 @@ impl Plan {
             checkpoint: Checkpoint::Never,
             checkpoint_points: CHECKPOINT_POINTS,
             resume: false,
+            append: false,
+            subtree_points: None,
         }
     }
 }

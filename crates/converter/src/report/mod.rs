@@ -15,5 +15,6 @@ pub use precision::{PrecisionReport, SavedBytes};
 pub(crate) use precision::{check_lattice, precision};
 pub use types::{
     AttributeReport, ChangedAttribute, ChangedValues, DropReason, DroppedAttribute, Estimate, GridReport, InputReport,
-    MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport, TreeReport,
+    MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport, TakenOver,
+    TreeReport,
 };

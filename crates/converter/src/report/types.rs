@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::accuracy::Accuracy;
 use super::choices::PlannedChoice;
 use super::precision::{PrecisionReport, SavedBytes};
-use crate::reason::GridReason;
+use crate::reason::{BuiltAnew, GridReason};
 use crate::warning::{RenamedAttribute, Warning};
 
 /// What a run did.
@@ -101,6 +101,9 @@ pub struct OutputReport {
     pub checksum: String,
     /// Nodes of a tree.
     pub tree: TreeReport,
+    /// What stayed as it was in a dataset that scans were added to; `None`: it is a new one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub taken_over: Option<TakenOver>,
     /// What a coarser step of positions saved, where only the finished dataset tells.
     #[serde(skip)]
     pub(crate) saved: Option<SavedBytes>,
@@ -379,6 +382,29 @@ pub struct TreeReport {
     pub largest_leaf: u64,
     /// Leaves above the capacity, because their points share one position.
     pub overfull_leaves: u64,
+    /// Maximum points of a subtree of an octree that is built as one; 0: it is no octree.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub unit_points: u64,
+}
+
+/// What a dataset that scans were added to kept of itself.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct TakenOver {
+    /// Nodes whose bytes were copied.
+    pub nodes: u64,
+    /// Points in them.
+    pub points: u64,
+    /// Why all was built anew.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why_not: Option<BuiltAnew>,
+}
+
+impl TakenOver {
+    /// Nothing.
+    pub(crate) fn nothing(why: BuiltAnew) -> Self {
+        Self { why_not: Some(why), ..Self::default() }
+    }
 }
 
 /// One phase.

@@ -84,7 +84,8 @@ impl TreeSettings {
     /// Points of a subtree that one thread builds.
     fn unit_points(&self, cloud: &Cloud<'_>) -> u64 {
         let (least, most) = UNIT_POINTS.into_inner();
-        (UNIT_BYTES / chosen_bytes(cloud) as u64).clamp(least, most).max(self.leaf_capacity.into())
+        let usual = (UNIT_BYTES / chosen_bytes(cloud) as u64).clamp(least, most);
+        cloud.plan.subtree_points.unwrap_or(usual).max(self.leaf_capacity.into())
     }
 }
 
@@ -129,6 +130,7 @@ pub(super) fn tree_report(tree: &Octree) -> TreeReport {
         nodes_per_level: vec![0; depth + 1],
         overfull_leaves: tree.overfull_leaves,
         largest_leaf: 0,
+        unit_points: tree.unit_points,
     };
     let parents: HashSet<_> = nodes.iter().filter_map(|n| n.key.parent()).collect();
     for n in nodes {

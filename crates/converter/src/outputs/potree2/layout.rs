@@ -72,6 +72,16 @@ impl OutputLayout {
         self.stride == self.stored_stride && self.runs.len() <= 1
     }
 
+    /// True if stored records come back from those of the dataset: [`Self::unfinish`].
+    pub(crate) fn gives_back_records(&self) -> bool {
+        self.keeps_records() && self.doubled.is_empty()
+    }
+
+    /// Turns records of the dataset into stored ones.
+    pub(crate) fn unfinish(&self, records: &mut [u8]) {
+        self.shift(records, self.shift.map(u32::wrapping_neg));
+    }
+
     /// Appends what is kept of stored records that lie back to back.
     pub(crate) fn select(&self, records: &[u8], out: &mut Vec<u8>) {
         for record in records.chunks_exact(self.stored_stride) {
@@ -82,13 +92,18 @@ impl OutputLayout {
         }
     }
 
-    /// Turns what was kept of stored records into the records of the dataset.
-    pub(crate) fn finish(&self, records: &mut [u8]) {
+    /// Adds to the coordinates of records of the dataset.
+    fn shift(&self, records: &mut [u8], by: [u32; 3]) {
         for record in records.chunks_exact_mut(self.stride) {
-            for (axis, shift) in record[..POSITION_BYTES].as_chunks_mut::<4>().0.iter_mut().zip(self.shift) {
+            for (axis, shift) in record[..POSITION_BYTES].as_chunks_mut::<4>().0.iter_mut().zip(by) {
                 *axis = u32::from_le_bytes(*axis).wrapping_add(shift).to_le_bytes();
             }
         }
+    }
+
+    /// Turns what was kept of stored records into the records of the dataset.
+    pub(crate) fn finish(&self, records: &mut [u8]) {
+        self.shift(records, self.shift);
         for Doubled { from, to, is_signed } in &self.doubled {
             for record in records.chunks_exact_mut(self.stride) {
                 for bytes in record[*from..*to].as_chunks_mut::<8>().0 {

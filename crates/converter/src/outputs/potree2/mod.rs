@@ -1,5 +1,6 @@
 //! The Potree 2.0 octree: payloads behind one another in `octree.bin`, and the two files around them.
 
+mod earlier;
 mod layout;
 mod metadata;
 mod names;
@@ -20,6 +21,7 @@ pub(super) use names::Names;
 pub(crate) use payload::PayloadEncoder;
 pub use settings::{DarkColours, Encoding, Potree2Settings};
 
+use self::earlier::EarlierDataset;
 use self::watch::{AllSeen, Watch};
 use super::attributes::{Choice, changed, choose};
 use super::octrees::{ChosenSpacing, TreeSettings, UNIT_BYTES, errors, tree_report};
@@ -28,9 +30,10 @@ use super::staging::{OutputFile, StagedDataset};
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
 use crate::job::{Build, KeptFile, decode};
-use crate::octree::{self, AnySink, FinishedNode, NodeSink, Octree, OctreeSettings};
+use crate::octree::{self, AnySink, EarlierTree, FinishedNode, NodeSink, Octree, OctreeSettings};
 use crate::plan::{Plan, PlanError, PlanFault, Setting};
-use crate::report::{self, OutputReport, PlannedChoice, SavedBytes};
+use crate::reason::BuiltAnew;
+use crate::report::{self, OutputReport, PlannedChoice, SavedBytes, TakenOver};
 use crate::runtime::{Events, Runtime};
 use crate::sources::{POSITION_BYTES, ResolvedCrs, Schema};
 use crate::warning::Warning;
@@ -142,10 +145,16 @@ impl OctreeOutput for Potree2Settings {
             let (kind, name, elements) = (self.kind(), wide.name.clone(), wide.elements);
             return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());
         }
+        let layout = OutputLayout::new(schema, &choice.kept, &cloud.frame);
+        let earlier = cloud.plan.append.then(|| {
+            let names = Names::of(&notes::attributes(schema, &choice.kept)).stored;
+            EarlierDataset::open(cloud, rt, self, &spacing, &layout, &names)
+        });
         Ok(Box::new(Payloads {
             file: to.create_kept("octree.bin")?,
             turn: Mutex::default(),
-            layout: OutputLayout::new(schema, &choice.kept, &cloud.frame),
+            layout,
+            earlier,
             events: rt.events(),
             watch: self.watch(cloud, &choice.kept),
             seen: AllSeen::default(),
@@ -180,6 +189,8 @@ struct Payloads<'a> {
     /// Whose turn it is to write: threads that wait for the lock of a file in the kernel do not sleep.
     turn: Mutex<()>,
     layout: OutputLayout,
+    /// The dataset that scans are added to, or why nothing can be taken from it.
+    earlier: Option<Result<EarlierDataset, BuiltAnew>>,
     events: &'a dyn Events,
     watch: Watch,
     seen: AllSeen,
@@ -218,6 +229,10 @@ impl NodeSink for Payloads<'_> {
         self.file.kept(0)
     }
 
+    fn earlier(&self) -> Option<&dyn EarlierTree> {
+        self.earlier.as_ref()?.as_ref().ok().map(|earlier| earlier as &dyn EarlierTree)
+    }
+
     fn write_part(&self, node: &FinishedNode, bytes: &[u8], at: u64) -> Result<(), ConvertError> {
         self.write(&[], bytes, node.byte_offset + at)
     }
@@ -236,7 +251,7 @@ impl OctreeWriter for Payloads<'_> {
         let file = &self.file.file;
         file.set_len(tree.bytes, "ending the payloads")?;
         file.sync("syncing the payloads")?;
-        let Self { seen, settings, cloud, spacing, choice, to, .. } = *self;
+        let Self { seen, settings, cloud, spacing, choice, to, earlier, .. } = *self;
         let (kind, schema) = (settings.kind(), cloud.schema());
         let mut nodes: Vec<NodeEntry> = tree.nodes.iter().map(entry).collect();
         let hierarchy = encode_hierarchy(&mut nodes, CHUNK_RECORDS);
@@ -274,6 +289,7 @@ impl OctreeWriter for Payloads<'_> {
             bytes: tree.bytes + (hierarchy.bytes.len() + json.len()) as u64,
             checksum: tree.ledger.unaltered().to_string(),
             tree: tree_report(&tree),
+            taken_over: earlier.map(|earlier| earlier.map_or_else(TakenOver::nothing, |_| tree.taken_over)),
             details: [("spacing".to_owned(), spacing.describe())].into_iter().chain(notes::details(&seen)).collect(),
             ..OutputReport::default()
         })

@@ -199,6 +199,13 @@ impl NodeEncoder for PayloadEncoder<'_> {
         encode(&std::mem::take(&mut self.seen))
     }
 
+    fn notice(&mut self, records: &mut [u8]) {
+        // stored records are those of the dataset but for their positions, which nobody watches
+        if let Some((watch, _)) = &self.watch {
+            watch.look(records, self.layout.stored_stride, &mut self.seen);
+        }
+    }
+
     fn row_bytes(&self) -> Option<u64> {
         (self.encoding == Encoding::Default).then_some(self.layout.stride as u64)
     }

@@ -1,0 +1,197 @@
+//! Units that are taken from an earlier tree, to which points are added: those that the new points do not touch have the same
+//! nodes again. Their bytes are copied, and what they hand up and sideways is put together from the earlier nodes
+//! (docs/design/work-units.md, section 6, says why that is the same).
+//!
+//! [`nodes`] are those of the earlier tree, [`division`] finds its units again, [`samples`] what they had taken near their borders;
+//! [`take`] takes one.
+
+mod division;
+mod nodes;
+mod samples;
+mod take;
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use pointmill_format::{NodeKey, NodePoints};
+
+use super::divide::Subtree;
+use super::share::needs;
+use super::sink::EarlierTree;
+use super::unit::{Outer, Shared};
+use super::units::{Unit, Work, in_order};
+use crate::cloud::{TreePoint, xyz};
+use crate::error::ConvertError;
+use crate::octree::borders::Surroundings;
+use crate::plan::Duplicates;
+use crate::reason::BuiltAnew;
+use division::EarlierUnit;
+use nodes::EarlierNodes;
+use samples::{Samples, Sampling};
+pub(super) use take::Taken;
+
+/// A smaller leaf might have had as many points as there are levels, and have none left: what it was is not known.
+const LEAST_CAPACITY: u32 = 32;
+
+/// An earlier tree, and how far the new one is.
+pub(super) struct Earlier<'a> {
+    nodes: EarlierNodes<'a>,
+    /// Its units, in their order.
+    units: Vec<EarlierUnit>,
+    by_key: HashMap<NodeKey, usize>,
+    /// For each of its units those before it that it has seen.
+    seen: Vec<Vec<usize>>,
+    /// For each new unit those before it that it sees.
+    sees: Vec<Vec<usize>>,
+    /// New units that are built or taken over.
+    done: Vec<OnceLock<Done>>,
+    /// What earlier units had taken near their borders, of those that were asked for.
+    samples: Mutex<HashMap<usize, Arc<Samples>>>,
+    new: &'a [Unit],
+    shared: &'a Shared<'a>,
+}
+
+/// A new unit.
+struct Done {
+    is_taken_over: bool,
+    /// Its nodes that have taken points near its border.
+    border: Vec<NodeKey>,
+}
+
+/// Points near the border of a unit, by the node that has taken them.
+type Seen = BTreeMap<(u8, [u32; 3]), Vec<TreePoint>>;
+
+impl<'a> Earlier<'a> {
+    /// `unit_points`: of the new tree; `new`: its units. [`BuiltAnew`]: nothing can be taken over.
+    pub(super) fn of(
+        tree: &'a dyn EarlierTree,
+        unit_points: u64,
+        new: &'a [Unit],
+        shared: &'a Shared<'a>,
+    ) -> Result<Result<Self, BuiltAnew>, ConvertError> {
+        let plan = &shared.plan;
+        let is_like_it = tree.unit_points() == unit_points
+            && plan.most_points == u32::MAX
+            && plan.leaf_capacity >= LEAST_CAPACITY
+            && plan.cloud.plan.duplicates == Duplicates::Keep;
+        if !is_like_it {
+            return Ok(Err(BuiltAnew::Units));
+        }
+        let Some(nodes) = EarlierNodes::read(tree, &shared.rt.memory)? else { return Ok(Err(BuiltAnew::Memory)) };
+        let Some(found) = division::divide(&nodes, unit_points, shared)? else { return Ok(Err(BuiltAnew::Memory)) };
+        let (mut found, mut units): (HashMap<_, _>, Vec<_>) =
+            (found.into_iter().map(|unit| (unit.key, unit)).collect(), Vec::new());
+        let subtrees = found.keys().map(|key| Subtree { key: *key, chunks: Vec::new() }).collect();
+        let order = in_order(subtrees);
+        let seen = needs(&order);
+        units.extend(order.iter().map_while(|unit| found.remove(&unit.key))); // subtrees come first
+        let by_key = units.iter().enumerate().map(|(i, unit)| (unit.key, i)).collect();
+        let done = new.iter().map(|_| OnceLock::new()).collect();
+        let samples = Mutex::default();
+        Ok(Ok(Self { nodes, units, by_key, seen, sees: needs(new), done, samples, new, shared }))
+    }
+
+    /// The earlier unit that had the root and the points of a new one.
+    fn like(&self, index: usize) -> Option<usize> {
+        let unit = &self.new[index];
+        let earlier = *self.by_key.get(&unit.key)?;
+        (matches!(unit.work, Work::Subtree(_)) && self.units[earlier].points == unit.points()).then_some(earlier)
+    }
+
+    /// Notes what a new unit has taken near its border, before those begin that see it.
+    pub(super) fn note(&self, index: usize, outer: &Outer, is_taken_over: bool) {
+        let border = outer.iter().map(|(key, _)| *key).collect();
+        let _ = self.done[index].set(Done { is_taken_over, border }); // once for each
+    }
+
+    /// True if a new unit sees just what the earlier one had seen; all before it are done.
+    fn sees_the_same(&self, index: usize, earlier: usize) -> Result<bool, ConvertError> {
+        let unit = self.new[index].key;
+        let mut before: HashSet<usize> = self.seen[earlier].iter().copied().collect();
+        let (mut now, mut then) = (Seen::new(), Seen::new());
+        for &other in &self.sees[index] {
+            let Some(done) = self.done[other].get() else { return Ok(false) };
+            let same = self.by_key.get(&self.new[other].key).filter(|_| done.is_taken_over);
+            if same.is_some_and(|same| before.remove(same)) {
+                continue; // what was taken over has the same borders
+            }
+            for key in done.border.iter().filter(|key| key.level >= unit.level) {
+                let Some(mut near) = self.near(unit, *key, &mut now) else { continue };
+                self.shared.borders.get(*key, &mut near)?;
+            }
+        }
+        for other in before {
+            for sample in &self.samples(other)?.nodes {
+                if sample.key.level < unit.level {
+                    continue;
+                }
+                let Some(near) = self.near(unit, sample.key, &mut then) else { continue };
+                sample.points.iter().copied().for_each(near);
+                if sample.is_doubtful && then.get(&place(sample.key)).is_some_and(|points| !points.is_empty()) {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(settled(now) == settled(then))
+    }
+
+    /// Adds points of a node that the nodes of a unit see to `seen`.
+    fn near<'s>(&self, unit: NodeKey, key: NodeKey, seen: &'s mut Seen) -> Option<impl FnMut(TreePoint) + use<'s>> {
+        let near = Surroundings::of(unit, self.shared.borders.spacing().reach(key.level)?);
+        let points = seen.entry(place(key)).or_default();
+        Some(move |point| {
+            if near.hold(point) {
+                points.push(point);
+            }
+        })
+    }
+
+    /// What an earlier unit had taken near its border.
+    fn samples(&self, unit: usize) -> Result<Arc<Samples>, ConvertError> {
+        let known = || self.samples.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(samples) = known().get(&unit) {
+            return Ok(Arc::clone(samples));
+        }
+        let (mut points, mut records) = (NodePoints::default(), Vec::new());
+        let stride = self.shared.lists.stride;
+        let own = |key, out: &mut Vec<TreePoint>| {
+            records.clear();
+            self.nodes.records(key, &mut points, &mut records)?;
+            out.extend(records.chunks_exact(stride).map(|record| self.shared.plan.cloud.frame.tree(record)));
+            Ok(())
+        };
+        let samples = Arc::new(self.samples_with(&self.units[unit], own)?);
+        known().insert(unit, Arc::clone(&samples));
+        Ok(samples)
+    }
+
+    /// The same; `own`: appends the points of a node.
+    fn samples_with(
+        &self,
+        unit: &EarlierUnit,
+        own: impl FnMut(NodeKey, &mut Vec<TreePoint>) -> Result<(), ConvertError>,
+    ) -> Result<Samples, ConvertError> {
+        let Shared { plan, lists, borders, .. } = self.shared;
+        let mut taken = Vec::new();
+        lists.each(&unit.taken, |records| {
+            taken.extend(records.chunks_exact(lists.stride).map(|record| plan.cloud.frame.tree(record)));
+            Ok(true)
+        })?;
+        let (leaf_capacity, found) = (plan.leaf_capacity.into(), Samples::default());
+        let spacing = borders.spacing();
+        let mut sampling = Sampling { nodes: &self.nodes, spacing, leaf_capacity, unit: unit.key, own, found };
+        sampling.of(unit.key, taken)?;
+        Ok(sampling.found)
+    }
+}
+
+fn place(key: NodeKey) -> (u8, [u32; 3]) {
+    (key.level, xyz(key))
+}
+
+/// The points of each node in order, without nodes that have none.
+fn settled(mut seen: Seen) -> Seen {
+    seen.retain(|_, points| !points.is_empty());
+    seen.values_mut().for_each(|points| points.sort_unstable_by_key(|point| point.0));
+    seen
+}
