@@ -34,7 +34,8 @@ pub(crate) struct ConvertArgs {
     #[arg(long, help_heading = "Output")]
     pub(crate) overwrite: bool,
     /// Adds the points of the inputs to those of OUT, a dataset that was made with the same options, and replaces it: the same bytes as
-    /// converting all scans at once, if it holds all attributes and has the same --name; everything is built anew
+    /// converting all scans at once, if it holds all attributes and has the same --name. Of Potree 2.0 what the new points do not touch is
+    /// copied, as long as root cube, step and spacing stay; all else is built anew
     #[arg(long, conflicts_with = "overwrite", help_heading = "Output")]
     pub(crate) append: bool,
     /// Name of the point cloud in the metadata [default: name of the first input]

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use pointmill_converter::{DropReason, Estimate, OutputReport, Plan, Report};
+use pointmill_converter::{DropReason, Estimate, OutputReport, Plan, Report, TakenOver};
 use pointmill_format::DatasetKind;
 use serde_json::Value;
 
@@ -31,6 +31,7 @@ pub(crate) fn report(report: &Report, plan: &Plan, verbose: bool) -> Vec<String>
         };
         lines.push(format!("{} had been read before{built}", plural(report.recalled_points, "point")));
     }
+    lines.extend(report.outputs.iter().filter_map(taken_over_line));
     lines.extend(points_lines(report));
     lines.extend(colours_line(report));
     lines.extend(report.outputs.iter().map(|output| accuracy::line(output, report)));
@@ -57,6 +58,16 @@ fn output_line(output: &OutputReport, plan: &Plan) -> String {
     // joining nothing leaves a separator at the end
     let place = if output.folder.is_empty() { &plan.output } else { &place };
     format!("{}: {} in {parts}, {}", place.display(), plural(output.points, "point"), bytes(output.bytes))
+}
+
+/// What a dataset that scans were added to kept of itself.
+fn taken_over_line(output: &OutputReport) -> Option<String> {
+    let TakenOver { nodes, points, why_not, .. } = output.taken_over?;
+    let (of, points) = (plural(output.tree.nodes, "node"), plural(points, "point"));
+    Some(match why_not {
+        Some(why) => format!("all built anew: {why}"),
+        None => format!("{} of {of} copied from the dataset, with {points}", count(nodes)),
+    })
 }
 
 /// Colours that are not stored as they were read. Some formats have 8 bits in any case.

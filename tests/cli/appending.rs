@@ -29,6 +29,19 @@ fn a_dataset_that_was_added_to_has_the_bytes_of_all_scans() {
 }
 
 #[test]
+fn the_summary_and_the_report_say_what_was_built_anew() {
+    let dir = stage(&[]);
+    let said = dir.succeed(["convert", "b.las", "-o", "city", "--append"]);
+    assert!(
+        said.stderr.contains("all built anew: with the new points the root cube is another one"),
+        "{}",
+        said.stderr
+    );
+    let report = std::fs::read_to_string(dir.path("city/report.json")).unwrap();
+    assert!(report.contains("\"taken_over\""), "{report}");
+}
+
+#[test]
 fn formats_with_other_fields_than_the_scans_hold_all_points_too() {
     // COPC has more fields, so that its description differs; Potree 1 has 8 bits of a colour, so that points of one place have another order
     for options in [&["--to", "copc"][..], &["--to", "potree1", "--potree1-version", "1.8"]] {

@@ -154,6 +154,46 @@ fn a_run_that_ends_at_any_operation_is_gone_on_with_to_the_same_bytes() {
 }
 
 #[test]
+fn an_append_that_ends_anywhere_is_gone_on_with() {
+    let mut bench = Bench::of(3000);
+    bench.plan.subtree_points = Some(500);
+    let targets = [Potree2Settings { leaf_capacity: 60, spacing: Some(1.0), ..Potree2Settings::default() }.into()];
+    convert(&Plan { checkpoint: Checkpoint::Never, ..bench.plan.clone() }, &targets, &Silent).unwrap();
+    let (out, base) = (bench.plan.output.clone(), bench.dir.path().join("base"));
+    fs::rename(&out, &base).unwrap();
+    let restore = || {
+        let _ = fs::remove_dir_all(&out);
+        fs::create_dir(&out).unwrap();
+        names(&base).iter().for_each(|name| drop(fs::copy(base.join(name), out.join(name)).unwrap()));
+    };
+    let mut corner = Las::terrain(3000, 1);
+    let least = |a: usize| corner.points.iter().map(|point| point.xyz[a]).min().unwrap();
+    let end = [least(0) + 300, least(1) + 300];
+    corner.points.retain(|point| point.xyz[0] < end[0] && point.xyz[1] < end[1]);
+    let more = bench.dir.path().join("more.las");
+    fs::write(&more, corner.bytes()).unwrap();
+    bench.plan.inputs.push(more.clone());
+    let whole = Plan { checkpoint: Checkpoint::Never, output: bench.dir.path().join("whole"), ..bench.plan.clone() };
+    convert(&whole, &targets, &Silent).unwrap();
+    let expected = dataset(&whole.output);
+    (bench.plan.inputs, bench.plan.append, bench.plan.overwrite) = (vec![more, out.clone()], true, true);
+    restore();
+    let (operations, ended) = bench.end_at(&bench.plan, &targets, u64::MAX);
+    ended.unwrap();
+    let (mut taken, mut recalled) = (0, 0);
+    for at in (0..operations).step_by((operations / 12).max(1) as usize) {
+        restore();
+        if bench.end_at(&bench.plan, &targets, at).1.is_ok() {
+            continue; // what was refused was the name of something temporary
+        }
+        let report = convert(&bench.resumed(), &targets, &Silent).unwrap();
+        assert!(dataset(&out) == expected, "operation {at}");
+        (taken, recalled) = (taken + report.outputs[0].taken_over.unwrap().nodes, recalled + report.recalled_units);
+    }
+    assert!(taken > 0 && recalled > 0, "{taken} nodes, {recalled} units");
+}
+
+#[test]
 fn another_input_option_or_version_is_refused_with_the_reason_and_the_job_stays() {
     let bench = Bench::new();
     bench.with_job();

@@ -71,8 +71,11 @@ impl ChunkMemory {
     /// Records below a node of `level` in the order of [`order`].
     pub(super) fn in_order(&mut self, records: &[u8], frame: &RecordFrame, level: u8) -> Vec<u8> {
         order(records, frame, level, &mut self.scratch, &mut self.points);
-        let of = |point: &Point| &records[point.record as usize * frame.stride..][..frame.stride];
-        self.points.iter().flat_map(of).copied().collect()
+        let mut sorted = Vec::with_capacity(records.len());
+        for point in &self.points {
+            sorted.extend_from_slice(&records[point.record as usize * frame.stride..][..frame.stride]);
+        }
+        sorted
     }
 
     /// Builds the nodes of the chunk that was loaded; returns its root, and the number of leaves above the capacity.

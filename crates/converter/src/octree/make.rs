@@ -78,17 +78,27 @@ impl<S: Sinks> Making<'_, S> {
         mut buffers: Vec<Vec<u8>>,
     ) -> Result<Option<BuiltUnit>, ConvertError> {
         let wait = || self.committer.wait_for(index, unit.class_start);
-        if let (Some(earlier), Work::Subtree(chunks)) = (self.earlier, &unit.work) {
-            match builder.take_over(earlier, index, chunks, buffers, wait)? {
-                Taken::Over(unit) => return Ok(Some(unit)),
-                Taken::Stopped => return Ok(None),
-                Taken::Not(unused) => buffers = unused,
-            }
-        }
         match &unit.work {
-            Work::Subtree(chunks) => builder.subtree(unit.key, chunks, buffers, wait),
+            Work::Subtree(chunks) => {
+                if let Some(earlier) = self.earlier {
+                    match builder.take_subtree(earlier, index, chunks, buffers, wait)? {
+                        Taken::Over(unit) => return Ok(Some(unit)),
+                        Taken::Stopped => return Ok(None),
+                        Taken::Not(unused) => buffers = unused,
+                    }
+                }
+                builder.subtree(unit.key, chunks, buffers, wait)
+            }
             Work::Above(children) if wait() => {
-                builder.above(unit.key, self.committer.take(children)?, buffers).map(Some)
+                let roots = self.committer.take(children)?;
+                if let Some(earlier) = self.earlier {
+                    match builder.take_above(earlier, index, buffers)? {
+                        Taken::Over(unit) => return Ok(Some(unit)),
+                        Taken::Stopped => return Ok(None),
+                        Taken::Not(unused) => buffers = unused,
+                    }
+                }
+                builder.above(unit.key, roots, buffers).map(Some)
             }
             Work::Above(_) => Ok(None),
         }

@@ -75,11 +75,17 @@ pub(crate) trait EarlierTree: Sync {
     /// They cannot be read.
     fn read(&self, offset: u64, out: &mut [u8]) -> Result<(), ConvertError>;
 
-    /// Appends the points of a node to `out`, as stored records of the run.
+    /// Appends the points of a node to `out`, as stored records of the run; `bytes`: those of the node.
     ///
     /// # Errors
-    /// They cannot be read.
-    fn records(&self, node: &FinishedNode, points: &mut NodePoints, out: &mut Vec<u8>) -> Result<(), ConvertError>;
+    /// They cannot be decoded.
+    fn records(
+        &self,
+        node: &FinishedNode,
+        bytes: &[u8],
+        points: &mut NodePoints,
+        out: &mut Vec<u8>,
+    ) -> Result<(), ConvertError>;
 }
 
 /// Makes the bytes of nodes.

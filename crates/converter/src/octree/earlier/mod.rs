@@ -13,7 +13,7 @@ mod take;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use pointmill_format::{NodeKey, NodePoints};
+use pointmill_format::NodeKey;
 
 use super::divide::Subtree;
 use super::share::needs;
@@ -26,12 +26,15 @@ use crate::octree::borders::Surroundings;
 use crate::plan::Duplicates;
 use crate::reason::BuiltAnew;
 use division::EarlierUnit;
-use nodes::EarlierNodes;
+use nodes::{EarlierNodes, Scratch};
 use samples::{Samples, Sampling};
 pub(super) use take::Taken;
 
 /// A smaller leaf might have had as many points as there are levels, and have none left: what it was is not known.
 const LEAST_CAPACITY: u32 = 32;
+
+/// As many earlier units have their samples in memory.
+const MOST_SAMPLES: usize = 64;
 
 /// An earlier tree, and how far the new one is.
 pub(super) struct Earlier<'a> {
@@ -48,6 +51,8 @@ pub(super) struct Earlier<'a> {
     /// What earlier units had taken near their borders, of those that were asked for.
     samples: Mutex<HashMap<usize, Arc<Samples>>>,
     new: &'a [Unit],
+    new_by_key: HashMap<NodeKey, usize>,
+    unit_points: u64,
     shared: &'a Shared<'a>,
 }
 
@@ -79,23 +84,39 @@ impl<'a> Earlier<'a> {
         }
         let Some(nodes) = EarlierNodes::read(tree, &shared.rt.memory)? else { return Ok(Err(BuiltAnew::Memory)) };
         let Some(found) = division::divide(&nodes, unit_points, shared)? else { return Ok(Err(BuiltAnew::Memory)) };
-        let (mut found, mut units): (HashMap<_, _>, Vec<_>) =
-            (found.into_iter().map(|unit| (unit.key, unit)).collect(), Vec::new());
-        let subtrees = found.keys().map(|key| Subtree { key: *key, chunks: Vec::new() }).collect();
-        let order = in_order(subtrees);
-        let seen = needs(&order);
-        units.extend(order.iter().map_while(|unit| found.remove(&unit.key))); // subtrees come first
+        let mut found: HashMap<NodeKey, EarlierUnit> = found.into_iter().map(|unit| (unit.key, unit)).collect();
+        let subtrees = found.values().filter(|unit| !unit.is_above);
+        let order = in_order(subtrees.map(|unit| Subtree { key: unit.key, chunks: Vec::new() }).collect());
+        let units: Vec<EarlierUnit> = order.iter().filter_map(|unit| found.remove(&unit.key)).collect();
+        if units.len() != order.len() || !found.is_empty() {
+            return Err(ConvertError::Internal("the units of an earlier tree have no order".into()));
+        }
         let by_key = units.iter().enumerate().map(|(i, unit)| (unit.key, i)).collect();
+        let new_by_key = new.iter().enumerate().map(|(i, unit)| (unit.key, i)).collect();
         let done = new.iter().map(|_| OnceLock::new()).collect();
-        let samples = Mutex::default();
-        Ok(Ok(Self { nodes, units, by_key, seen, sees: needs(new), done, samples, new, shared }))
+        let (seen, sees, samples) = (needs(&order), needs(new), Mutex::default());
+        Ok(Ok(Self { nodes, units, by_key, seen, sees, done, samples, new, new_by_key, unit_points, shared }))
     }
 
-    /// The earlier unit that had the root and the points of a new one.
+    /// The earlier unit that was made of the same as a new one: of as many points, or of the same children, all of which were
+    /// taken over.
     fn like(&self, index: usize) -> Option<usize> {
-        let unit = &self.new[index];
-        let earlier = *self.by_key.get(&unit.key)?;
-        (matches!(unit.work, Work::Subtree(_)) && self.units[earlier].points == unit.points()).then_some(earlier)
+        let new = &self.new[index];
+        let known = *self.by_key.get(&new.key)?;
+        let earlier = &self.units[known];
+        let is_like_it = match &new.work {
+            Work::Subtree(_) => !earlier.is_above && earlier.points == new.points(),
+            Work::Above(children) => {
+                let is_taken_over = |key| {
+                    let done = self.new_by_key.get(key).and_then(|child| self.done[*child].get());
+                    done.is_some_and(|done| done.is_taken_over)
+                };
+                let known_children =
+                    (0..8).filter_map(|child| new.key.child(child)).filter(|c| self.by_key.contains_key(c));
+                earlier.is_above && children.iter().all(is_taken_over) && known_children.eq(children.iter().copied())
+            }
+        };
+        is_like_it.then_some(known)
     }
 
     /// Notes what a new unit has taken near its border, before those begin that see it.
@@ -107,6 +128,7 @@ impl<'a> Earlier<'a> {
     /// True if a new unit sees just what the earlier one had seen; all before it are done.
     fn sees_the_same(&self, index: usize, earlier: usize) -> Result<bool, ConvertError> {
         let unit = self.new[index].key;
+        let deepest = if self.units[earlier].is_above { unit.level } else { u8::MAX };
         let mut before: HashSet<usize> = self.seen[earlier].iter().copied().collect();
         let (mut now, mut then) = (Seen::new(), Seen::new());
         for &other in &self.sees[index] {
@@ -115,14 +137,14 @@ impl<'a> Earlier<'a> {
             if same.is_some_and(|same| before.remove(same)) {
                 continue; // what was taken over has the same borders
             }
-            for key in done.border.iter().filter(|key| key.level >= unit.level) {
+            for key in done.border.iter().filter(|key| (unit.level..=deepest).contains(&key.level)) {
                 let Some(mut near) = self.near(unit, *key, &mut now) else { continue };
                 self.shared.borders.get(*key, &mut near)?;
             }
         }
         for other in before {
             for sample in &self.samples(other)?.nodes {
-                if sample.key.level < unit.level {
+                if !(unit.level..=deepest).contains(&sample.key.level) {
                     continue;
                 }
                 let Some(near) = self.near(unit, sample.key, &mut then) else { continue };
@@ -152,16 +174,20 @@ impl<'a> Earlier<'a> {
         if let Some(samples) = known().get(&unit) {
             return Ok(Arc::clone(samples));
         }
-        let (mut points, mut records) = (NodePoints::default(), Vec::new());
+        let (mut scratch, mut records) = (Scratch::default(), Vec::new());
         let stride = self.shared.lists.stride;
         let own = |key, out: &mut Vec<TreePoint>| {
             records.clear();
-            self.nodes.records(key, &mut points, &mut records)?;
+            self.nodes.records(key, &mut scratch, &mut records)?;
             out.extend(records.chunks_exact(stride).map(|record| self.shared.plan.cloud.frame.tree(record)));
             Ok(())
         };
         let samples = Arc::new(self.samples_with(&self.units[unit], own)?);
-        known().insert(unit, Arc::clone(&samples));
+        let mut known = known();
+        if known.len() >= MOST_SAMPLES {
+            known.clear();
+        }
+        known.insert(unit, Arc::clone(&samples));
         Ok(samples)
     }
 
@@ -172,6 +198,9 @@ impl<'a> Earlier<'a> {
         own: impl FnMut(NodeKey, &mut Vec<TreePoint>) -> Result<(), ConvertError>,
     ) -> Result<Samples, ConvertError> {
         let Shared { plan, lists, borders, .. } = self.shared;
+        if !unit.is_above && unit.points > self.unit_points {
+            return Ok(Samples::default()); // of one place: a leaf
+        }
         let mut taken = Vec::new();
         lists.each(&unit.taken, |records| {
             taken.extend(records.chunks_exact(lists.stride).map(|record| plan.cloud.frame.tree(record)));
@@ -179,7 +208,8 @@ impl<'a> Earlier<'a> {
         })?;
         let (leaf_capacity, found) = (plan.leaf_capacity.into(), Samples::default());
         let spacing = borders.spacing();
-        let mut sampling = Sampling { nodes: &self.nodes, spacing, leaf_capacity, unit: unit.key, own, found };
+        let (nodes, is_above) = (&self.nodes, unit.is_above);
+        let mut sampling = Sampling { nodes, spacing, leaf_capacity, unit: unit.key, is_above, own, found };
         sampling.of(unit.key, taken)?;
         Ok(sampling.found)
     }

@@ -57,8 +57,19 @@ impl<'a> EarlierNodes<'a> {
     }
 
     /// Appends the points of a node to `out`, as stored records.
-    pub(super) fn records(&self, key: NodeKey, points: &mut NodePoints, out: &mut Vec<u8>) -> Result<(), ConvertError> {
-        self.get(key).map_or(Ok(()), |node| self.tree.records(node, points, out))
+    pub(super) fn records(&self, key: NodeKey, scratch: &mut Scratch, out: &mut Vec<u8>) -> Result<(), ConvertError> {
+        let Some(node) = self.get(key) else { return Ok(()) };
+        scratch.bytes.resize(node.byte_size as usize, 0);
+        self.tree.read(node.byte_offset, &mut scratch.bytes)?;
+        self.tree.records(node, &scratch.bytes, &mut scratch.points, out)
+    }
+
+    /// The children of a node that have points of their own, in the order of their bytes.
+    pub(super) fn children(&self, key: NodeKey) -> Vec<FinishedNode> {
+        let children = (0..8).filter_map(|child| key.child(child));
+        let mut found: Vec<FinishedNode> = children.filter_map(|child| self.get(child)).copied().collect();
+        found.sort_unstable_by_key(|node| node.byte_offset);
+        found
     }
 
     /// The nodes below one, in the order of their bytes.
@@ -74,4 +85,11 @@ impl<'a> EarlierNodes<'a> {
         found.sort_unstable_by_key(|node| node.byte_offset);
         found
     }
+}
+
+/// Memory to decode a node in, used again and again.
+#[derive(Default)]
+pub(super) struct Scratch {
+    bytes: Vec<u8>,
+    pub(super) points: NodePoints,
 }

@@ -40,6 +40,8 @@ pub(super) struct Sampling<'a, F> {
     pub(super) spacing: Spacing,
     pub(super) leaf_capacity: u64,
     pub(super) unit: NodeKey,
+    /// The unit is a node alone.
+    pub(super) is_above: bool,
     pub(super) own: F,
     pub(super) found: Samples,
 }
@@ -63,6 +65,9 @@ impl<F: FnMut(NodeKey, &mut Vec<TreePoint>) -> Result<(), ConvertError>> Samplin
         if !outer.is_empty() {
             let is_doubtful = self.nodes.own_points(key) < 2;
             self.found.nodes.push(Sample { key, points: outer, is_doubtful });
+        }
+        if self.is_above {
+            return Ok(());
         }
         let mut parts: [Vec<TreePoint>; 8] = Default::default();
         points.iter().for_each(|point| parts[usize::from(morton::child_index(*point, key.level))].push(*point));

@@ -13,7 +13,7 @@ use crate::error::ConvertError;
 use crate::octree::{EarlierTree, FinishedNode};
 use crate::outputs::octrees::ChosenSpacing;
 use crate::outputs::output::Output;
-use crate::plan::Plan;
+use crate::plan::{Filter, OriginPoints, Plan, RgbDepth};
 use crate::reason::BuiltAnew;
 use crate::runtime::{DiskFile, Runtime};
 
@@ -37,6 +37,9 @@ impl EarlierDataset {
         names: &[String],
     ) -> Result<Self, BuiltAnew> {
         let unit_points = unit_points(cloud.plan, settings).ok_or(BuiltAnew::OtherMaking)?;
+        if !keeps_points(cloud.plan) {
+            return Err(BuiltAnew::OtherMaking);
+        }
         let dataset = Dataset::open(&cloud.plan.output).map_err(|_| BuiltAnew::Unreadable)?;
         let octree = rt.temp.read(&dataset.locate(OCTREE_FILE)).map_err(|_| BuiltAnew::Unreadable)?;
         let (metadata, cube) = (dataset.metadata(), &cloud.frame.cube);
@@ -61,6 +64,14 @@ impl EarlierDataset {
         same(is_encoded_alike, BuiltAnew::OtherMaking)?;
         Ok(Self { dataset, octree, unit_points, encoding: settings.encoding, layout: layout.clone() })
     }
+}
+
+/// True if all points of the dataset are read, as they are stored.
+fn keeps_points(plan: &Plan) -> bool {
+    let Filter { bounds, regions, classes, every, origin_points } = &plan.filter;
+    let keeps_all = bounds.is_none() && regions.is_empty() && classes.is_none() && *every <= 1;
+    let is_input = plan.inputs.contains(&plan.output);
+    is_input && keeps_all && *origin_points == OriginPoints::Keep && plan.rgb_depth != RgbDepth::Eight
 }
 
 /// Maximum points of a subtree of the dataset that a plan adds to, if this version has made it with the same settings.
@@ -97,21 +108,26 @@ impl EarlierTree for EarlierDataset {
         self.octree.read_at(out, offset, "reading nodes")
     }
 
-    fn records(&self, node: &FinishedNode, points: &mut NodePoints, out: &mut Vec<u8>) -> Result<(), ConvertError> {
+    fn records(
+        &self,
+        node: &FinishedNode,
+        bytes: &[u8],
+        points: &mut NodePoints,
+        out: &mut Vec<u8>,
+    ) -> Result<(), ConvertError> {
         let (start, stride) = (out.len(), self.layout.stride);
-        out.resize(start + node.points as usize * stride, 0);
-        let records = &mut out[start..];
         match self.encoding {
-            Encoding::Default => self.read(node.byte_offset, records)?,
+            Encoding::Default => out.extend_from_slice(bytes),
             Encoding::Brotli { .. } => {
                 let FinishedNode { key, points: count, byte_offset, byte_size } = *node;
                 let node_type = NodeType::Normal as u8; // as much as reading its points needs
                 let record = NodeRecord { node_type, child_mask: 0, points: count, byte_offset, byte_size };
                 self.dataset.read_points(&Node::new(key, record), points)?;
-                interleave(points, records, stride);
+                out.resize(start + count as usize * stride, 0);
+                interleave(points, &mut out[start..], stride);
             }
         }
-        self.layout.unfinish(records);
+        self.layout.unfinish(&mut out[start..]);
         Ok(())
     }
 }
