@@ -92,7 +92,7 @@ impl<S: Sinks> Making<'_, S> {
             Work::Above(children) if wait() => {
                 let roots = self.committer.take(children)?;
                 if let Some(earlier) = self.earlier {
-                    match builder.take_above(earlier, index, buffers)? {
+                    match builder.take_above(earlier, index, &roots, buffers)? {
                         Taken::Over(unit) => return Ok(Some(unit)),
                         Taken::Stopped => return Ok(None),
                         Taken::Not(unused) => buffers = unused,

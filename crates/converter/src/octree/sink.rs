@@ -109,8 +109,9 @@ pub(crate) trait NodeEncoder {
     /// It cannot be put into bytes.
     fn take_notes(&mut self) -> Result<Vec<u8>, ConvertError>;
 
-    /// Notices of stored records what [`Self::encode`] does, where their bytes are there already ([`NodeSink::earlier`]).
-    fn notice(&mut self, _records: &mut [u8]) {}
+    /// Notices of stored records, but for some of them, what [`Self::encode`] does, where their bytes are there already
+    /// ([`NodeSink::earlier`]).
+    fn notice(&mut self, _records: &mut [u8], _but_for: &mut [u8]) {}
 
     /// Bytes of a point, if the bytes of a node are those of its points one after the other, so that they may be encoded in
     /// parts.

@@ -73,7 +73,7 @@ pub(super) trait Encoders {
     fn take_notes(&mut self) -> Result<Vec<Vec<u8>>, ConvertError>;
 
     /// As [`NodeEncoder::notice`]; never of several streams.
-    fn notice(&mut self, records: &mut [u8]);
+    fn notice(&mut self, records: &mut [u8], but_for: &mut [u8]);
 
     /// Bytes of a node that is encoded in parts.
     fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64>;
@@ -140,8 +140,8 @@ impl<E: NodeEncoder> Encoders for E {
         Ok(vec![NodeEncoder::take_notes(self)?])
     }
 
-    fn notice(&mut self, records: &mut [u8]) {
-        NodeEncoder::notice(self, records);
+    fn notice(&mut self, records: &mut [u8], but_for: &mut [u8]) {
+        NodeEncoder::notice(self, records, but_for);
     }
 
     fn large_bytes(&self, _: usize, key: NodeKey, points: u64) -> Option<u64> {
@@ -335,7 +335,7 @@ impl Encoders for SeveralEncoders<'_> {
         self.encoders.iter_mut().map(|encoder| encoder.take_any_notes()).collect()
     }
 
-    fn notice(&mut self, _: &mut [u8]) {}
+    fn notice(&mut self, _: &mut [u8], _: &mut [u8]) {}
 
     fn large_bytes(&self, stream: usize, key: NodeKey, points: u64) -> Option<u64> {
         self.encoders.get(stream)?.any_large_bytes(key, points)

@@ -1,17 +1,16 @@
 //! One unit, taken from an earlier tree.
 
-use std::collections::HashMap;
-
 use pointmill_format::NodeKey;
 
 use super::Earlier;
 use super::division::{EarlierUnit, is_one_place};
 use super::nodes::Scratch;
-use crate::cloud::{Checksum, Ledger, TreePoint};
+use super::samples::Samples;
+use crate::cloud::{Checksum, Cloud, Ledger, TreePoint};
 use crate::error::ConvertError;
 use crate::octree::divide::Chunk;
 use crate::octree::finished::{Piece, Run};
-use crate::octree::list::List;
+use crate::octree::list::{List, Lists};
 use crate::octree::raise::{ENOUGH_FOR_ALL_ANCESTORS, Pairs, Pending, Points};
 use crate::octree::sink::{EarlierTree, FinishedNode};
 use crate::octree::sinks::Encoders;
@@ -26,14 +25,13 @@ pub(in crate::octree) enum Taken {
     Stopped,
 }
 
-/// A unit of the earlier tree, decoded.
-struct Decoded {
-    /// Those below its root, in the order of their bytes.
+/// A unit of the earlier tree.
+struct Found {
+    /// Those below its root that were written with it, in the order of their bytes.
     nodes: Vec<FinishedNode>,
     /// What its root had before nodes above took points from it, in order.
     root: Vec<u8>,
     outer: Outer,
-    written: Checksum,
 }
 
 impl<E: Encoders> UnitBuilder<'_, E> {
@@ -47,54 +45,72 @@ impl<E: Encoders> UnitBuilder<'_, E> {
         wait: impl FnOnce() -> bool,
     ) -> Result<Taken, ConvertError> {
         let ([chunk], Some(known)) = (chunks, earlier.like(index)) else { return Ok(Taken::Not(buffers)) };
-        let taken = self.take_over(earlier, index, known, buffers, wait)?;
+        let Cloud { store, facts, .. } = self.shared.plan.cloud;
+        let fill = |records: &mut Vec<u8>| {
+            let mut read = chunk.segments.iter().map(|segment| store.read(*segment, records));
+            // as the dataset has them
+            read.try_fold(true, |are_wide, group| Ok(are_wide && facts.widening.of(group?).is_none()))
+        };
+        let taken = self.take_over(earlier, index, known, buffers, fill, wait)?;
         if let Taken::Over(_) = &taken {
-            let store = &self.shared.plan.cloud.store;
             chunk.segments.iter().try_for_each(|segment| store.pass_over(*segment))?;
         }
         Ok(taken)
     }
 
-    /// The same of a node above subtrees; all before it are done.
+    /// The same of a node above subtrees, whose children have `roots`; all before it are done.
     pub(in crate::octree) fn take_above(
         &mut self,
         earlier: &Earlier<'_>,
         index: usize,
+        roots: &[Pending<List>],
         buffers: Vec<Vec<u8>>,
     ) -> Result<Taken, ConvertError> {
         let Some(known) = earlier.like(index) else { return Ok(Taken::Not(buffers)) };
-        self.take_over(earlier, index, known, buffers, || true)
+        let lists = &self.shared.lists;
+        let fill = |records: &mut Vec<u8>| {
+            roots.iter().try_for_each(|root| append(lists, &root.points, records))?;
+            Ok(roots.iter().all(|root| root.children.is_empty()))
+        };
+        self.take_over(earlier, index, known, buffers, fill, || true)
     }
 
+    /// `fill`: appends all records that the unit is made of; false: they are not those of the earlier one.
     fn take_over(
         &mut self,
         earlier: &Earlier<'_>,
         index: usize,
         known: usize,
         mut buffers: Vec<Vec<u8>>,
+        fill: impl FnOnce(&mut Vec<u8>) -> Result<bool, ConvertError>,
         wait: impl FnOnce() -> bool,
     ) -> Result<Taken, ConvertError> {
         let (shared, unit) = (self.shared, &earlier.units[known]);
-        let (1, Some(mut bytes)) = (buffers.len(), buffers.pop()) else { return Ok(Taken::Not(buffers)) };
-        let mut records = self.chunk.buffer();
-        let decoded = self.decode(earlier, unit, &mut bytes, &mut records)?;
-        if decoded.is_some() && !wait() {
+        let Some(Found { mut nodes, mut root, outer }) = self.find(earlier, unit)? else {
+            return Ok(Taken::Not(buffers));
+        };
+        if !wait() {
             return Ok(Taken::Stopped);
         }
-        let decoded = match decoded {
-            Some(decoded) if earlier.sees_the_same(index, known)? => decoded,
-            _ => {
-                self.chunk.give_back(records);
-                bytes.clear();
-                return Ok(Taken::Not(vec![bytes]));
-            }
-        };
-        self.encoder.notice(&mut records);
+        if buffers.len() != 1 || !earlier.sees_the_same(index, known)? {
+            return Ok(Taken::Not(buffers));
+        }
+        let (mut records, stride) = (self.chunk.buffer(), shared.lists.stride);
+        records.clear();
+        let points: usize = nodes.iter().map(|node| node.points as usize).sum();
+        let is_whole = fill(&mut records)? && records.len() == points * stride + root.len();
+        if is_whole {
+            self.encoder.notice(&mut records, &mut root);
+        }
+        let written = sum_of_others(&records, &root, stride);
         self.chunk.give_back(records);
-        let Decoded { nodes, root, outer, written } = decoded;
-        let is_inner = !nodes.is_empty();
+        if !is_whole {
+            return Ok(Taken::Not(buffers));
+        }
+        let (is_inner, mut bytes) = (!nodes.is_empty(), buffers.pop().unwrap_or_default());
+        read(earlier.nodes.tree, &mut nodes, &mut bytes)?;
         let run = Run { nodes, bytes, in_place: None };
-        let mut root = Pending { is_inner, ..Pending::leaf(unit.key, List::of_chunk(root, shared.lists.stride)) };
+        let mut root = Pending { is_inner, ..Pending::leaf(unit.key, List::of_chunk(root, stride)) };
         shared.lists.admit(&mut root.points)?;
         Ok(Taken::Over(BuiltUnit {
             pieces: if is_inner { vec![Piece::Nodes(vec![run])] } else { Vec::new() },
@@ -109,70 +125,44 @@ impl<E: Encoders> UnitBuilder<'_, E> {
         }))
     }
 
-    /// Decodes a unit. Then `bytes` has those of its nodes, without that of its root, and `records` their points. `None`: its
-    /// nodes do not say what it was.
-    fn decode(
-        &mut self,
-        earlier: &Earlier<'_>,
-        unit: &EarlierUnit,
-        bytes: &mut Vec<u8>,
-        records: &mut Vec<u8>,
-    ) -> Result<Option<Decoded>, ConvertError> {
-        let (shared, all) = (self.shared, &earlier.nodes);
+    /// Finds a unit again. `None`: its nodes do not say what it was, or it has more points than fit into memory.
+    fn find(&mut self, earlier: &Earlier<'_>, unit: &EarlierUnit) -> Result<Option<Found>, ConvertError> {
+        let (shared, all, mut scratch) = (self.shared, &earlier.nodes, Scratch::default());
         let (frame, stride) = (&shared.plan.cloud.frame, shared.lists.stride);
-        let mut nodes = if unit.is_above { all.children(unit.key) } else { all.below(unit.key) };
-        let points = nodes.iter().map(|node| u64::from(node.points)).sum::<u64>();
-        let in_root = all.own_points(unit.key) + unit.taken.count();
-        if points.max(in_root) > shared.chunk_points || !follow_each_other(&nodes) {
-            return Ok(None);
-        }
         let tree = |record: &[u8]| frame.tree(record);
-        let mut scratch = Scratch::default();
-        records.clear();
-        all.records(unit.key, &mut scratch, records)?;
-        let own_of_root: Vec<TreePoint> = records.chunks_exact(stride).map(tree).collect();
-        shared.lists.each(&unit.taken, |piece| {
-            records.extend_from_slice(piece);
-            Ok(true)
-        })?;
-        let root = self.chunk.in_order(records, frame, unit.key.level);
-        if !self.is_known(unit, own_of_root.len(), !nodes.is_empty(), &root) {
+        let nodes = if unit.is_above { all.children(unit.key) } else { all.below(unit.key) };
+        let in_root = all.own_points(unit.key) + unit.taken.count();
+        let points = in_root + nodes.iter().map(|node| u64::from(node.points)).sum::<u64>();
+        if points > shared.chunk_points || !follow_each_other(&nodes) {
             return Ok(None);
         }
+        let mut records = self.chunk.buffer();
         records.clear();
-        read(all.tree, &mut nodes, bytes)?;
-        let mut ranges = HashMap::with_capacity(nodes.len());
-        for node in &nodes {
-            let (start, at) = (records.len(), node.byte_offset as usize);
-            let Some(earlier) = all.get(node.key) else { return Ok(None) };
-            all.tree.records(earlier, &bytes[at..at + node.byte_size as usize], &mut scratch.points, records)?;
-            ranges.insert(node.key, start..records.len());
-            // nodes above have one of its points each, at most
-            let may_be_overfull = u64::from(node.points) + u64::from(node.key.level) > shared.plan.leaf_capacity.into();
-            if !unit.is_above
-                && may_be_overfull
-                && !all.has_children(node.key)
-                && is_one_place(records[start..].chunks_exact(stride).map(tree))
-            {
-                return Ok(None);
-            }
-        }
-        let mut written = Checksum::default();
-        written.add_all(records, stride);
-        let own = |key: NodeKey, out: &mut Vec<TreePoint>| {
+        all.records(unit.key, &mut scratch, &mut records)?;
+        let own_of_root: Vec<TreePoint> = records.chunks_exact(stride).map(tree).collect();
+        append(&shared.lists, &unit.taken, &mut records)?;
+        let root = self.chunk.in_order(&records, frame, unit.key.level);
+        let is_known = self.is_known(unit, own_of_root.len(), !nodes.is_empty(), &root);
+        let mut own = |key: NodeKey, out: &mut Vec<TreePoint>| {
             if key == unit.key {
                 out.extend_from_slice(&own_of_root);
-            } else if let Some(range) = ranges.get(&key) {
-                out.extend(records[range.clone()].chunks_exact(stride).map(tree));
+                return Ok(());
             }
+            records.clear();
+            all.records(key, &mut scratch, &mut records)?;
+            out.extend(records.chunks_exact(stride).map(tree));
             Ok(())
         };
-        let samples = earlier.samples_with(unit, own)?;
-        if samples.are_doubtful() {
-            return Ok(None);
-        }
-        let outer = samples.nodes.into_iter().map(|sample| (sample.key, sample.points)).collect();
-        Ok(Some(Decoded { nodes, root, outer, written }))
+        let found = if is_known && (unit.is_above || !has_crowded_leaf(earlier, &nodes, &mut own)?) {
+            let samples = earlier.samples_with(unit, own)?;
+            let outer =
+                |samples: Samples| samples.nodes.into_iter().map(|sample| (sample.key, sample.points)).collect();
+            (!samples.are_doubtful()).then(|| Found { nodes, root, outer: outer(samples) })
+        } else {
+            None
+        };
+        self.chunk.give_back(records);
+        Ok(found)
     }
 
     /// True if the root was what its points say: a leaf, or an inner node that has served all above it without taking a point
@@ -191,6 +181,43 @@ impl<E: Encoders> UnitBuilder<'_, E> {
             pairs.count >= ENOUGH_FOR_ALL_ANCESTORS
         })
     }
+}
+
+/// True if a leaf may have had more points than the capacity, in one place: nodes above have one of them each, at most. `own`:
+/// appends the points of a node.
+fn has_crowded_leaf(
+    earlier: &Earlier<'_>,
+    nodes: &[FinishedNode],
+    own: &mut impl FnMut(NodeKey, &mut Vec<TreePoint>) -> Result<(), ConvertError>,
+) -> Result<bool, ConvertError> {
+    let capacity = u64::from(earlier.shared.plan.leaf_capacity);
+    for node in nodes {
+        if u64::from(node.points) + u64::from(node.key.level) <= capacity || earlier.nodes.has_children(node.key) {
+            continue;
+        }
+        let mut points = Vec::new();
+        own(node.key, &mut points)?;
+        if is_one_place(points.into_iter()) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// The sum of records of which some, `of_root`, are not written yet.
+fn sum_of_others(records: &[u8], of_root: &[u8], stride: usize) -> Checksum {
+    let [mut all, mut root] = [Checksum::default(); 2];
+    all.add_all(records, stride);
+    root.add_all(of_root, stride);
+    all.remove(&root);
+    all
+}
+
+fn append(lists: &Lists, list: &List, records: &mut Vec<u8>) -> Result<(), ConvertError> {
+    lists.each(list, |piece| {
+        records.extend_from_slice(piece);
+        Ok(true)
+    })
 }
 
 /// True if no other bytes are between those of nodes in order.

@@ -199,11 +199,14 @@ impl NodeEncoder for PayloadEncoder<'_> {
         encode(&std::mem::take(&mut self.seen))
     }
 
-    fn notice(&mut self, records: &mut [u8]) {
+    fn notice(&mut self, records: &mut [u8], but_for: &mut [u8]) {
         // stored records are those of the dataset but for their positions, which nobody watches
-        if let Some((watch, _)) = &self.watch {
-            watch.look(records, self.layout.stored_stride, &mut self.seen);
-        }
+        let Some((watch, _)) = &self.watch else { return };
+        let [mut all, mut others] = [Seen::default(); 2];
+        watch.look(records, self.layout.stored_stride, &mut all);
+        watch.look(but_for, self.layout.stored_stride, &mut others);
+        self.seen.dark_points += all.dark_points.saturating_sub(others.dark_points);
+        self.seen.many_returns += all.many_returns.saturating_sub(others.many_returns);
     }
 
     fn row_bytes(&self) -> Option<u64> {
