@@ -164,7 +164,9 @@ fn an_append_that_ends_anywhere_is_gone_on_with() {
     let restore = || {
         let _ = fs::remove_dir_all(&out);
         fs::create_dir(&out).unwrap();
-        names(&base).iter().for_each(|name| drop(fs::copy(base.join(name), out.join(name)).unwrap()));
+        for name in names(&base) {
+            fs::copy(base.join(&name), out.join(&name)).unwrap();
+        }
     };
     let mut corner = Las::terrain(3000, 1);
     let least = |a: usize| corner.points.iter().map(|point| point.xyz[a]).min().unwrap();

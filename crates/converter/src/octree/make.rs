@@ -82,7 +82,7 @@ impl<S: Sinks> Making<'_, S> {
             Work::Subtree(chunks) => {
                 if let Some(earlier) = self.earlier {
                     match builder.take_subtree(earlier, index, chunks, buffers, wait)? {
-                        Taken::Over(unit) => return Ok(Some(unit)),
+                        Taken::Over(unit) => return Ok(Some(*unit)),
                         Taken::Stopped => return Ok(None),
                         Taken::Not(unused) => buffers = unused,
                     }
@@ -93,7 +93,7 @@ impl<S: Sinks> Making<'_, S> {
                 let roots = self.committer.take(children)?;
                 if let Some(earlier) = self.earlier {
                     match builder.take_above(earlier, index, &roots, buffers)? {
-                        Taken::Over(unit) => return Ok(Some(unit)),
+                        Taken::Over(unit) => return Ok(Some(*unit)),
                         Taken::Stopped => return Ok(None),
                         Taken::Not(unused) => buffers = unused,
                     }

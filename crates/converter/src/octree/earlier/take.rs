@@ -18,7 +18,7 @@ use crate::octree::unit::{BuiltUnit, Outer, UnitBuilder};
 
 /// What became of a unit.
 pub(in crate::octree) enum Taken {
-    Over(BuiltUnit),
+    Over(Box<BuiltUnit>),
     /// It is to be built; its buffers.
     Not(Vec<Vec<u8>>),
     /// It is not needed any more.
@@ -112,7 +112,7 @@ impl<E: Encoders> UnitBuilder<'_, E> {
         let run = Run { nodes, bytes, in_place: None };
         let mut root = Pending { is_inner, ..Pending::leaf(unit.key, List::of_chunk(root, stride)) };
         shared.lists.admit(&mut root.points)?;
-        Ok(Taken::Over(BuiltUnit {
+        Ok(Taken::Over(Box::new(BuiltUnit {
             pieces: if is_inner { vec![Piece::Nodes(vec![run])] } else { Vec::new() },
             root: Some(root),
             ledger: Ledger::default(),
@@ -122,7 +122,7 @@ impl<E: Encoders> UnitBuilder<'_, E> {
             outer,
             file: None,
             is_taken_over: true,
-        }))
+        })))
     }
 
     /// Finds a unit again. `None`: its nodes do not say what it was, or it has more points than fit into memory.
