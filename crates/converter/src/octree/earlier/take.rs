@@ -2,8 +2,8 @@
 
 use pointmill_format::NodeKey;
 
-use super::Earlier;
 use super::division::{EarlierUnit, is_one_place};
+use super::known::Earlier;
 use super::nodes::Scratch;
 use super::samples::Samples;
 use crate::cloud::{Checksum, Cloud, Ledger, TreePoint};
