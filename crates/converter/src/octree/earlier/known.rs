@@ -78,7 +78,7 @@ impl<'a> Earlier<'a> {
         let order = in_order(subtrees.map(|unit| Subtree { key: unit.key, chunks: Vec::new() }).collect());
         let units: Vec<EarlierUnit> = order.iter().filter_map(|unit| found.remove(&unit.key)).collect();
         if units.len() != order.len() || !found.is_empty() {
-            return Err(ConvertError::Internal("the units of an earlier tree have no order".into()));
+            return Ok(Err(BuiltAnew::Units));
         }
         let by_key = units.iter().enumerate().map(|(i, unit)| (unit.key, i)).collect();
         let new_by_key = new.iter().enumerate().map(|(i, unit)| (unit.key, i)).collect();
