@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use serde::{Deserialize, Serialize};
 
 use super::segments::Segment;
+use super::widening::Group;
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
 
@@ -62,8 +63,19 @@ pub(crate) struct SafeBlock {
     sum: u32,
 }
 
+impl SafeBlock {
+    /// How many records of `stride` bytes it has; `None`: it cannot be a block of one of so many sources.
+    pub(crate) fn records(&self, stride: usize, sources: usize) -> Option<u32> {
+        let is_one = self.offset.checked_add(self.bytes).is_some_and(|end| end >> OFFSET_BITS == 0)
+            && self.bytes.is_multiple_of(stride as u64)
+            && Group(self.source).is_among(sources);
+        u32::try_from(self.bytes / stride as u64).ok().filter(|_| is_one)
+    }
+}
+
 struct Block {
     source: u32,
+    records: u32,
     /// Records that were not taken yet, once for each use.
     remaining: u64,
     place: Place,
@@ -177,16 +189,22 @@ impl Store {
         self.adopt_at(safe, number << OFFSET_BITS)
     }
 
+    /// True if it can be a block of such records.
+    pub(crate) fn can_hold(&self, block: &SafeBlock) -> bool {
+        block.records(self.stride, usize::MAX).is_some()
+    }
+
     fn adopt_at(&self, safe: &[SafeBlock], start: u64) -> Result<u32, ConvertError> {
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let mut kept = self.kept.lock().map_err(|_| poisoned())?;
         let first = blocks.len() as u32;
         for &SafeBlock { source, offset, bytes, sum } in safe {
-            let remaining = bytes / self.stride as u64 * u64::from(self.uses);
+            let records = (bytes / self.stride as u64) as u32; // [`SafeBlock::records`] was asked
+            let remaining = u64::from(records) * u64::from(self.uses);
             if self.is_kept {
                 kept.push(Kept { bytes, sum, copy: None, is_unseen: start == 0 });
             }
-            blocks.push(Block { source, remaining, place: Place::Disk { offset: start + offset } });
+            blocks.push(Block { source, records, remaining, place: Place::Disk { offset: start + offset } });
         }
         Ok(first)
     }
@@ -263,7 +281,7 @@ impl Store {
         if self.is_kept {
             self.kept.lock().map_err(|_| poisoned())?.push(Kept::default());
         }
-        blocks.push(Block { source, remaining: 0, place: Place::Gone });
+        blocks.push(Block { source, records: 0, remaining: 0, place: Place::Gone });
         Ok((blocks.len() - 1) as u32)
     }
 
@@ -291,13 +309,13 @@ impl Store {
             self.spill(records)?
         };
         records.clear();
-        let remaining = bytes / self.stride as u64 * u64::from(uses);
+        let count = (bytes / self.stride as u64) as u32;
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         if self.is_kept {
             self.kept.lock().map_err(|_| poisoned())?[block as usize] = Kept { bytes, sum, ..Kept::default() };
         }
         let slot = &mut blocks[block as usize];
-        (slot.remaining, slot.place) = (remaining, place);
+        (slot.records, slot.remaining, slot.place) = (count, u64::from(count) * u64::from(uses), place);
         Ok(())
     }
 
@@ -378,7 +396,9 @@ impl Store {
     pub(crate) fn read(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
         let (place, source) = {
             let blocks = self.blocks.lock().map_err(|_| poisoned())?;
-            let block = &blocks[segment.block as usize];
+            let block = blocks.get(segment.block as usize).filter(|block| segment.end() <= u64::from(block.records));
+            let beyond = || ConvertError::Internal("records that no block has".into());
+            let block = block.ok_or_else(beyond)?;
             (block.place.clone(), block.source)
         };
         let (start, len) = (segment.start as usize * self.stride, segment.count as usize * self.stride);

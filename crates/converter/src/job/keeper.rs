@@ -35,26 +35,28 @@ impl Build<'_> {
         self.units.is_some_and(|units| units.shared().is_some())
     }
 
-    /// How the work is divided: as `divide` says, or as another process that shares it has said.
+    /// How the work is divided: as `divide` says, or as another process that shares it has said, if that `can_be`.
     pub(crate) fn divided<T: Serialize + DeserializeOwned>(
         &self,
+        can_be: impl FnOnce(&T) -> bool,
         divide: impl FnOnce() -> Result<T, ConvertError>,
     ) -> Result<T, ConvertError> {
         let name = self.units.map_or_else(String::new, |units| units.division());
-        settled(self.units.map(|units| units.keeper), &name, &self.cloud.store, divide)
+        settled(self.units.map(|units| units.keeper), &name, &self.cloud.store, can_be, divide)
     }
 }
 
 /// A result of settling by its name, where several processes share a job; anywhere else what `make` makes. `store`: where it puts
-/// records.
+/// records; `can_be`: whether what another process has said can be of this cloud.
 pub(crate) fn settled<T: Serialize + DeserializeOwned>(
     keeper: Option<Keeper<'_>>,
     name: &str,
     store: &Store,
+    can_be: impl FnOnce(&T) -> bool,
     make: impl FnOnce() -> Result<T, ConvertError>,
 ) -> Result<T, ConvertError> {
     match keeper.and_then(Keeper::shared) {
-        Some(job) => job.settled(name, store, make),
+        Some(job) => job.settled_in(name, store, None, can_be, make),
         None => make(),
     }
 }
@@ -65,6 +67,14 @@ impl<'a> Keeper<'a> {
         match self {
             Self::Shared(_) => Ok(()),
             Self::Own(job) => job.part_with_output(),
+        }
+    }
+
+    /// True if others have read records: nobody has looked whether they lie where that says.
+    pub(crate) fn is_of_others(self) -> bool {
+        match self {
+            Self::Shared(_) => true,
+            Self::Own(job) => job.recalled() > 0,
         }
     }
 
@@ -95,6 +105,11 @@ impl<'a> GroupUnits<'a> {
     /// The same, of a group that is divided into these: what a run has kept that divided it otherwise is not found.
     pub(crate) fn divided(self, units: &impl Serialize) -> Result<Self, ConvertError> {
         Ok(Self { mark: crc32c::crc32c(&super::encode(units)?), ..self })
+    }
+
+    /// As [`Keeper::is_of_others`].
+    pub(crate) fn is_of_others(&self) -> bool {
+        self.keeper.is_of_others()
     }
 
     /// The name of a unit.

@@ -97,6 +97,7 @@ fn build_for<S: Sinks>(build: Build<'_>, settings: OctreeSettings, sinks: &S) ->
             most_points,
             unit_points: unit_points.min(cloud.points()),
             usual_points,
+            is_of_others: kept.is_some_and(|of| of.is_of_others()),
         },
         rt,
         lists: Lists::new(cloud.frame.stride, &rt.memory, &rt.temp),

@@ -10,6 +10,7 @@ use pointmill_format::batches::{
 use serde::{Deserialize, Serialize};
 
 use super::frame::refused;
+use super::unit_check::is_whole;
 use crate::cloud::{Segment, Store};
 use crate::error::ConvertError;
 use crate::outputs::recovery::{Lost, Recovery};
@@ -94,6 +95,36 @@ pub(super) struct Part {
     fragments: Vec<(u32, Vec<Fragment>)>,
     /// First storage index and number of entries.
     originals: Vec<(u32, u32)>,
+}
+
+impl Part {
+    /// True if it can be of a task of so many points in these pieces.
+    pub(super) fn can_be_of(&self, pieces: &[Piece], points: u64, layout: &Layout) -> bool {
+        let is_found = |found: &Found| {
+            let is_piece = |piece: &Piece| piece.batch == found.batch && is_whole(piece, layout);
+            layout.slot(found.batch).0 == found.slot && found.errors.points <= points && pieces.iter().any(is_piece)
+        };
+        let is_fragment = |batch: u32, Fragment { start, relative }: &Fragment| {
+            let is_piece = |piece: &Piece| {
+                (piece.batch, piece.start) == (batch, *start)
+                    && relative.iter().all(|axis| axis.len() == piece.range.len())
+                    && !is_whole(piece, layout)
+            };
+            pieces.iter().any(is_piece)
+        };
+        let mut fragments = self.fragments.iter().flat_map(|(batch, all)| all.iter().map(|one| (*batch, one)));
+        let count = self.found.len() + fragments.clone().count();
+        count == pieces.len()
+            && self.found.iter().all(is_found)
+            && fragments.all(|(batch, one)| is_fragment(batch, one))
+            && self.lost.points <= points
+            && self.lost.merged <= points
+    }
+
+    /// Of the originals: of pieces, the first storage index and the number of entries.
+    pub(super) fn originals(&self) -> &[(u32, u32)] {
+        &self.originals
+    }
 }
 
 /// Points of one task in one batch.

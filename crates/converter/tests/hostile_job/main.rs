@@ -1,0 +1,106 @@
+//! Jobs that lie, with the right checksums: an error of one line, or all points; no panic, no memory for what is only claimed, no
+//! work without end. `fuzz/fuzz_targets/job.rs` does the same for longer.
+
+mod left_job;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+use left_job::{JOBS, LARGE, LeftJob, PartName};
+use pointmill_testkit::Random;
+use pointmill_testkit::damage::{hit, peak_memory_bytes, rounds};
+
+/// More than any of these runs takes on a machine that does other work, too.
+const LONGEST: Duration = Duration::from_secs(30);
+
+/// Changes a part of a job: lengths and counts, most often, which are numbers of 7 bits a byte.
+fn lie(part: &mut Vec<u8>, random: &mut Random) {
+    let at = random.index(part.len());
+    if random.below(3) == 0 {
+        return hit(part, at, random);
+    }
+    let number = random.pick(&[0, 1, 2, 127, 128, 255, 1 << 20, u64::from(u32::MAX), 1 << 40, u64::MAX / 2, u64::MAX]);
+    let was = 1 + part[at..].iter().take_while(|byte| **byte >= 128).count();
+    let (mut number, mut bytes) = (number, Vec::new());
+    while number >= 128 {
+        bytes.push(number as u8 | 128);
+        number >>= 7;
+    }
+    bytes.push(number as u8);
+    part.splice(at..(at + was).min(part.len()), bytes);
+}
+
+/// Lets parts of a job lie. Returns how often it was refused, ended in other bytes than those of one run, and in these.
+fn let_lie(kind: usize, seed: u64, times: u64) -> [u64; 3] {
+    let dir = tempfile::tempdir().unwrap();
+    let job = LeftJob::of(kind, dir.path(), 700);
+    let parts: Vec<PartName> = job.parts().into_iter().filter(|part| !job.part(part).is_empty()).collect();
+    let (mut random, mut ends) = (Random::new(seed), [0; 3]);
+    for round in 0..times {
+        let changed: Vec<(PartName, Vec<u8>)> = (0..1 + random.below(2))
+            .map(|_| {
+                let name = parts[random.index(parts.len())].clone();
+                let mut bytes = job.part(&name).to_vec();
+                lie(&mut bytes, &mut random);
+                (name, bytes)
+            })
+            .collect();
+        let begun = Instant::now();
+        let ended = catch_unwind(AssertUnwindSafe(|| job.go_on(&job.with(&changed))));
+        let names: Vec<&PartName> = changed.iter().map(|(name, _)| name).collect();
+        let Ok(ended) = ended else { panic!("kind {kind}, round {round}: {names:?}") };
+        assert!(begun.elapsed() < LONGEST, "kind {kind}, round {round}: {names:?}: {:?}", begun.elapsed());
+        let end = match ended {
+            Err(_) => 0,
+            Ok((_, false)) => 1,
+            Ok((_, true)) => 2,
+        };
+        ends[end] += 1;
+    }
+    ends
+}
+
+#[test]
+fn parts_of_jobs_that_lie_are_refused_or_do_no_harm() {
+    for kind in 0..JOBS {
+        let times = rounds(12).div_ceil(if LARGE.contains(&kind) { 4 } else { 1 });
+        let [refused, other, plain] = let_lie(kind, 40 + kind as u64, times);
+        println!("kind {kind}: {refused} were refused, {plain} had the bytes of one run, {other} others");
+        assert!(refused + plain > 0, "kind {kind}");
+    }
+    if let Some(peak) = peak_memory_bytes() {
+        assert!(peak < 400 << 20, "{peak} bytes");
+    }
+}
+
+/// A unit that keeps back where some of its bytes are: they would stay as they are in the file, or be missing.
+#[test]
+fn a_unit_that_leaves_out_a_place_is_built_again() {
+    for kind in [0, 6, 8, 10, 12].into_iter().filter(|_| cfg!(unix)) {
+        let dir = tempfile::tempdir().unwrap();
+        let job = LeftJob::of(kind, dir.path(), 700);
+        let (whole, _) = job.go_on(&job.with(&[])).unwrap();
+        let unit = job.parts().into_iter().find(|(file, part)| file.starts_with("build-") && *part == 3).unwrap();
+        let mut places = job.part(&unit).to_vec();
+        let count = usize::from(kind > 6); // behind the mark of what may be missing
+        assert!((1..128).contains(&places[count]), "kind {kind}: {} places", places[count]);
+        places[count] -= 1;
+        let (report, is_plain) = job.go_on(&job.with(&[(unit, places)])).unwrap();
+        assert!(is_plain && report.recalled_units + 1 == whole.recalled_units, "kind {kind}");
+    }
+}
+
+/// Found by the fuzzer: what a journal says of the run before was quoted with its line ends.
+#[test]
+fn an_error_is_one_line_whatever_the_journal_says() {
+    let dir = tempfile::tempdir().unwrap();
+    let job = LeftJob::of(0, dir.path(), 700);
+    let name = ("journal".to_owned(), 0);
+    let whole = job.part(&name).to_vec();
+    let path = whole.windows(5).position(|bytes| bytes == b"1.las").unwrap();
+    for at in [2, 8, path] {
+        let mut bytes = whole.clone();
+        bytes[at] = b'\n';
+        assert!(job.go_on(&job.with(&[(name.clone(), bytes)])).is_err(), "byte {at}");
+    }
+}
