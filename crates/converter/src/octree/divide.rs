@@ -34,7 +34,8 @@ impl Subtree {
     /// True if these can be all of a cloud with so many points: where others have divided it, nobody has looked.
     fn can_be_of(subtrees: &[Self], points: u64) -> bool {
         let keys = |chunks: &[Chunk]| chunks.iter().map(|chunk| chunk.key).collect::<Vec<_>>();
-        let is_subtree = |subtree: &Self| !subtree.chunks.is_empty() && are_in_order(keys(&subtree.chunks), subtree.key);
+        let is_subtree =
+            |subtree: &Self| !subtree.chunks.is_empty() && are_in_order(keys(&subtree.chunks), subtree.key);
         let chunks = || subtrees.iter().flat_map(|subtree| &subtree.chunks);
         are_in_order(subtrees.iter().map(|subtree| subtree.key), NodeKey::ROOT)
             && subtrees.iter().all(is_subtree)

@@ -1,106 +1,26 @@
 //! What a job holds for others to go on with, to be changed and given its checksums again: for the tests here and for the fuzz
 //! target, which includes this file.
 
+#[path = "job_file.rs"]
+mod job_file;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use job_file::JobFile;
 use pointmill_converter::{
-    BatchesSettings, BintreeSettings, Checkpoint, ConvertError, CopcSettings, Disk, DiskOperation, Plan,
+    BatchesSettings, BintreeSettings, Checkpoint, ConvertError, CopcSettings, Disk, DiskOperation, JobFault, Plan,
     Potree1Settings, Potree2Settings, Report, Silent, Target, convert, convert_on, finish_job, job_units, plan_job,
     run_units,
 };
 use pointmill_format::bintree::Layout;
 use pointmill_format::{OpenOptions, Wanted, open_scan};
-use pointmill_testkit::damage::{u32_at, u64_at};
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 use pointmill_testkit::reader;
-
-const MAGIC: usize = 16;
-/// Before a payload of a journal; behind the table of a unit; an entry of this table.
-const HEAD: usize = 12;
-const TAIL: usize = 28;
-const ENTRY: usize = 20;
-
-/// A file of a job. Parts have checksums in it.
-#[derive(Clone)]
-pub(crate) enum JobFile {
-    /// What has none, or none that a forger would need.
-    Plain(Vec<u8>),
-    Journal(Vec<Vec<u8>>),
-    Unit {
-        sections: Vec<Vec<u8>>,
-        label: [u8; 4],
-    },
-}
-
-impl JobFile {
-    fn of(bytes: Vec<u8>) -> Self {
-        if bytes.starts_with(b"pointmill job 1\n") {
-            let (mut rest, mut payloads) = (&bytes[MAGIC..], Vec::new());
-            while !rest.is_empty() {
-                let (payload, others) = rest[HEAD..].split_at(u32_at(rest, 0) as usize);
-                payloads.push(payload.to_vec());
-                rest = others;
-            }
-            return Self::Journal(payloads);
-        }
-        if !bytes.starts_with(b"pointmill unit 1") {
-            return Self::Plain(bytes);
-        }
-        let tail = bytes.len() - TAIL;
-        let table = &bytes[tail - u32_at(&bytes, tail) as usize..tail];
-        let section = |entry: &[u8]| {
-            let [start, length] = [0, 8].map(|at| u64_at(entry, at) as usize);
-            bytes[start..start + length].to_vec()
-        };
-        let label = bytes[tail + 8..tail + 12].try_into().unwrap();
-        Self::Unit { sections: table.chunks(ENTRY).map(section).collect(), label }
-    }
-
-    fn parts(&self) -> &[Vec<u8>] {
-        match self {
-            Self::Plain(_) => &[],
-            Self::Journal(parts) | Self::Unit { sections: parts, .. } => parts,
-        }
-    }
-
-    fn parts_mut(&mut self) -> &mut [Vec<u8>] {
-        match self {
-            Self::Plain(_) => &mut [],
-            Self::Journal(parts) | Self::Unit { sections: parts, .. } => parts,
-        }
-    }
-
-    /// The file, with the right lengths and checksums.
-    fn bytes(&self) -> Vec<u8> {
-        let sum = |bytes: &[u8]| crc32c::crc32c(bytes).to_le_bytes();
-        match self {
-            Self::Plain(bytes) => bytes.clone(),
-            Self::Journal(payloads) => {
-                let mut file = b"pointmill job 1\n".to_vec();
-                for payload in payloads {
-                    let head = [(payload.len() as u32).to_le_bytes(), sum(payload)].concat();
-                    file.extend([&head[..], &sum(&head), payload].concat());
-                }
-                file
-            }
-            Self::Unit { sections, label } => {
-                let (mut file, mut table) = (b"pointmill unit 1".to_vec(), Vec::new());
-                for section in sections {
-                    table.extend([file.len() as u64, section.len() as u64].map(u64::to_le_bytes).concat());
-                    table.extend(sum(section));
-                    file.extend(section);
-                }
-                let tail = [&(table.len() as u32).to_le_bytes()[..], &sum(&table), label, b"pointmill unit 1"].concat();
-                [file, table, tail].concat()
-            }
-        }
-    }
-}
 
 /// Kinds of jobs: outputs, each of a job that a run has left, and of one that processes share.
 pub(crate) const JOBS: usize = 16;
@@ -108,6 +28,9 @@ pub(crate) const JOBS: usize = 16;
 /// Of the kinds, those whose tree has several units: they have so many more points.
 pub(crate) const LARGE: [usize; 2] = [2, 3];
 const LARGER: usize = 16;
+
+/// No job takes more rounds of doing what is open: each does a unit, or finds one that is to be done again.
+const MOST_ROUNDS: usize = 30;
 
 /// Points of a task of binary trees and batches: there are several.
 const TASK_POINTS: u64 = 400;
@@ -141,6 +64,16 @@ impl Disk for Ending {
             false => Err(std::io::ErrorKind::StorageFull.into()),
         }
     }
+}
+
+/// What an output is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Made {
+    /// Its bytes are those of one run.
+    Plain,
+    /// Its points are.
+    SamePoints,
+    Other,
 }
 
 /// A job, the run or the processes of which have ended when all was read and built, but nothing was put together.
@@ -207,8 +140,8 @@ impl LeftJob {
             return None;
         }
         self.plan.resume = true;
-        let (report, is_plain) = self.go_on(&files).unwrap();
-        assert!(is_plain, "ended at operation {at}");
+        let (report, made) = self.go_on(&files).unwrap();
+        assert_eq!(made, Made::Plain, "ended at operation {at}");
         (report.recalled_units > 0).then_some(files)
     }
 
@@ -219,21 +152,45 @@ impl LeftJob {
         (disk.asked.load(Ordering::Relaxed), is_ended)
     }
 
-    /// Does all units.
+    /// Does all units of a new job; of a tree with several, that at the top is left to be done again.
     fn share(&self) -> BTreeMap<String, JobFile> {
         let folder = self.folder();
-        let mut known = plan_job(&self.plan, &self.targets, &folder, &Silent).unwrap();
-        while !known.complete {
+        plan_job(&self.plan, &self.targets, &folder, &Silent).unwrap();
+        self.do_units().unwrap();
+        let mut files = files_of(&folder);
+        fs::remove_dir_all(folder).unwrap();
+        let number = |name: &str| name.strip_prefix("units/build-0-").and_then(|number| number.parse().ok());
+        if let Some(top) = files.keys().filter_map(|name| number(name)).max().filter(|top: &u32| *top > 0) {
+            files.remove(&format!("units/build-0-{top}"));
+        }
+        files
+    }
+
+    /// Does the units of the job that are not done.
+    fn do_units(&self) -> Result<(), ConvertError> {
+        let folder = self.folder();
+        for _ in 0..MOST_ROUNDS {
+            let known = job_units(&self.plan, &self.targets, &folder, &Silent)?;
+            if known.complete {
+                return Ok(());
+            }
             let ready: Vec<_> = known.ready().map(|unit| unit.name).collect();
             assert!(!ready.is_empty(), "{known:?}");
-            known = run_units(&self.plan, &self.targets, &folder, &ready, None, &Silent).unwrap();
-            if known.units.iter().all(|unit| unit.done) {
-                known = job_units(&self.plan, &self.targets, &folder, &Silent).unwrap();
+            run_units(&self.plan, &self.targets, &folder, &ready, None, &Silent)?;
+        }
+        panic!("the units of a job do not come to an end");
+    }
+
+    /// Does the units of the job that are not done, or turn out not to be, and puts all together.
+    fn finish(&self) -> Result<Report, ConvertError> {
+        for _ in 0..MOST_ROUNDS {
+            self.do_units()?;
+            match finish_job(&self.plan, &self.targets, &self.folder(), &Silent, &|_| Ok(())) {
+                Err(ConvertError::Job(JobFault::Unfinished { .. })) => {}
+                ended => return ended,
             }
         }
-        let files = files_of(&folder);
-        fs::remove_dir_all(folder).unwrap();
-        files
+        panic!("a job does not come to an end");
     }
 
     fn folder(&self) -> PathBuf {
@@ -268,31 +225,28 @@ impl LeftJob {
         files
     }
 
-    /// Goes on with these files. Nothing is left of it. Also returns whether the output had the bytes of one run.
+    /// Goes on with these files. Nothing is left of it. Also returns what the output was.
     ///
     /// # Errors
     /// As the run.
     ///
     /// # Panics
-    /// The error is no line, or points of the output are not those of the scans.
-    pub(crate) fn go_on(&self, files: &BTreeMap<String, JobFile>) -> Result<(Report, bool), ConvertError> {
+    /// The error is no line, there is half an output, or the sums of its points are not those of the scans.
+    pub(crate) fn go_on(&self, files: &BTreeMap<String, JobFile>) -> Result<(Report, Made), ConvertError> {
         self.write(files);
         let folder = self.folder();
         let ended = match self.is_shared {
-            true => finish_job(&self.plan, &self.targets, &folder, &Silent, &|_| Ok(())),
+            true => self.finish(),
             false => convert(&self.plan, &self.targets, &Silent),
         };
         let ended = ended.map(|report| {
-            let is_plain = dataset(&self.plan.output) == self.plain.0;
-            (report, is_plain)
+            let made = self.made(&report);
+            (report, made)
         });
-        match &ended {
-            Ok((report, is_plain)) => self.check(report, *is_plain),
-            Err(error) => {
-                let line = error.to_string();
-                assert!(!line.is_empty() && !line.contains('\n'), "{line}");
-                assert!(!self.plan.output.exists(), "{line}: and there is an output");
-            }
+        if let Err(error) = &ended {
+            let line = error.to_string();
+            assert!(!line.is_empty() && !line.contains('\n'), "{line}");
+            assert!(!self.plan.output.exists(), "{line}: and there is an output");
         }
         for left in [folder, self.plan.output.clone()].iter().filter(|left| left.exists()) {
             fs::remove_dir_all(left).unwrap();
@@ -300,13 +254,16 @@ impl LeftJob {
         ended
     }
 
-    /// Whatever is said of them, all points are in the output, as they were.
-    fn check(&self, report: &Report, is_plain: bool) {
+    fn made(&self, report: &Report) -> Made {
         let sums = |report: &Report| -> Vec<(u64, String)> {
             report.outputs.iter().map(|output| (output.points, output.checksum.clone())).collect()
         };
         assert_eq!(sums(report), sums(&self.plain.1));
-        assert!(is_plain || points_of(&self.plan.output) == self.plain.2, "other points");
+        match dataset(&self.plan.output) == self.plain.0 {
+            true => Made::Plain,
+            false if points_of(&self.plan.output) == self.plain.2 => Made::SamePoints,
+            false => Made::Other,
+        }
     }
 
     fn write(&self, files: &BTreeMap<String, JobFile>) {

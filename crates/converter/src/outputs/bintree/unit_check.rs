@@ -29,9 +29,9 @@ pub(super) fn can_be_of(said: &Said<Place, Built>, task: &Task, stride: u64, is_
     }
     parts.sort_unstable_by_key(|(place, _)| place.first_point());
     // each where the one before ends: all points, and none twice
-    let end = parts.iter().try_fold(task.start, |next, (place, bytes)| {
-        (place.first_point() == next).then_some(next + bytes / stride)
-    });
+    let end = parts
+        .iter()
+        .try_fold(task.start, |next, (place, bytes)| (place.first_point() == next).then_some(next + bytes / stride));
     end == Some(task.start + points)
         && in_place().all(|(place, at)| place.offset(stride, is_packed) == at.offset)
         && ledger.can_be_of(points)
