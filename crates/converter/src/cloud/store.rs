@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex};
 use serde::{Deserialize, Serialize};
 
 use super::segments::Segment;
-use super::widening::Group;
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
 
@@ -64,11 +63,10 @@ pub(crate) struct SafeBlock {
 }
 
 impl SafeBlock {
-    /// How many records of `stride` bytes it has; `None`: it cannot be a block of one of so many sources.
-    pub(crate) fn records(&self, stride: usize, sources: usize) -> Option<u32> {
+    /// How many records of `stride` bytes it has; `None`: it cannot be a block of such records.
+    pub(crate) fn records(&self, stride: usize) -> Option<u32> {
         let is_one = self.offset.checked_add(self.bytes).is_some_and(|end| end >> OFFSET_BITS == 0)
-            && self.bytes.is_multiple_of(stride as u64)
-            && Group(self.source).is_among(sources);
+            && self.bytes.is_multiple_of(stride as u64);
         u32::try_from(self.bytes / stride as u64).ok().filter(|_| is_one)
     }
 }
@@ -191,7 +189,7 @@ impl Store {
 
     /// True if it can be a block of such records.
     pub(crate) fn can_hold(&self, block: &SafeBlock) -> bool {
-        block.records(self.stride, usize::MAX).is_some()
+        block.records(self.stride).is_some()
     }
 
     fn adopt_at(&self, safe: &[SafeBlock], start: u64) -> Result<u32, ConvertError> {
@@ -199,7 +197,7 @@ impl Store {
         let mut kept = self.kept.lock().map_err(|_| poisoned())?;
         let first = blocks.len() as u32;
         for &SafeBlock { source, offset, bytes, sum } in safe {
-            let records = (bytes / self.stride as u64) as u32; // [`SafeBlock::records`] was asked
+            let records = (bytes / self.stride as u64) as u32; // fits: who read it has asked [`SafeBlock::records`]
             let remaining = u64::from(records) * u64::from(self.uses);
             if self.is_kept {
                 kept.push(Kept { bytes, sum, copy: None, is_unseen: start == 0 });

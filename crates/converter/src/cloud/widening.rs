@@ -14,11 +14,6 @@ impl Group {
     pub(crate) const fn of_source(index: usize) -> Self {
         Self(index as u32 + 2)
     }
-
-    /// True if it can be one of so many sources.
-    pub(crate) fn is_among(self, sources: usize) -> bool {
-        (self.0 as usize) < sources.saturating_add(2)
-    }
 }
 
 /// Which stored colours are 8 bits deep.

@@ -130,17 +130,19 @@ impl<'a> Pass<'a> {
         let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
         let group = || group(&grouper, &partition, collected, stats.points, &mut room);
         self.keeper.and_then(Keeper::shared).map_or(Ok(()), |job| job.enter(pass, stats.points))?;
-        let can_be = |(cells, counted): &(Vec<Cell>, Vec<CensusCell>)| {
+        let (cells, counted) = settled(self.keeper, "cells", &store, |_| true, group)?;
+        // whoever has made them: what they were made from may lie, too
+        if self.keeper.is_some_and(Keeper::is_of_others) {
             let is_cell = |cell: &Cell| {
                 let own = frame.cube.bounds_of(cell.key);
                 let meets = (0..3).all(|a| own.min[a] <= bounds.max[a] && bounds.min[a] <= own.max[a]);
                 meets && (!wants_moments || cell.moments.can_be_of(cell.points, &bounds))
             };
-            Cell::can_be_of(cells, stats.points)
-                && CensusCell::can_be_of(counted, stats.points)
-                && cells.iter().all(is_cell)
-        };
-        let (cells, counted) = settled(self.keeper, "cells", &store, can_be, group)?;
+            let can_be = Cell::can_be_of(&cells, stats.points) && CensusCell::can_be_of(&counted, stats.points);
+            if !can_be || !cells.iter().all(is_cell) {
+                return Err(ConvertError::Internal("cells that are none of the cloud".into()));
+            }
+        }
         let census = Census { cells: counted, bounds: HashMap::new() };
         let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
         room.resize(of_cells + (census.cells.capacity() * size_of::<CensusCell>()) as u64)?;

@@ -5,7 +5,6 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::context::{Collected, Context};
-use super::unit_check::Found;
 use crate::cloud::{SafeBlock, SourceStats, Stats};
 use crate::error::ConvertError;
 use crate::job::{Job, SharedJob, UnitReader};
@@ -24,16 +23,16 @@ pub(super) struct Unit {
 
 /// A unit as a job keeps it.
 #[derive(Serialize, Deserialize)]
-struct Kept {
+pub(super) struct Kept {
     /// Of the pairs of pieces.
-    pairs: Range<usize>,
-    stats: Stats,
+    pub(super) pairs: Range<usize>,
+    pub(super) stats: Stats,
     /// Segments count blocks from the first of the unit.
-    collected: Collected,
-    seen: Vec<(u32, SourceStats)>,
-    blocks: Vec<SafeBlock>,
+    pub(super) collected: Collected,
+    pub(super) seen: Vec<(u32, SourceStats)>,
+    pub(super) blocks: Vec<SafeBlock>,
     /// The pass has been misled, in this unit or before.
-    misled: bool,
+    pub(super) misled: bool,
 }
 
 /// The same that is written, which needs nothing of its own.
@@ -163,12 +162,6 @@ pub(super) fn recall_shared(
 }
 
 impl Kept {
-    /// True if it can be what this run would make of these pairs.
-    fn can_be_of(&self, context: &Context<'_>, pairs: &Range<usize>) -> bool {
-        let Self { pairs: of, stats, collected, seen, blocks, misled } = self;
-        *of == *pairs && Found { stats, collected, seen, blocks, misled: *misled }.can_be_of(context)
-    }
-
     /// The unit, whose blocks have got numbers from `first` on.
     fn taken(self, context: &Context<'_>, first: u32) -> Result<Unit, ConvertError> {
         let Self { stats, mut collected, seen, misled, .. } = self;
