@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
+use super::frames::StoredPoint;
+use super::record::position;
 use super::segments::Segment;
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
@@ -41,6 +43,8 @@ pub(crate) struct Store {
     spill: Mutex<Option<Arc<DiskFile>>>,
     spilled: AtomicU64,
     adopted: Mutex<Adopted>,
+    /// Where all records lie, if others have read some of them and nobody has looked.
+    limits: OnceLock<[StoredPoint; 2]>,
 }
 
 /// Files of other processes, which are only read.
@@ -129,6 +133,7 @@ impl Store {
             spill: Mutex::new(file.map(Arc::new)),
             spilled: AtomicU64::new(0),
             adopted: Mutex::default(),
+            limits: OnceLock::new(),
         })
     }
 
@@ -172,8 +177,10 @@ impl Store {
 
     /// Takes blocks that another run has made safe in the store's own file; returns the number of the first.
     pub(crate) fn adopt(&self, safe: &[SafeBlock]) -> Result<u32, ConvertError> {
+        // what is read next goes behind them, and not behind what they only claim
+        let length = self.spill_file()?.len("looking at the records")?;
         safe.iter().for_each(|block| {
-            self.spilled.fetch_max(block.offset + block.bytes, Ordering::Relaxed);
+            self.spilled.fetch_max((block.offset + block.bytes).min(length), Ordering::Relaxed);
         });
         self.adopt_at(safe, 0)
     }
@@ -185,6 +192,11 @@ impl Store {
         let number = adopted.paths.len() as u64;
         drop(adopted);
         self.adopt_at(safe, number << OFFSET_BITS)
+    }
+
+    /// From now on records must lie between these: others have said where they are.
+    pub(crate) fn expect_within(&self, limits: [StoredPoint; 2]) {
+        let _ = self.limits.set(limits); // once, of a pass
     }
 
     /// True if it can be a block of such records.
@@ -399,7 +411,8 @@ impl Store {
             let block = block.ok_or_else(beyond)?;
             (block.place.clone(), block.source)
         };
-        let (start, len) = (segment.start as usize * self.stride, segment.count as usize * self.stride);
+        let (start, len, before) =
+            (segment.start as usize * self.stride, segment.count as usize * self.stride, out.len());
         match place {
             Place::Memory(bytes) => out.extend_from_slice(&bytes[start..start + len]),
             Place::Disk { offset } => {
@@ -410,6 +423,12 @@ impl Store {
                 self.read_disk(&mut out[at..], offset + start as u64, "reading the spill file")?;
             }
             Place::Gone => return Err(ConvertError::Internal("a record was taken twice".into())),
+        }
+        if let Some([min, max]) = self.limits.get() {
+            let is_within = |q: StoredPoint| (0..3).all(|a| (min[a]..=max[a]).contains(&q[a]));
+            if !out[before..].chunks_exact(self.stride).map(position).all(is_within) {
+                return Err(ConvertError::Internal("a record outside of the bounds of all points".into()));
+            }
         }
         Ok(source)
     }

@@ -127,12 +127,16 @@ impl<'a> Pass<'a> {
             _ => return Ok(PassEnd::Misled(Box::new(stats))),
         };
         let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
+        let is_of_others = self.keeper.is_some_and(Keeper::is_of_others);
+        if is_of_others {
+            store.expect_within([bounds.min, bounds.max].map(|corner| frame.origin.stored(corner)));
+        }
         let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
         let group = || group(&grouper, &partition, collected, stats.points, &mut room);
         self.keeper.and_then(Keeper::shared).map_or(Ok(()), |job| job.enter(pass, stats.points))?;
         let (cells, counted) = settled(self.keeper, "cells", &store, |_| true, group)?;
         // whoever has made them: what they were made from may lie, too
-        if self.keeper.is_some_and(Keeper::is_of_others) {
+        if is_of_others {
             let is_cell = |cell: &Cell| {
                 let own = frame.cube.bounds_of(cell.key);
                 let meets = (0..3).all(|a| own.min[a] <= bounds.max[a] && bounds.min[a] <= own.max[a]);

@@ -102,9 +102,14 @@ impl<'a> GroupUnits<'a> {
         Self { keeper, group, mark: 0 }
     }
 
-    /// The same, of a group that is divided into these: what a run has kept that divided it otherwise is not found.
-    pub(crate) fn divided(self, units: &impl Serialize) -> Result<Self, ConvertError> {
-        Ok(Self { mark: crc32c::crc32c(&super::encode(units)?), ..self })
+    /// The same, of a group that is divided into these: what a run has kept that divided it otherwise, or took the cloud for another
+    /// one, is not found.
+    pub(crate) fn divided(self, cloud: &Cloud<'_>, units: &impl Serialize) -> Result<Self, ConvertError> {
+        let Cloud { lattice, frame, stats, facts, census, .. } = cloud;
+        let of_all = (lattice.lattice, &frame.cube, frame.origin, stats.bounds, stats.checksum);
+        let facts = format!("{:?}", (of_all, &facts.ranges, &facts.relations, &facts.widening));
+        let mark = super::encode(&(facts, &census.cells, units))?;
+        Ok(Self { mark: crc32c::crc32c(&mark), ..self })
     }
 
     /// As [`Keeper::is_of_others`].

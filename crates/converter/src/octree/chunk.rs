@@ -66,8 +66,7 @@ impl ChunkMemory {
     /// True if all points lie in a node.
     fn is_within(&self, node: NodeKey) -> bool {
         let (shift, cell) = (TREE_BITS - u32::from(node.level), xyz(node));
-        let apart = |p: &Point| (0..3).fold(0, |apart, a| apart | (p.t.0[a] >> shift ^ cell[a]));
-        self.points.iter().fold(0, |all, p| all | apart(p)) == 0
+        self.points.iter().all(|p| p.t.cell(shift) == cell)
     }
 
     /// Builds the nodes of the chunk that was loaded; returns its root, and the number of leaves above the capacity.

@@ -88,7 +88,7 @@ fn build_for<S: Sinks>(build: Build<'_>, settings: OctreeSettings, sinks: &S) ->
     let chunk_points = division.chunk_points;
     let units = units::in_order(std::mem::take(&mut division.subtrees));
     let all: Vec<_> = units.iter().map(|unit| (unit.key, unit.points())).collect();
-    let kept = kept.map(|kept| kept.divided(&all)).transpose()?;
+    let kept = kept.map(|kept| kept.divided(cloud, &all)).transpose()?;
     let usual_points = chunk_points.min(cloud.points());
     let shared = Shared {
         plan: ChunkPlan {

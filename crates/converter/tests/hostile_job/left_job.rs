@@ -17,7 +17,7 @@ use pointmill_converter::{
     run_units,
 };
 use pointmill_format::bintree::Layout;
-use pointmill_format::{OpenOptions, Wanted, open_scan};
+use pointmill_format::{OpenOptions, ReadError, Wanted, open_scan};
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 use pointmill_testkit::reader;
@@ -115,7 +115,7 @@ impl LeftJob {
         (plan.memory_bytes, plan.name, plan.task_points) = (400 << 20, "cloud".into(), Some(TASK_POINTS));
         let plain = Plan { checkpoint: Checkpoint::Never, output: folder.join("plain"), ..plan.clone() };
         let report = convert(&plain, &targets, &Silent).unwrap();
-        let plain = (dataset(&plain.output), report, points_of(&plain.output));
+        let plain = (dataset(&plain.output), report, points_of(&plain.output).unwrap());
         Self { plan, targets, is_shared, files: BTreeMap::new(), is_octree, holds_bytes, plain }
     }
 
@@ -261,7 +261,7 @@ impl LeftJob {
         assert_eq!(sums(report), sums(&self.plain.1));
         match dataset(&self.plan.output) == self.plain.0 {
             true => Made::Plain,
-            false if points_of(&self.plan.output) == self.plain.2 => Made::SamePoints,
+            false if points_of(&self.plan.output).is_ok_and(|points| points == self.plain.2) => Made::SamePoints,
             false => Made::Other,
         }
     }
@@ -276,10 +276,10 @@ impl LeftJob {
 }
 
 /// The points of a dataset, in no order: positions in millimetres, and all attributes.
-fn points_of(folder: &Path) -> Vec<Vec<i128>> {
-    let scan = open_scan(folder, &OpenOptions::default()).unwrap();
-    let cloud = reader::read(scan.as_ref(), &Wanted::all(scan.info()));
-    assert!(cloud.errors.is_empty(), "{:?}", cloud.errors);
+fn points_of(folder: &Path) -> Result<Vec<Vec<i128>>, ReadError> {
+    let scan = open_scan(folder, &OpenOptions::default())?;
+    let mut cloud = reader::read(scan.as_ref(), &Wanted::all(scan.info()));
+    cloud.errors.pop().map_or(Ok(()), Err)?;
     let (scale, offset) = cloud.info.lattice.map_or(([1.0; 3], [0.0; 3]), |l| (l.scale, l.offset));
     let steps = |a: usize| cloud.xyz[a].iter().map(|v| ((v * scale[a] + offset[a]) * 1000.0).round() as i128).collect();
     let mut columns: Vec<Vec<i128>> = (0..3).map(steps).collect();
@@ -288,7 +288,7 @@ fn points_of(folder: &Path) -> Vec<Vec<i128>> {
     let row = |i: usize| columns.iter().flat_map(|c| c[i * elements(c)..(i + 1) * elements(c)].to_vec()).collect();
     let mut rows: Vec<Vec<i128>> = (0..cloud.len()).map(row).collect();
     rows.sort_unstable();
-    rows
+    Ok(rows)
 }
 
 /// All files of a folder, by their path in it.

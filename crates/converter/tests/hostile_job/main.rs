@@ -5,14 +5,14 @@ mod left_job;
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::{Duration, Instant};
 
 use left_job::{JOBS, LARGE, LeftJob, Made, PartName};
 use pointmill_testkit::Random;
-use pointmill_testkit::damage::{hit, peak_memory_bytes, rounds};
+use pointmill_testkit::damage::{hit, peak_memory_bytes, processor_seconds, rounds};
+use pointmill_testkit::las::Las;
 
-/// More than any of these runs takes on a machine that does other work, too.
-const LONGEST: Duration = Duration::from_secs(30);
+/// Processor seconds: more than any of these runs takes, and others beside it.
+const LONGEST: f64 = 60.0;
 
 /// Changes a part of a job: lengths and counts, most often, which are numbers of 7 bits a byte.
 fn lie(part: &mut Vec<u8>, random: &mut Random) {
@@ -22,21 +22,32 @@ fn lie(part: &mut Vec<u8>, random: &mut Random) {
     }
     let number = random.pick(&[0, 1, 2, 127, 128, 255, 1 << 20, u64::from(u32::MAX), 1 << 40, u64::MAX / 2, u64::MAX]);
     let was = 1 + part[at..].iter().take_while(|byte| **byte >= 128).count();
-    let (mut number, mut bytes) = (number, Vec::new());
+    part.splice(at..(at + was).min(part.len()), varint(number));
+}
+
+/// A number as files of jobs have it: 7 bits a byte.
+fn varint(mut number: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
     while number >= 128 {
         bytes.push(number as u8 | 128);
         number >>= 7;
     }
     bytes.push(number as u8);
-    part.splice(at..(at + was).min(part.len()), bytes);
+    bytes
 }
 
-/// Lets parts of a job lie. Returns how often it was refused, ended in the bytes of one run, and in others.
-fn let_lie(kind: usize, seed: u64, times: u64) -> [u64; 3] {
+/// Signed numbers as files of jobs have them.
+fn varints(numbers: [i64; 6]) -> Vec<u8> {
+    numbers.into_iter().flat_map(|n| varint((n << 1 ^ n >> 63).cast_unsigned())).collect()
+}
+
+/// Lets parts of a job lie. Returns how often it was refused, and ended in the bytes of one run, in other bytes of the same points,
+/// and in other points.
+fn let_lie(kind: usize, seed: u64, times: u64) -> [u64; 4] {
     let dir = tempfile::tempdir().unwrap();
     let job = LeftJob::of(kind, dir.path(), 700);
     let parts: Vec<PartName> = job.parts().into_iter().filter(|part| !job.part(part).is_empty()).collect();
-    let (mut random, mut ends) = (Random::new(seed), [0; 3]);
+    let (mut random, mut ends) = (Random::new(seed), [0; 4]);
     for round in 0..times {
         let changed: Vec<(PartName, Vec<u8>)> = (0..1 + random.below(2))
             .map(|_| {
@@ -46,19 +57,20 @@ fn let_lie(kind: usize, seed: u64, times: u64) -> [u64; 3] {
                 (name, bytes)
             })
             .collect();
-        let begun = Instant::now();
+        let begun = processor_seconds();
         let ended = catch_unwind(AssertUnwindSafe(|| job.go_on(&job.with(&changed))));
         let names: Vec<&PartName> = changed.iter().map(|(name, _)| name).collect();
         let Ok(ended) = ended else { panic!("kind {kind}, round {round}: {names:?}") };
-        assert!(begun.elapsed() < LONGEST, "kind {kind}, round {round}: {names:?}: {:?}", begun.elapsed());
+        let took = begun.zip(processor_seconds()).map_or(0.0, |(begun, end)| end - begun);
+        assert!(took < LONGEST, "kind {kind}, round {round}: {names:?}: {took} s");
         let end = match ended {
             Err(_) => 0,
             Ok((_, Made::Plain)) => 1,
             Ok((_, Made::SamePoints)) => 2,
-            // where nodes and batches are is what units say: nobody reads their points again
+            // where nodes and leaves are is what a unit that was built says: nobody reads its points again
             Ok((_, Made::Other)) => {
                 assert!(names.iter().any(|(file, _)| file.contains("build-")), "kind {kind}, round {round}: {names:?}");
-                2
+                3
             }
         };
         ends[end] += 1;
@@ -69,8 +81,10 @@ fn let_lie(kind: usize, seed: u64, times: u64) -> [u64; 3] {
 fn all_lie(kinds: Range<usize>) {
     for kind in kinds {
         let times = rounds(12).div_ceil(if LARGE.contains(&kind) { 4 } else { 1 });
-        let [refused, plain, other] = let_lie(kind, 40 + kind as u64, times);
-        println!("kind {kind}: {refused} were refused, {plain} had the bytes of one run, {other} others");
+        let [refused, plain, same, other] = let_lie(kind, 100 * times + kind as u64, times);
+        println!(
+            "kind {kind}: {refused} refused, {plain} the bytes of one run, {same} the same points, {other} others"
+        );
         assert!(refused + plain > 0, "kind {kind}");
     }
     if let Some(peak) = peak_memory_bytes() {
@@ -119,6 +133,38 @@ fn a_unit_that_leaves_out_a_place_is_built_again() {
         }
         // of batches, some may have been changed at the end of the run before
         assert!(again == all && all > 0, "kind {kind}: {again} of {all}");
+    }
+}
+
+/// Found by the fuzzer: cells lay outside of the bounds of all points.
+#[test]
+fn bounds_that_do_not_hold_the_points_are_refused() {
+    let bounds = |seed: u64| {
+        let las = Las::terrain(700, seed);
+        let steps = |corner: [f64; 3]| [0, 1, 2].map(|a| ((corner[a] - las.offset[a]) / las.scale[a]).round() as i64);
+        let [[a, b, c], [d, e, f]] = las.bounds().map(steps);
+        [a, b, c, d, e, f]
+    };
+    for kind in [0, 1, 4, 5, 6, 7, 8, 9, 14, 15] {
+        let dir = tempfile::tempdir().unwrap();
+        let job = LeftJob::of(kind, dir.path(), 700);
+        let lying = |seed: u64, change: fn([i64; 6]) -> [i64; 6]| {
+            let (was, says) = (varints(bounds(seed)), varints(change(bounds(seed))));
+            let at = |part: &PartName| job.part(part).windows(was.len()).position(|bytes| bytes == was);
+            let (part, at) = job.parts().into_iter().find_map(|part| Some((part.clone(), at(&part)?))).unwrap();
+            let mut bytes = job.part(&part).to_vec();
+            bytes.splice(at..at + was.len(), says);
+            (part, bytes)
+        };
+        let changes: [fn([i64; 6]) -> [i64; 6]; 3] = [
+            |[a, b, c, ..]| [a, b, c, a, b, c],
+            |[.., d, e, f]| [d, e, f, d, e, f],
+            |[a, b, c, d, e, f]| [a - 9_000_000, b - 9_000_000, c, d - 9_000_000, e - 9_000_000, f],
+        ];
+        for (i, change) in changes.into_iter().enumerate() {
+            let ended = job.go_on(&job.with(&[lying(1, change), lying(2, change)])).map(|(_, made)| made);
+            assert!(ended.is_err(), "kind {kind}, change {i}: {ended:?}");
+        }
     }
 }
 

@@ -162,7 +162,7 @@ impl Output for BatchesSettings {
             usual_points: task_points.min(points),
         };
         let division: Vec<_> = tasks.iter().map(|task| (task.first_point, task.points, task.start)).collect();
-        let units = units.map(|units| units.divided(&division)).transpose()?;
+        let units = units.map(|units| units.divided(cloud, &division)).transpose()?;
         let name = self.kind().marker_file();
         // what is compressed is written raw first, elsewhere
         let (made, raw) = match self.zstd_level {

@@ -131,7 +131,7 @@ impl Output for BintreeSettings {
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
         room.resize(upper.tasks.iter().map(upper::Task::bytes).sum())?;
         let division: Vec<_> = upper.tasks.iter().map(|task| (task.start, task.points())).collect();
-        let units = units.map(|units| units.divided(&division)).transpose()?;
+        let units = units.map(|units| units.divided(cloud, &division)).transpose()?;
         let make = Make { cloud, rt, settings: self, columns: &columns, tasks: &upper.tasks, task_points };
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
         if let Some(units) = units {

@@ -1,5 +1,6 @@
 //! Whether what a unit has left can be of its task: the nodes are a tree with its points, and the bytes belong to their leaves.
 
+use pointmill_format::Aabb;
 use pointmill_format::bintree::{MAX_DEPTH, Node, NodeKind};
 
 use super::files::Place;
@@ -63,17 +64,26 @@ fn leaves(nodes: &[Node], task: &Task, stride: Option<u64>) -> Option<Vec<Leaf>>
     coming.is_empty().then_some(leaves)
 }
 
-/// Points of nodes in preorder, if those above have as many as those below them.
+/// Points of nodes in preorder, if those above have as many as those below them, and the box around theirs.
 fn sum(nodes: &[Node]) -> Option<u64> {
-    let mut roots: Vec<u64> = Vec::new();
+    let mut roots: Vec<(u64, Aabb)> = Vec::new();
     for node in nodes.iter().rev() {
-        if !node.is_leaf() {
-            let below = roots.pop()?.checked_add(roots.pop()?)?;
-            if below != node.count {
-                return None;
+        let is_sound = match node.kind {
+            // an offset from the center, which lies between the extremes, is rounded to the same side of it
+            NodeKind::Leaf { center, .. } => is_finite(&node.bounds) && node.bounds.contains(center),
+            NodeKind::Inner { .. } | NodeKind::Degenerate { .. } => {
+                let [(low, low_box), (high, high_box)] = [roots.pop()?, roots.pop()?];
+                low.checked_add(high) == Some(node.count) && low_box.union(&high_box) == node.bounds
             }
+        };
+        if !is_sound {
+            return None;
         }
-        roots.push(node.count);
+        roots.push((node.count, node.bounds));
     }
-    roots.pop().filter(|_| roots.is_empty())
+    roots.pop().filter(|_| roots.is_empty()).map(|(points, _)| points)
+}
+
+fn is_finite(bounds: &Aabb) -> bool {
+    bounds.min.iter().chain(&bounds.max).all(|v| v.is_finite())
 }
