@@ -130,7 +130,7 @@ mod tests {
         };
         let next = NodeKey { z: 2, ..key };
         assert!(Cell::can_be_of(&[cell(key, 5), cell(next, 5)], 10));
-        for others in [[next, key], [key, key], [key, key.parent().unwrap()], [key.parent().unwrap(), next]] {
+        for others in [[next, key], [key, key], [key, key.parent().unwrap()], [key.parent().unwrap(), key]] {
             assert!(!Cell::can_be_of(&others.map(|key| cell(key, 5)), 10), "{others:?}");
         }
         let outside = NodeKey { x: 4, ..key };
