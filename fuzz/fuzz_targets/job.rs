@@ -10,7 +10,8 @@ use std::sync::OnceLock;
 
 use left_job::{JOBS, LeftJob, PartName};
 
-const POINTS: usize = 300;
+/// Of a scan: enough for a tree of several units.
+const POINTS: usize = 700;
 
 fn job(kind: usize) -> &'static LeftJob {
     static ALL: [OnceLock<LeftJob>; JOBS] = [const { OnceLock::new() }; JOBS];

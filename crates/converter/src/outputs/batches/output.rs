@@ -10,7 +10,6 @@ use pointmill_format::batches::{
 use serde::{Deserialize, Serialize};
 
 use super::frame::refused;
-use super::unit_check::is_whole;
 use crate::cloud::{Segment, Store};
 use crate::error::ConvertError;
 use crate::outputs::recovery::{Lost, Recovery};
@@ -101,14 +100,14 @@ impl Part {
     /// True if it can be of a task of so many points in these pieces.
     pub(super) fn can_be_of(&self, pieces: &[Piece], points: u64, layout: &Layout) -> bool {
         let is_found = |found: &Found| {
-            let is_piece = |piece: &Piece| piece.batch == found.batch && is_whole(piece, layout);
+            let is_piece = |piece: &Piece| piece.batch == found.batch && piece.is_whole(layout);
             layout.slot(found.batch).0 == found.slot && found.errors.points <= points && pieces.iter().any(is_piece)
         };
         let is_fragment = |batch: u32, Fragment { start, relative }: &Fragment| {
             let is_piece = |piece: &Piece| {
                 (piece.batch, piece.start) == (batch, *start)
                     && relative.iter().all(|axis| axis.len() == piece.range.len())
-                    && !is_whole(piece, layout)
+                    && !piece.is_whole(layout)
             };
             pieces.iter().any(is_piece)
         };
@@ -136,6 +135,13 @@ pub(super) struct Piece {
     pub(super) start: u32,
     /// Its points, counted from the first of the task.
     pub(super) range: std::ops::Range<usize>,
+}
+
+impl Piece {
+    /// True if it has all points of its batch.
+    pub(super) fn is_whole(&self, layout: &Layout) -> bool {
+        self.range.len() == batch_points(self.batch, layout.points) as usize
+    }
 }
 
 /// The pieces of a task.

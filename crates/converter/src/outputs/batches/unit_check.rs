@@ -1,6 +1,6 @@
 //! Whether what a unit has left can be of its task: every number that others look something up by.
 
-use pointmill_format::batches::{BATCH_POINTS, Layout, Part as Of, PointSection, batch_points};
+use pointmill_format::batches::{BATCH_POINTS, Layout, Part as Of, PointSection};
 
 use super::buckets::Task;
 use super::lod::{Edges, OpenCell};
@@ -23,7 +23,7 @@ pub(super) fn can_be_of(said: &Said<u64, CameTo>, index: usize, task: &Task, lay
 
 /// True if these are the bytes of all pieces and no others: colours and attributes, and planes where a batch is whole.
 fn are_bytes_of(said: &Said<u64, CameTo>, pieces: &[Piece], layout: &Layout) -> bool {
-    let is_there = |of: Of, piece: &Piece| matches!(of, Of::Colour | Of::Attribute(_)) || is_whole(piece, layout);
+    let is_there = |of: Of, piece: &Piece| matches!(of, Of::Colour | Of::Attribute(_)) || piece.is_whole(layout);
     let place = |PointSection { section, bytes_per_point, .. }: PointSection, piece: &Piece| {
         let first = layout.slot(piece.batch).1 + piece.start;
         (Layout::point_offset(section, bytes_per_point, first), bytes_per_point * piece.range.len() as u64)
@@ -72,9 +72,4 @@ fn are_originals(of_pieces: &[(u32, u32)], entries: &[u8], pieces: &[Piece], lay
         entries = others;
     }
     rest.is_empty() && entries.is_empty()
-}
-
-/// True if the task has all points of a batch.
-pub(super) fn is_whole(piece: &Piece, layout: &Layout) -> bool {
-    piece.range.len() == batch_points(piece.batch, layout.points) as usize
 }

@@ -7,7 +7,6 @@ use std::sync::{Mutex, PoisonError};
 use pointmill_format::bintree::{Layout, PACKED_FILE, leaf_file_name};
 use serde::{Deserialize, Serialize};
 
-use super::unit_check::Leaf;
 use crate::error::ConvertError;
 use crate::job::{self, InPlace};
 use crate::outputs::staging::{OutputFile, StagedDataset};
@@ -47,6 +46,14 @@ pub(super) struct Place {
     start: u64,
     /// Points of the leaf before this part.
     from: u64,
+}
+
+/// A leaf, as the nodes tell.
+pub(super) struct Leaf {
+    pub(super) path: Vec<bool>,
+    /// Points in the leaves before it, and its own.
+    pub(super) start: u64,
+    pub(super) points: u64,
 }
 
 impl Place {

@@ -3,18 +3,10 @@
 use pointmill_format::Aabb;
 use pointmill_format::bintree::{MAX_DEPTH, Node, NodeKind};
 
-use super::files::Place;
+use super::files::{Leaf, Place};
 use super::subtree::Built;
 use super::upper::Task;
 use crate::job::Said;
-
-/// A leaf, as the nodes tell.
-pub(super) struct Leaf {
-    pub(super) path: Vec<bool>,
-    /// Points in the leaves before it, and its own.
-    pub(super) start: u64,
-    pub(super) points: u64,
-}
 
 /// True if it can be of the task. `stride`: bytes of a point; `is_packed`: all leaves are in one file.
 pub(super) fn can_be_of(said: &Said<Place, Built>, task: &Task, stride: u64, is_packed: bool) -> bool {
