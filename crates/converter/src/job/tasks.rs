@@ -111,16 +111,17 @@ fn check<P: DeserializeOwned>(unit: &UnitReader, output: Option<&dyn InPlace<P>>
 }
 
 /// Does those units that are to be done here, and leaves them in their files. `points`: of each; `output`: if their bytes are put
-/// there at once; `make`: fills the file of one.
+/// there at once; `make`: fills the file of one, with what `begin` gives each thread.
 ///
 /// # Errors
 /// If units of the job are done one by one, how far all of them are: nothing is left to do here then.
-pub(crate) fn make_units<P: DeserializeOwned>(
+pub(crate) fn make_units<P: DeserializeOwned, S>(
     of: GroupUnits<'_>,
     points: &[u64],
     output: Option<&dyn InPlace<P>>,
     rt: &Runtime<'_>,
-    make: impl Fn(usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
+    begin: impl Fn() -> S + Sync,
+    make: impl Fn(&mut S, usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
 ) -> Result<(), ConvertError> {
     let is_wanted = |i: usize| -> Result<bool, ConvertError> {
         Ok(of.in_parts().is_none_or(|job| job.wants(of.name(i))) && !of.is_done(i, |unit| check(unit, output))?)
@@ -142,13 +143,13 @@ pub(crate) fn make_units<P: DeserializeOwned>(
     of.count_recalled(points.len() - wanted.len());
     rt.in_parallel(
         wanted.len(),
-        || (),
-        |(), i| {
-            of.keep(wanted[i], |file| make(wanted[i], file))?;
+        begin,
+        |state, i| {
+            of.keep(wanted[i], |file| make(state, wanted[i], file))?;
             rt.advance(points[wanted[i]]);
             Ok(())
         },
-        |()| (),
+        |_| (),
     )?;
     let Some(job) = of.in_parts() else { return Ok(()) };
     let listed = points.iter().enumerate().map(|(i, points)| of.listed(job, i, *points, Vec::new()));

@@ -235,21 +235,28 @@ impl Means<'_> {
     fn units(&self, units: GroupUnits<'_>, tasks: &[Task], kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = tasks.iter().map(|task| task.points).collect();
         let output = kept.as_ref().map(|kept| kept as &dyn InPlace<u64>);
-        make_units(units, &points, output, self.rt, |index, file| {
-            let log = UnitLog::begin(file, output);
-            let came_to: (TaskResults, Part, Vec<u8>) = {
-                let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
-                let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
-                let output = BatchFile::new(To::Unit(&put), self.layout, self.originals(), recovery, origin);
-                let shop = self.shop(&output);
-                let mut worker = Worker::new(&shop);
-                worker.run(index, &tasks[index])?;
-                let results = worker.finish();
-                let (part, originals) = output.take_part()?;
-                (results, part, originals)
-            };
-            log.end(&came_to)
-        })
+        make_units(
+            units,
+            &points,
+            output,
+            self.rt,
+            || (),
+            |(), index, file| {
+                let log = UnitLog::begin(file, output);
+                let came_to: (TaskResults, Part, Vec<u8>) = {
+                    let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
+                    let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
+                    let output = BatchFile::new(To::Unit(&put), self.layout, self.originals(), recovery, origin);
+                    let shop = self.shop(&output);
+                    let mut worker = Worker::new(&shop);
+                    worker.run(index, &tasks[index])?;
+                    let results = worker.finish();
+                    let (part, originals) = output.take_part()?;
+                    (results, part, originals)
+                };
+                log.end(&came_to)
+            },
+        )
     }
 
     /// Takes what all units of a job came to.

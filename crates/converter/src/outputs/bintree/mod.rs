@@ -22,6 +22,7 @@ mod subtree;
 mod upper;
 
 use std::io::BufWriter;
+use std::mem::take;
 
 use pointmill_format::bintree::{CORE_BYTES, Header, INDEX_FILE, IndexWriter, Layout, Node};
 use pointmill_format::{AttributeType, DatasetKind, Deviations};
@@ -33,7 +34,7 @@ use self::assemble::{assemble, figures};
 use self::files::{Leaves, Place};
 use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
-use self::subtree::{Builder, Built};
+use self::subtree::{Builder, Built, Room};
 use super::attributes::changed;
 use super::origin::own_key;
 use super::output::{DiskSize, Output, Target, Wants};
@@ -193,13 +194,15 @@ impl Make<'_> {
     fn units(&self, units: GroupUnits<'_>, output: Option<&dyn InPlace<Place>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = self.tasks.iter().map(upper::Task::points).collect();
         let (layout, stride) = (self.settings.layout, self.columns.record.stride());
-        make_units(units, &points, output, self.rt, |index, file| {
+        make_units(units, &points, output, self.rt, Room::default, |room, index, file| {
             let log = UnitLog::begin(file, output);
             let built = {
                 let put = |place: Place, records: &[u8]| log.put(place, records);
                 let leaves = Leaves::of_unit(layout, stride, &put);
-                let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves);
-                self.one(&mut builder, index)?
+                let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves, take(room));
+                let built = self.one(&mut builder, index);
+                *room = builder.room;
+                built?
             };
             log.end(&built)
         })
@@ -217,7 +220,7 @@ impl Make<'_> {
             tasks.len(),
             || {
                 (
-                    Builder::new(cloud, settings, columns, leaves),
+                    Builder::new(cloud, settings, columns, leaves, Room::default()),
                     Vec::new(),
                     Reservation::new(&rt.memory, Consumer::Nodes),
                 )
