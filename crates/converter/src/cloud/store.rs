@@ -22,6 +22,9 @@ const CHECK_BYTES: usize = 1 << 20;
 /// As many adopted files stay open.
 const MOST_OPEN: usize = 64;
 
+/// A page: smaller buffers are not worth being looked for. Of scans of a few points there are very many.
+const LEAST_SPARE: usize = 4 << 10;
+
 /// Blocks of records. A block holds records of one source and never changes; it is dropped once all of it was taken.
 pub(crate) struct Store {
     stride: usize,
@@ -353,11 +356,11 @@ impl Store {
     fn keep(&self, bytes: Arc<Vec<u8>>) -> Result<(), ConvertError> {
         let size = bytes.capacity() as u64;
         match Arc::try_unwrap(bytes) {
-            Ok(mut buffer) => {
+            Ok(mut buffer) if buffer.capacity() >= LEAST_SPARE => {
                 buffer.clear();
                 self.spare.lock().map_err(|_| poisoned())?.push(buffer);
             }
-            Err(_) => self.give(size),
+            _ => self.give(size),
         }
         Ok(())
     }
