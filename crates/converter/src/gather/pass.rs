@@ -195,7 +195,7 @@ impl<'a> Pass<'a> {
         unit.seen = self.context.take_touched()?;
         read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit, self.rt)?;
         if job.is_safe() {
-            self.rt.events().checkpoint(job.folder());
+            self.rt.events().checkpoint(Some(job.folder()));
         }
         Ok(unit)
     }
