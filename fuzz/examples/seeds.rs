@@ -4,6 +4,11 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+#[path = "../../crates/converter/tests/hostile_job/left_job.rs"]
+mod left_job;
+
+use left_job::{JOBS, LeftJob};
+
 fn main() -> io::Result<()> {
     let fuzz = Path::new(env!("CARGO_MANIFEST_DIR"));
     let fixtures = fuzz.join("../fixtures");
@@ -64,7 +69,8 @@ fn main() -> io::Result<()> {
             fs::copy(&path, corpus.join(name))?;
         }
     }
-    datasets(&fixtures, &fuzz.join("corpus/datasets"))
+    datasets(&fixtures, &fuzz.join("corpus/datasets"))?;
+    jobs(&fuzz.join("corpus/job"))
 }
 
 /// What the target writes to a folder: the kind, then files with their lengths, the last without.
@@ -91,6 +97,22 @@ fn datasets(fixtures: &Path, corpus: &Path) -> io::Result<()> {
             input.extend(bytes);
         }
         fs::write(corpus.join(format!("{}-{}", folder.replace('/', "-"), names[names.len() - 1])), input)?;
+    }
+    Ok(())
+}
+
+/// Each kind of job, and each of its parts as it is, unless it is very long. The journal's head is of no use to another job: it names the scans.
+fn jobs(corpus: &Path) -> io::Result<()> {
+    fs::create_dir_all(corpus)?;
+    for kind in 0..JOBS {
+        let folder = tempfile::tempdir()?;
+        let job = LeftJob::of(kind, folder.path(), 700);
+        for (number, part) in job.parts().iter().enumerate() {
+            let bytes = job.part(part);
+            let Ok(length) = u16::try_from(bytes.len()) else { continue };
+            let head = [&[kind as u8, number as u8][..], &length.to_le_bytes()].concat();
+            fs::write(corpus.join(format!("{kind}-{number}")), [&head, bytes].concat())?;
+        }
     }
     Ok(())
 }

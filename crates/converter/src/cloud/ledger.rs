@@ -50,6 +50,15 @@ impl Ledger {
         }
     }
 
+    /// True if it can be of so many points at most.
+    pub(crate) fn can_be_of(&self, points: u64) -> bool {
+        let classes = &self.classes_dropped;
+        let sums = [&self.written, &self.narrow, &self.wide, &self.dropped];
+        sums.into_iter().all(|sum| sum.count() <= points)
+            && (classes.is_empty() || classes.len() == 256)
+            && classes.iter().all(|dropped| *dropped <= self.dropped.count())
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         self.written.merge(&other.written);
         self.narrow.merge(&other.narrow);

@@ -26,7 +26,7 @@ mod store;
 mod widening;
 
 pub(crate) use big_sort::BigSort;
-pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, node, xyz};
+pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, add_up, are_in_order, lies_in, node, xyz};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{Cube, MOST_STEPS, TREE_BITS, high, tidy_world};
 pub(crate) use facts::Facts;

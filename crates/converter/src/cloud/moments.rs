@@ -19,6 +19,15 @@ impl Default for Moments {
 }
 
 impl Moments {
+    /// True if so many points within these bounds can have them.
+    pub(crate) fn can_be_of(&self, points: u64, all: &JobBounds) -> bool {
+        (0..3).all(|a| {
+            let (min, max, points) = (self.bounds.min[a], self.bounds.max[a], i128::from(points));
+            let is_inside = all.min[a] <= min && min <= max && max <= all.max[a];
+            is_inside && (i128::from(min) * points..=i128::from(max) * points).contains(&self.sum[a])
+        })
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         for a in 0..3 {
             self.sum[a] += other.sum[a];

@@ -19,6 +19,11 @@ impl Range {
         Self { min: vec![f64::INFINITY; elements], max: vec![f64::NEG_INFINITY; elements], has_non_finite: false }
     }
 
+    /// True if it can be of an attribute with so many elements.
+    pub(crate) fn can_be_of(&self, elements: usize) -> bool {
+        [self.min.len(), self.max.len()] == [elements; 2] && !self.min.iter().chain(&self.max).any(|v| v.is_nan())
+    }
+
     pub(crate) fn merge(&mut self, other: &Self) {
         for e in 0..self.min.len() {
             self.min[e] = self.min[e].min(other.min[e]);

@@ -26,7 +26,7 @@ pub(crate) enum Relation {
 }
 
 /// An attribute that can take part, and where its bytes are in a stored record.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 struct Place {
     attribute: usize,
     at: usize,
@@ -117,6 +117,25 @@ impl Relations {
         let pairs = (0..places.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
         let equal = pairs.filter(|(i, j)| places[*i].ty == places[*j].ty).collect();
         Self { is_constant: vec![true; places.len()], keys, equal, places, ..Self::default() }
+    }
+
+    /// True if it can be of points with these attributes.
+    pub(crate) fn can_be_of(&self, schema: &Schema) -> bool {
+        let count = self.places.len();
+        let is_numbered = |keys: &Keys, values: usize| {
+            let last = keys.last.map(|(_, number)| number);
+            keys.numbers.len() <= MOST_KEYS && keys.numbers.values().copied().chain(last).all(|n| n < values)
+        };
+        let is_table = |pair: &Pair| {
+            let keys = self.keys.get(pair.key);
+            pair.follower < count && keys.is_some_and(|keys| is_numbered(keys, pair.values.len()))
+        };
+        self.places == Self::new(schema).places
+            && [self.is_constant.len(), self.keys.len()] == [count; 2]
+            && self.keys.iter().all(|keys| is_numbered(keys, keys.numbers.len()))
+            && self.first.as_ref().is_none_or(|first| first.len() == count)
+            && self.equal.iter().all(|(i, j)| i < j && *j < count)
+            && self.pairs.iter().all(is_table)
     }
 
     /// Adds stored records of `stride` bytes.

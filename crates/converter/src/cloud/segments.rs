@@ -13,6 +13,11 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
+    /// The record of the block behind it.
+    pub(crate) fn end(&self) -> u64 {
+        u64::from(self.start) + u64::from(self.count)
+    }
+
     /// The same records in segments of at most `count`.
     pub(crate) fn split(self, count: u32) -> impl Iterator<Item = Self> {
         let part = move |at: u32| Self { start: self.start + at, count: count.min(self.count - at), ..self };
@@ -21,7 +26,7 @@ impl Segment {
 
     /// True if `next` begins where this ends.
     fn is_followed_by(&self, next: &Self) -> bool {
-        next.block == self.block && next.start == self.start + self.count
+        next.block == self.block && u64::from(next.start) == self.end()
     }
 }
 

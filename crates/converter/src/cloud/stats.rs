@@ -1,6 +1,6 @@
 //! What the pass over the points learns: bounds, ranges, counts and the checksum.
 
-use pointmill_format::{Aabb, Changes};
+use pointmill_format::{Aabb, Attribute, Changes};
 use serde::{Deserialize, Serialize};
 
 use super::checksum::Checksum;
@@ -161,10 +161,34 @@ impl SourceStats {
         other.changes.iter().enumerate().for_each(|(attribute, changes)| self.count_changes(attribute, changes));
     }
 
+    /// True if it can be of points with these attributes.
+    pub(crate) fn can_be_of(&self, schema: &Schema) -> bool {
+        let counts = [self.read, self.kept, self.at_origin];
+        counts.into_iter().all(is_count)
+            && self.kept.max(self.at_origin) <= self.read
+            && can_be_changes(&self.changes, schema)
+    }
+
     /// Adds to what changed of an attribute of the schema.
     pub(crate) fn count_changes(&mut self, attribute: usize, changes: &Changes) {
         count(&mut self.changes, attribute, changes);
     }
+}
+
+/// No unit has more points: sums of such counts fit.
+const MOST_POINTS: u64 = 1 << 48;
+
+fn is_count(count: u64) -> bool {
+    count <= MOST_POINTS
+}
+
+fn can_be_changes(changes: &[Changes], schema: &Schema) -> bool {
+    changes.len() <= schema.attributes.len() && changes.iter().all(are_counts)
+}
+
+fn are_counts(changes: &Changes) -> bool {
+    let Changes { clamped, rounded, not_finite, out_of_range, missing, .. } = *changes;
+    [clamped, rounded, not_finite, out_of_range, missing].into_iter().all(is_count)
 }
 
 fn count(all: &mut Vec<Changes>, attribute: usize, changes: &Changes) {
@@ -203,6 +227,36 @@ impl Stats {
             fallen_together: None,
             skipped: Vec::new(),
         }
+    }
+
+    /// True if it can be of points with these attributes, in a unit.
+    pub(crate) fn can_be_of(&self, schema: &Schema) -> bool {
+        let counts = [
+            self.points,
+            self.outside_bounds,
+            self.outliers,
+            self.other_class,
+            self.thinned,
+            self.invalid,
+            self.origin_skipped,
+            self.unreadable,
+            self.integers_lost,
+        ];
+        let skipped = self.skipped.iter().map(|skipped| skipped.points);
+        let is_range = |(range, a): (&Range, &Attribute)| range.can_be_of(a.elements);
+        let is_place = |a: usize| self.bounds.min[a] <= self.bounds.max[a];
+        let is_nowhere = self.points == 0 && self.bounds == JobBounds::EMPTY;
+        counts.into_iter().chain(skipped).all(is_count)
+            && (is_nowhere || (0..3).all(is_place))
+            && self.classes.len() == 256
+            && self.classes.iter().all(|points| *points <= self.points)
+            && self.ranges.len() == schema.attributes.len()
+            && self.ranges.iter().zip(&schema.attributes).all(is_range)
+            && are_counts(&self.odd_classes)
+            && can_be_changes(&self.doubled, schema)
+            && self.relations.as_ref().is_none_or(|relations| relations.can_be_of(schema))
+            && self.sources.is_empty()
+            && self.checksum.count() == self.points
     }
 
     /// Adds to the values of an attribute of the schema that doubles do not hold.

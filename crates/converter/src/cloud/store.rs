@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
+use super::frames::StoredPoint;
+use super::record::position;
 use super::segments::Segment;
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
@@ -43,6 +45,8 @@ pub(crate) struct Store {
     spill: Mutex<Option<Arc<DiskFile>>>,
     spilled: AtomicU64,
     adopted: Mutex<Adopted>,
+    /// Where all records lie, if others have read some of them and nobody has looked.
+    limits: OnceLock<[StoredPoint; 2]>,
 }
 
 /// Files of other processes, which are only read.
@@ -64,8 +68,18 @@ pub(crate) struct SafeBlock {
     sum: u32,
 }
 
+impl SafeBlock {
+    /// How many records of `stride` bytes it has; `None`: it cannot be a block of such records.
+    pub(crate) fn records(&self, stride: usize) -> Option<u32> {
+        let is_one = self.offset.checked_add(self.bytes).is_some_and(|end| end >> OFFSET_BITS == 0)
+            && self.bytes.is_multiple_of(stride as u64);
+        u32::try_from(self.bytes / stride as u64).ok().filter(|_| is_one)
+    }
+}
+
 struct Block {
     source: u32,
+    records: u32,
     /// Records that were not taken yet, once for each use.
     remaining: u64,
     place: Place,
@@ -123,6 +137,7 @@ impl Store {
             spill: Mutex::new(file.map(Arc::new)),
             spilled: AtomicU64::new(0),
             adopted: Mutex::default(),
+            limits: OnceLock::new(),
         })
     }
 
@@ -166,8 +181,10 @@ impl Store {
 
     /// Takes blocks that another run has made safe in the store's own file; returns the number of the first.
     pub(crate) fn adopt(&self, safe: &[SafeBlock]) -> Result<u32, ConvertError> {
+        // what is read next goes behind them, and not behind what they only claim
+        let length = self.spill_file()?.len("looking at the records")?;
         safe.iter().for_each(|block| {
-            self.spilled.fetch_max(block.offset + block.bytes, Ordering::Relaxed);
+            self.spilled.fetch_max((block.offset + block.bytes).min(length), Ordering::Relaxed);
         });
         self.adopt_at(safe, 0)
     }
@@ -181,16 +198,27 @@ impl Store {
         self.adopt_at(safe, number << OFFSET_BITS)
     }
 
+    /// From now on records must lie between these: others have said where they are.
+    pub(crate) fn expect_within(&self, limits: [StoredPoint; 2]) {
+        let _ = self.limits.set(limits); // once, of a pass
+    }
+
+    /// True if it can be a block of such records.
+    pub(crate) fn can_hold(&self, block: &SafeBlock) -> bool {
+        block.records(self.stride).is_some()
+    }
+
     fn adopt_at(&self, safe: &[SafeBlock], start: u64) -> Result<u32, ConvertError> {
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         let mut kept = self.kept.lock().map_err(|_| poisoned())?;
         let first = blocks.len() as u32;
         for &SafeBlock { source, offset, bytes, sum } in safe {
-            let remaining = bytes / self.stride as u64 * u64::from(self.uses);
+            let records = (bytes / self.stride as u64) as u32; // fits: who read it has asked [`SafeBlock::records`]
+            let remaining = u64::from(records) * u64::from(self.uses);
             if self.is_kept {
                 kept.push(Kept { bytes, sum, copy: None, is_unseen: start == 0 });
             }
-            blocks.push(Block { source, remaining, place: Place::Disk { offset: start + offset } });
+            blocks.push(Block { source, records, remaining, place: Place::Disk { offset: start + offset } });
         }
         Ok(first)
     }
@@ -267,7 +295,7 @@ impl Store {
         if self.is_kept {
             self.kept.lock().map_err(|_| poisoned())?.push(Kept::default());
         }
-        blocks.push(Block { source, remaining: 0, place: Place::Gone });
+        blocks.push(Block { source, records: 0, remaining: 0, place: Place::Gone });
         Ok((blocks.len() - 1) as u32)
     }
 
@@ -297,13 +325,13 @@ impl Store {
             self.spill(records)?
         };
         records.clear();
-        let remaining = bytes / self.stride as u64 * u64::from(uses);
+        let count = (bytes / self.stride as u64) as u32;
         let mut blocks = self.blocks.lock().map_err(|_| poisoned())?;
         if self.is_kept {
             self.kept.lock().map_err(|_| poisoned())?[block as usize] = Kept { bytes, sum, ..Kept::default() };
         }
         let slot = &mut blocks[block as usize];
-        (slot.remaining, slot.place) = (remaining, place);
+        (slot.records, slot.remaining, slot.place) = (count, u64::from(count) * u64::from(uses), place);
         Ok(())
     }
 
@@ -384,10 +412,13 @@ impl Store {
     pub(crate) fn read(&self, segment: Segment, out: &mut Vec<u8>) -> Result<u32, ConvertError> {
         let (place, source) = {
             let blocks = self.blocks.lock().map_err(|_| poisoned())?;
-            let block = &blocks[segment.block as usize];
+            let block = blocks.get(segment.block as usize).filter(|block| segment.end() <= u64::from(block.records));
+            let beyond = || ConvertError::Internal("records that no block has".into());
+            let block = block.ok_or_else(beyond)?;
             (block.place.clone(), block.source)
         };
-        let (start, len) = (segment.start as usize * self.stride, segment.count as usize * self.stride);
+        let (start, len, before) =
+            (segment.start as usize * self.stride, segment.count as usize * self.stride, out.len());
         match place {
             Place::Memory(bytes) => out.extend_from_slice(&bytes[start..start + len]),
             Place::Disk { offset } => {
@@ -398,6 +429,12 @@ impl Store {
                 self.read_disk(&mut out[at..], offset + start as u64, "reading the spill file")?;
             }
             Place::Gone => return Err(ConvertError::Internal("a record was taken twice".into())),
+        }
+        if let Some([min, max]) = self.limits.get() {
+            let is_within = |q: StoredPoint| (0..3).all(|a| (min[a]..=max[a]).contains(&q[a]));
+            if !out[before..].chunks_exact(self.stride).map(position).all(is_within) {
+                return Err(ConvertError::Internal("a record outside of the bounds of all points".into()));
+            }
         }
         Ok(source)
     }

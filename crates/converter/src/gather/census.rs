@@ -51,6 +51,13 @@ impl Counts {
         }
     }
 
+    /// True if it can be of so many points in cells of a level.
+    pub(super) fn can_be_of(&self, points: u64, level: u32) -> bool {
+        let all = self.counts.values().try_fold(0u64, |all, points| all.checked_add(*points));
+        let is_cell = |code: &u64| code >> (3 * (level - self.wider)) == 0;
+        self.wider <= level && all == Some(points) && self.counts.keys().all(is_cell)
+    }
+
     /// Memory that it takes, bytes.
     pub(super) fn bytes(&self) -> u64 {
         (self.counts.capacity() * (size_of::<(u64, u64)>() + 1)) as u64

@@ -27,6 +27,7 @@ mod places;
 mod ranges;
 mod read_unit;
 mod select;
+mod unit_check;
 mod visit;
 
 use std::sync::Arc;
@@ -43,7 +44,9 @@ pub(crate) use moved::is_more_than_rounding as moves;
 pub(crate) use select::select;
 pub(crate) use visit::{Reading, Visit};
 
-use crate::cloud::{Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats};
+use crate::cloud::{
+    Census, CensusCell, Cloud, Gathered, Intake, JobBounds, JobLattice, JobPoint, MOST_STEPS, SharedPlace, Stats,
+};
 use crate::error::{ConvertError, InputFault, Unsupported};
 use crate::job::{self, Keeper};
 use crate::plan::{OriginPoints, Outliers, Plan, ScaleChoice};
@@ -144,7 +147,8 @@ pub(crate) fn gather<'a>(
             (_, Some(mut gathered)) => {
                 if let Some(mark) = intake.mark {
                     let count = || fallen::count(&gathered, mark);
-                    let fallen = job::settled(keeper, "fallen", &gathered.store, count)?;
+                    let can_be = |fallen: &Option<u64>| fallen.is_none_or(|points| points <= gathered.stats.points);
+                    let fallen = job::settled(keeper, "fallen", &gathered.store, can_be, count)?;
                     gathered.stats.fallen_together = fallen;
                 }
                 if gathered.lattice.reason.is_forced_coarser() && !is_said {
@@ -169,7 +173,14 @@ fn find_shared_places(
     rt: &Runtime<'_>,
 ) -> Result<(), ConvertError> {
     let store = Arc::clone(&gathered.store);
-    (gathered.shared_places, gathered.census) = job::settled(keeper, "places", &store, || {
+    let points = gathered.stats.points;
+    let can_be = |(places, Census { cells, bounds }): &(Vec<SharedPlace>, Census)| {
+        let is_box = |place: &JobBounds| (0..3).all(|a| place.min[a] <= place.max[a]);
+        places.iter().all(|place| place.points <= points)
+            && CensusCell::can_be_of(cells, points)
+            && bounds.values().all(is_box)
+    };
+    (gathered.shared_places, gathered.census) = job::settled(keeper, "places", &store, can_be, || {
         let places = places::find(gathered, rt)?;
         Ok((places, std::mem::take(&mut gathered.census)))
     })?;

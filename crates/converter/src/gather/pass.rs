@@ -129,10 +129,26 @@ impl<'a> Pass<'a> {
             _ => return Ok(PassEnd::Misled(Box::new(stats))),
         };
         let frame = RecordFrame { stride: intake.schema.stride, cube, origin: partition.origin() };
+        let is_of_others = self.keeper.is_some_and(Keeper::is_of_others);
+        if is_of_others {
+            store.expect_within([bounds.min, bounds.max].map(|corner| frame.origin.stored(corner)));
+        }
         let grouper = Grouper { store: &store, frame: &frame, wants_moments, rt };
         let group = || group(&grouper, &partition, collected, stats.points, &mut room);
         self.keeper.and_then(Keeper::shared).map_or(Ok(()), |job| job.enter(pass, stats.points))?;
-        let (cells, counted) = settled(self.keeper, "cells", &store, group)?;
+        let (cells, counted) = settled(self.keeper, "cells", &store, |_| true, group)?;
+        // whoever has made them: what they were made from may lie, too
+        if is_of_others {
+            let is_cell = |cell: &Cell| {
+                let own = frame.cube.bounds_of(cell.key);
+                let meets = (0..3).all(|a| own.min[a] <= bounds.max[a] && bounds.min[a] <= own.max[a]);
+                meets && (!wants_moments || cell.moments.can_be_of(cell.points, &bounds))
+            };
+            let can_be = Cell::can_be_of(&cells, stats.points) && CensusCell::can_be_of(&counted, stats.points);
+            if !can_be || !cells.iter().all(is_cell) {
+                return Err(ConvertError::Internal("cells that are none of the cloud".into()));
+            }
+        }
         let census = Census { cells: counted, bounds: HashMap::new() };
         let of_cells = cells.iter().map(|cell| size_of::<Cell>() as u64 + cell.segments.bytes()).sum::<u64>();
         room.resize(of_cells + (census.cells.capacity() * size_of::<CensusCell>()) as u64)?;

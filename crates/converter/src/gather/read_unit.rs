@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::context::{Collected, Context};
 use crate::cloud::{SafeBlock, SourceStats, Stats};
 use crate::error::ConvertError;
-use crate::job::{Job, SharedJob};
+use crate::job::{Job, SharedJob, UnitReader};
 use crate::runtime::{Consumer, Reservation, Runtime};
 use crate::sources::Sources;
 use crate::unit_name::{Stage, UnitName};
@@ -23,16 +23,16 @@ pub(super) struct Unit {
 
 /// A unit as a job keeps it.
 #[derive(Serialize, Deserialize)]
-struct Kept {
+pub(super) struct Kept {
     /// Of the pairs of pieces.
-    pairs: Range<usize>,
-    stats: Stats,
+    pub(super) pairs: Range<usize>,
+    pub(super) stats: Stats,
     /// Segments count blocks from the first of the unit.
-    collected: Collected,
-    seen: Vec<(u32, SourceStats)>,
-    blocks: Vec<SafeBlock>,
+    pub(super) collected: Collected,
+    pub(super) seen: Vec<(u32, SourceStats)>,
+    pub(super) blocks: Vec<SafeBlock>,
     /// The pass has been misled, in this unit or before.
-    misled: bool,
+    pub(super) misled: bool,
 }
 
 /// The same that is written, which needs nothing of its own.
@@ -133,8 +133,11 @@ pub(super) fn recall(
     pairs: &Range<usize>,
 ) -> Result<Option<Unit>, ConvertError> {
     let Some(kept) = job.unit::<Kept>(context.pass, number)? else { return Ok(None) };
+    if !kept.can_be_of(context, pairs) {
+        return Err(job.damaged_unit(context.pass, number));
+    }
     let first = context.store.adopt(&kept.blocks)?;
-    kept.taken(context, pairs, first).map(Some)
+    kept.taken(context, first).map(Some)
 }
 
 /// The same for a job that several processes share. Its records are not looked at here: the sums of all points tell in the
@@ -146,20 +149,22 @@ pub(super) fn recall_shared(
     pairs: &Range<usize>,
 ) -> Result<Option<Unit>, ConvertError> {
     let unit = name(context.pass, number);
-    let Some((records, kept)) = job.recall(unit, |file| Ok((file.get::<String>(0)?, file.get::<Kept>(1)?)))? else {
-        return Ok(None);
+    let read = |file: &UnitReader| {
+        let (records, kept) = (file.get::<String>(0)?, file.get::<Kept>(1)?);
+        // a name, no path to elsewhere
+        let is_sound =
+            kept.can_be_of(context, pairs) && records.starts_with(&unit.to_string()) && !records.contains('/');
+        if is_sound { Ok((records, kept)) } else { Err(file.damaged(0)) }
     };
+    let Some((records, kept)) = job.recall(unit, read)? else { return Ok(None) };
     let first = context.store.adopt_from(job.records(&records), &kept.blocks)?;
-    kept.taken(context, pairs, first).map(Some)
+    kept.taken(context, first).map(Some)
 }
 
 impl Kept {
     /// The unit, whose blocks have got numbers from `first` on.
-    fn taken(self, context: &Context<'_>, pairs: &Range<usize>, first: u32) -> Result<Unit, ConvertError> {
-        let Self { pairs: of, stats, mut collected, seen, misled, .. } = self;
-        if of != *pairs {
-            return Err(ConvertError::Internal("the units of a job are not those of the run".into()));
-        }
+    fn taken(self, context: &Context<'_>, first: u32) -> Result<Unit, ConvertError> {
+        let Self { stats, mut collected, seen, misled, .. } = self;
         collected.shift(first);
         context.note_misled(misled);
         let mut room = Reservation::new(context.memory, Consumer::Cells);

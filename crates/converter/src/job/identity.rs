@@ -38,7 +38,7 @@ struct Fingerprint {
 
 impl Fingerprint {
     fn shown(&self) -> PathBuf {
-        String::from_utf8_lossy(&self.path).into_owned().into()
+        one_line(&String::from_utf8_lossy(&self.path)).into()
     }
 }
 
@@ -73,14 +73,14 @@ impl Identity {
     /// What differs from `was`, if anything does.
     pub(super) fn differs_from(&self, was: &Self) -> Option<JobFault> {
         if self.version != was.version {
-            return Some(JobFault::Version { was: was.version.clone() });
+            return Some(JobFault::Version { was: one_line(&was.version) });
         }
         let setting = |all: &Self, name: &str| all.settings.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone());
         for (name, _) in was.settings.iter().chain(&self.settings) {
             let (was, now) = (setting(was, name), setting(self, name));
             if was != now {
-                let text = |value: Option<String>| value.unwrap_or_else(|| "not given".into());
-                return Some(JobFault::Setting { name: name.clone(), was: text(was), now: text(now) });
+                let text = |value: Option<String>| value.map_or_else(|| "not given".into(), |value| one_line(&value));
+                return Some(JobFault::Setting { name: one_line(name), was: text(was), now: text(now) });
             }
         }
         for (was, now) in was.inputs.iter().zip(&self.inputs) {
@@ -95,6 +95,11 @@ impl Identity {
         let more = was.inputs.get(self.inputs.len()).or_else(|| self.inputs.get(was.inputs.len()));
         more.map(|input| JobFault::OtherInputs { path: input.shown() })
     }
+}
+
+/// What a file says of itself, for a line.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }
 
 /// Checksums of the first and the last bytes of a file, of which it may have fewer.

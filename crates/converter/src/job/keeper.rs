@@ -35,26 +35,28 @@ impl Build<'_> {
         self.units.is_some_and(|units| units.shared().is_some())
     }
 
-    /// How the work is divided: as `divide` says, or as another process that shares it has said.
+    /// How the work is divided: as `divide` says, or as another process that shares it has said, if that `can_be`.
     pub(crate) fn divided<T: Serialize + DeserializeOwned>(
         &self,
+        can_be: impl FnOnce(&T) -> bool,
         divide: impl FnOnce() -> Result<T, ConvertError>,
     ) -> Result<T, ConvertError> {
         let name = self.units.map_or_else(String::new, |units| units.division());
-        settled(self.units.map(|units| units.keeper), &name, &self.cloud.store, divide)
+        settled(self.units.map(|units| units.keeper), &name, &self.cloud.store, can_be, divide)
     }
 }
 
 /// A result of settling by its name, where several processes share a job; anywhere else what `make` makes. `store`: where it puts
-/// records.
+/// records; `can_be`: whether what another process has said can be of this cloud.
 pub(crate) fn settled<T: Serialize + DeserializeOwned>(
     keeper: Option<Keeper<'_>>,
     name: &str,
     store: &Store,
+    can_be: impl FnOnce(&T) -> bool,
     make: impl FnOnce() -> Result<T, ConvertError>,
 ) -> Result<T, ConvertError> {
     match keeper.and_then(Keeper::shared) {
-        Some(job) => job.settled(name, store, make),
+        Some(job) => job.settled_in(name, store, None, can_be, make),
         None => make(),
     }
 }
@@ -65,6 +67,14 @@ impl<'a> Keeper<'a> {
         match self {
             Self::Shared(_) => Ok(()),
             Self::Own(job) => job.part_with_output(),
+        }
+    }
+
+    /// True if others have read records: nobody has looked whether they lie where that says.
+    pub(crate) fn is_of_others(self) -> bool {
+        match self {
+            Self::Shared(_) => true,
+            Self::Own(job) => job.recalled() > 0,
         }
     }
 
@@ -92,9 +102,19 @@ impl<'a> GroupUnits<'a> {
         Self { keeper, group, mark: 0 }
     }
 
-    /// The same, of a group that is divided into these: what a run has kept that divided it otherwise is not found.
-    pub(crate) fn divided(self, units: &impl Serialize) -> Result<Self, ConvertError> {
-        Ok(Self { mark: crc32c::crc32c(&super::encode(units)?), ..self })
+    /// The same, of a group that is divided into these: what a run has kept that divided it otherwise, or took the cloud for another
+    /// one, is not found.
+    pub(crate) fn divided(self, cloud: &Cloud<'_>, units: &impl Serialize) -> Result<Self, ConvertError> {
+        let Cloud { lattice, frame, stats, facts, census, .. } = cloud;
+        let of_all = (lattice.lattice, &frame.cube, frame.origin, stats.bounds, stats.checksum);
+        let facts = format!("{:?}", (of_all, &facts.ranges, &facts.relations, &facts.widening));
+        let mark = super::encode(&(facts, &census.cells, units))?;
+        Ok(Self { mark: crc32c::crc32c(&mark), ..self })
+    }
+
+    /// As [`Keeper::is_of_others`].
+    pub(crate) fn is_of_others(&self) -> bool {
+        self.keeper.is_of_others()
     }
 
     /// The name of a unit.

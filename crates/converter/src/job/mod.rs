@@ -25,7 +25,7 @@ use pointmill_format::DatasetKind;
 use pointmill_format::bintree::PACKED_FILE;
 use serde::{Deserialize, Serialize};
 pub(crate) use shared::{SharedJob, Task};
-pub(crate) use tasks::{UnitLog, make_units, put_back};
+pub(crate) use tasks::{Said, UnitLog, make_units, put_back};
 pub(crate) use unit_file::{UnitReader, UnitWriter};
 
 use crate::error::{ConvertError, JobFault};
@@ -251,6 +251,13 @@ impl Job {
     /// Where a unit leaves what it has built.
     fn built_path(&self, unit: UnitName) -> PathBuf {
         self.folder.join(unit.to_string())
+    }
+
+    /// The error for a unit that has left what no unit of this run leaves.
+    pub(crate) fn damaged_unit(&self, pass: u32, unit: u64) -> ConvertError {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let byte = state.units.get(&(pass, unit)).map_or(0, |entry| entry.offset);
+        JobFault::Damaged { file: self.folder.join(JOURNAL), byte }.into()
     }
 
     /// The folder.

@@ -264,22 +264,14 @@ impl SharedJob {
         self.settling().is_running
     }
 
-    /// A result of settling: made here, with what it puts into the store, or as another process has found it.
-    pub(crate) fn settled<T: Serialize + DeserializeOwned>(
-        &self,
-        name: &str,
-        store: &Store,
-        make: impl FnOnce() -> Result<T, ConvertError>,
-    ) -> Result<T, ConvertError> {
-        self.settled_in(name, store, None, make)
-    }
-
-    /// [`Self::settled`] with another store than that of the pass, whose file for records is `records` if this process settles.
+    /// A result of settling: made here, with what it puts into the store, or as another process has found it, if that `can_be`.
+    /// `records`: the file for records of this process, if it is another one than that of the pass.
     pub(crate) fn settled_in<T: Serialize + DeserializeOwned>(
         &self,
         name: &str,
         store: &Store,
         records: Option<String>,
+        can_be: impl FnOnce(&T) -> bool,
         make: impl FnOnce() -> Result<T, ConvertError>,
     ) -> Result<T, ConvertError> {
         let first = store.next_block()?;
@@ -297,6 +289,11 @@ impl SharedJob {
         let (_, result) = settling.results.iter().find(|(known, _)| known == name).ok_or_else(damaged)?;
         let (value, was_first, records, blocks) =
             postcard::from_bytes::<(T, u32, Option<String>, Vec<SafeBlock>)>(result).map_err(|_| damaged())?;
+        let is_name = |name: &String| name.starts_with(&unit.to_string()) && !name.contains('/');
+        let are_blocks = blocks.iter().all(|block| store.can_hold(block)) && records.iter().all(is_name);
+        if !are_blocks || !can_be(&value) {
+            return Err(damaged());
+        }
         if was_first != first {
             return Err(ConvertError::Internal(format!(
                 "{name}: {first} blocks before it, {was_first} when it was made"

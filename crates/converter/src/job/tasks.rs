@@ -66,19 +66,36 @@ impl<'a, P: Serialize> UnitLog<'a, P> {
     }
 }
 
+/// What a unit has left beside its bytes.
+pub(crate) struct Said<P, T> {
+    /// Where bytes belong, and how many.
+    pub(crate) belong: Vec<(P, u64)>,
+    /// What else it came to.
+    pub(crate) came_to: T,
+    /// Bytes that are in the output already.
+    pub(crate) in_place: Option<Vec<(P, Place)>>,
+}
+
+impl<P: DeserializeOwned, T: DeserializeOwned> Said<P, T> {
+    /// `can_be`: whether it can be of the unit. Checksums say that a file is as it was written, not by whom.
+    fn read(unit: &UnitReader, can_be: impl FnOnce(&Self) -> bool) -> Result<Self, ConvertError> {
+        let said = Self { belong: unit.get(BELONG)?, came_to: unit.get(CAME_TO)?, in_place: unit.get(IN_PLACE)? };
+        if can_be(&said) { Ok(said) } else { Err(unit.damaged(0)) }
+    }
+}
+
 /// Puts the bytes of a unit where they belong, in the order in which they were noted, a large piece in parts of whole rows of
 /// `row_bytes`: `put` gets the place, where in the piece they begin, and the bytes. `there` is told of bytes that are in the output
-/// already. Returns what else the unit came to. If the file turns out not to be whole, some bytes were put: who makes the unit again
+/// already. `can_be`: whether what it says can be of the unit. Returns what else the unit came to. If the file turns out not to be whole, some bytes were put: who makes the unit again
 /// puts them there again.
 pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
     unit: &UnitReader,
     row_bytes: u64,
+    can_be: impl FnOnce(&Said<P, T>) -> bool,
     mut put: impl FnMut(&P, u64, &[u8]) -> Result<(), ConvertError>,
     mut there: impl FnMut(P, Place),
 ) -> Result<T, ConvertError> {
-    let belong: Vec<(P, u64)> = unit.get(BELONG)?;
-    let came_to = unit.get(CAME_TO)?;
-    let in_place: Option<Vec<(P, Place)>> = unit.get(IN_PLACE)?;
+    let Said { belong, came_to, in_place } = Said::read(unit, can_be)?;
     let mut reader = unit.reader(BYTES)?;
     let part = (PIECE_BYTES / row_bytes.max(1)).max(1) * row_bytes.max(1);
     let mut buffer = Vec::new();
@@ -99,10 +116,15 @@ pub(crate) fn put_back<P: DeserializeOwned, T: DeserializeOwned>(
     Ok(came_to)
 }
 
-/// Fails unless the file of a unit is whole, and so are its bytes in the output.
-fn check<P: DeserializeOwned>(unit: &UnitReader, output: Option<&dyn InPlace<P>>) -> Result<(), ConvertError> {
+/// Fails unless the file of a unit is whole and can be of it, and its bytes are in the output.
+fn check<P: DeserializeOwned, T: DeserializeOwned>(
+    unit: &UnitReader,
+    output: Option<&dyn InPlace<P>>,
+    can_be: impl FnOnce(&Said<P, T>) -> bool,
+) -> Result<(), ConvertError> {
     unit.check()?;
-    for (belong, place) in unit.get::<Option<Vec<(P, Place)>>>(IN_PLACE)?.into_iter().flatten() {
+    let said = Said::read(unit, can_be)?;
+    for (belong, place) in said.in_place.into_iter().flatten() {
         if !output.map_or(Ok(false), |output| output.holds(&belong, &place))? {
             return Err(unit.damaged(0));
         }
@@ -111,20 +133,21 @@ fn check<P: DeserializeOwned>(unit: &UnitReader, output: Option<&dyn InPlace<P>>
 }
 
 /// Does those units that are to be done here, and leaves them in their files. `points`: of each; `output`: if their bytes are put
-/// there at once; `make`: fills the file of one, with what `begin` gives each thread.
+/// there at once; `can_be`: whether what one has left can be of it; `make`: fills the file of one.
 ///
 /// # Errors
 /// If units of the job are done one by one, how far all of them are: nothing is left to do here then.
-pub(crate) fn make_units<P: DeserializeOwned, S>(
+pub(crate) fn make_units<P: DeserializeOwned, T: DeserializeOwned>(
     of: GroupUnits<'_>,
     points: &[u64],
     output: Option<&dyn InPlace<P>>,
     rt: &Runtime<'_>,
-    begin: impl Fn() -> S + Sync,
-    make: impl Fn(&mut S, usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
+    can_be: impl Fn(usize, &Said<P, T>) -> bool + Sync,
+    make: impl Fn(usize, &mut UnitWriter) -> Result<(), ConvertError> + Sync,
 ) -> Result<(), ConvertError> {
     let is_wanted = |i: usize| -> Result<bool, ConvertError> {
-        Ok(of.in_parts().is_none_or(|job| job.wants(of.name(i))) && !of.is_done(i, |unit| check(unit, output))?)
+        let is_here = of.in_parts().is_none_or(|job| job.wants(of.name(i)));
+        Ok(is_here && !of.is_done(i, |unit| check(unit, output, |said| can_be(i, said)))?)
     };
     let wanted = rt.in_parallel(
         points.len(),
@@ -143,13 +166,13 @@ pub(crate) fn make_units<P: DeserializeOwned, S>(
     of.count_recalled(points.len() - wanted.len());
     rt.in_parallel(
         wanted.len(),
-        begin,
-        |state, i| {
-            of.keep(wanted[i], |file| make(state, wanted[i], file))?;
+        || (),
+        |(), i| {
+            of.keep(wanted[i], |file| make(wanted[i], file))?;
             rt.advance(points[wanted[i]]);
             Ok(())
         },
-        |_| (),
+        |()| (),
     )?;
     let Some(job) = of.in_parts() else { return Ok(()) };
     let listed = points.iter().enumerate().map(|(i, points)| of.listed(job, i, *points, Vec::new()));
@@ -187,10 +210,11 @@ mod tests {
             }
             Ok(())
         };
-        let came_to: String = put_back(&unit, 3, put, |_, _| panic!("nothing is there")).unwrap();
+        let came_to: String = put_back(&unit, 3, |_| true, put, |_, _| panic!("nothing is there")).unwrap();
         assert_eq!(came_to, "the end");
         assert_eq!(found, pieces.map(|(place, bytes)| (place, bytes.to_vec())));
-        check::<u64>(&unit, None).unwrap();
+        check::<u64, String>(&unit, None, |_| true).unwrap();
+        assert!(check::<u64, String>(&unit, None, |_| false).is_err());
     }
 
     #[test]
@@ -210,15 +234,22 @@ mod tests {
         let unit = DiskFile::open(&path, path.clone(), &disk).unwrap();
         let unit = UnitReader::open(&path, 0, unit, std::fs::metadata(&path).unwrap().len()).unwrap();
         let (mut found, put) = (Vec::new(), |_: &u64, _, _: &[u8]| panic!("its bytes are there"));
-        let came_to: u8 = put_back(&unit, 1, put, |belong, at| {
-            found.push((belong, at.offset, at.bytes));
-        })
+        let came_to: u8 = put_back(
+            &unit,
+            1,
+            |_| true,
+            put,
+            |belong, at| {
+                found.push((belong, at.offset, at.bytes));
+            },
+        )
         .unwrap();
         assert_eq!((came_to, found), (1, vec![(7, 7, 3), (50, 50, 0), (20, 20, 30)]));
-        check::<u64>(&unit, Some(&kept)).unwrap();
-        assert!(check::<u64>(&unit, None).is_err());
-        assert!(check::<u64>(&unit, Some(&KeptFile { start: 99, ..kept })).is_err());
+        let check = |kept: Option<&dyn InPlace<u64>>| check::<u64, u8>(&unit, kept, |_| true);
+        check(Some(&kept)).unwrap();
+        assert!(check(None).is_err());
+        assert!(check(Some(&KeptFile { start: 99, ..kept })).is_err());
         out.write_at(&[8], 125, "writing").unwrap();
-        assert!(check::<u64>(&unit, Some(&kept)).is_err());
+        assert!(check(Some(&kept)).is_err());
     }
 }

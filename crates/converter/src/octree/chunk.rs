@@ -12,7 +12,7 @@ use super::order::{OrderScratch, Point, order};
 use super::raise::{Nodes, Pairs, Pending, Points, stays};
 use super::sample::Sampler;
 use super::sinks::Encoders;
-use crate::cloud::{Cloud, Ledger, morton};
+use crate::cloud::{Cloud, Ledger, TREE_BITS, morton, xyz};
 use crate::error::ConvertError;
 use crate::plan::Duplicates;
 use crate::runtime::os_hints;
@@ -27,6 +27,8 @@ pub(super) struct ChunkPlan<'a> {
     pub(super) unit_points: u64,
     /// The same of a chunk.
     pub(super) usual_points: u64,
+    /// Others have read the records and said which nodes they lie in.
+    pub(super) is_of_others: bool,
 }
 
 /// One thread's memory for building chunks.
@@ -52,10 +54,19 @@ impl ChunkMemory {
             ledger.load(store, *segment, frame.stride, &facts.widening, &mut self.records)?;
         }
         order(&self.records, frame, chunk.key.level, &mut self.scratch, &mut self.points);
+        if plan.is_of_others && !self.is_within(chunk.key) {
+            return Err(ConvertError::Internal(format!("points outside of their node {}", chunk.key)));
+        }
         if plan.cloud.plan.duplicates == Duplicates::Drop {
             self.drop_duplicates(plan, ledger);
         }
         Ok(())
+    }
+
+    /// True if all points lie in a node.
+    fn is_within(&self, node: NodeKey) -> bool {
+        let (shift, cell) = (TREE_BITS - u32::from(node.level), xyz(node));
+        self.points.iter().all(|p| p.t.cell(shift) == cell)
     }
 
     /// Builds the nodes of the chunk that was loaded; returns its root, and the number of leaves above the capacity.

@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 use pointmill_format::NodeKey;
 use serde::{Deserialize, Serialize};
 
-use crate::cloud::{Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, morton};
+use crate::cloud::{
+    Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, add_up, are_in_order, morton,
+};
 use crate::error::ConvertError;
 use crate::job::Build;
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -28,6 +30,20 @@ pub(super) struct Subtree {
     pub(super) chunks: Vec<Chunk>,
 }
 
+impl Subtree {
+    /// True if these can be all of a cloud with so many points: where others have divided it, nobody has looked.
+    fn can_be_of(subtrees: &[Self], points: u64) -> bool {
+        let keys = |chunks: &[Chunk]| chunks.iter().map(|chunk| chunk.key).collect::<Vec<_>>();
+        let is_subtree =
+            |subtree: &Self| !subtree.chunks.is_empty() && are_in_order(keys(&subtree.chunks), subtree.key);
+        let chunks = || subtrees.iter().flat_map(|subtree| &subtree.chunks);
+        are_in_order(subtrees.iter().map(|subtree| subtree.key), NodeKey::ROOT)
+            && subtrees.iter().all(is_subtree)
+            && chunks().all(|chunk| chunk.points == chunk.segments.points())
+            && add_up(chunks().map(|chunk| chunk.points), points)
+    }
+}
+
 /// How a cloud is divided.
 pub(super) struct Division {
     pub(super) subtrees: Vec<Subtree>,
@@ -45,8 +61,9 @@ const SPLIT_LEVELS: u32 = 3;
 pub(super) fn divide(build: Build<'_>, unit_points: u64, chunk_points: u64) -> Result<Division, ConvertError> {
     let Build { cloud, rt, .. } = build;
     let mut room = Reservation::new(&rt.memory, Consumer::Cells);
+    let can_be = |(subtrees, _): &(Vec<Subtree>, u64)| Subtree::can_be_of(subtrees, cloud.points());
     let (subtrees, chunk_points) =
-        build.divided(|| Ok((divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points)))?;
+        build.divided(can_be, || Ok((divide_now(cloud, rt, unit_points, chunk_points, &mut room)?, chunk_points)))?;
     let bytes = |chunk: &Chunk| chunk.segments.bytes() + size_of::<Chunk>() as u64;
     let of_subtree = |s: &Subtree| s.chunks.iter().map(bytes).sum::<u64>() + 2 * size_of::<Subtree>() as u64;
     room.resize(subtrees.iter().map(of_subtree).sum())?;

@@ -10,6 +10,9 @@
 //! If the bytes are in the output already, because a job has that, too, there is one section in the place of those from 3 on: where
 //! they are.
 
+mod check;
+
+use std::iter::Peekable;
 use std::sync::Arc;
 
 use pointmill_format::NodeKey;
@@ -20,7 +23,7 @@ use super::list::{List, Lists};
 use super::raise::{Pending, Points};
 use super::sink::FinishedNode;
 use super::unit::{BuiltUnit, Outer};
-use crate::cloud::{Checksum, Ledger};
+use crate::cloud::{Checksum, Ledger, TREE_BITS, TreePoint, lies_in};
 use crate::error::ConvertError;
 use crate::job::{KeptFile, Place, UnitReader, UnitWriter};
 use crate::runtime::DiskFile;
@@ -37,7 +40,8 @@ const PIECES: usize = 3;
 struct Kept {
     is_in_place: bool,
     pieces: Vec<KeptPiece>,
-    root: Option<KeptNode>,
+    /// The root, and what is pending below it, in preorder; empty: it is that of the tree.
+    root: Vec<KeptNode>,
     ledger: Ledger,
     written: Vec<Checksum>,
     overfull_leaves: u64,
@@ -55,13 +59,19 @@ enum KeptPiece {
     },
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 struct KeptNode {
     key: NodeKey,
     points: u64,
     is_one_place: bool,
     is_inner: bool,
-    children: Vec<KeptNode>,
+}
+
+/// Which unit a file is of.
+#[derive(Clone, Copy)]
+pub(super) struct Of {
+    pub(super) key: NodeKey,
+    pub(super) streams: usize,
 }
 
 /// Puts a unit into its file.
@@ -106,7 +116,7 @@ fn write_head(unit: &BuiltUnit, is_in_place: bool, lists: &Lists, file: &mut Uni
     file.put(&Kept {
         is_in_place,
         pieces: unit.pieces.iter().map(piece).collect(),
-        root: unit.root.as_ref().map(kept_node),
+        root: unit.root.as_ref().map(kept_nodes).unwrap_or_default(),
         ledger: unit.ledger.clone(),
         written: unit.written.clone(),
         overfull_leaves: unit.overfull_leaves,
@@ -117,14 +127,12 @@ fn write_head(unit: &BuiltUnit, is_in_place: bool, lists: &Lists, file: &mut Uni
     unit.root.iter().try_for_each(|root| write_pending(root, lists, file))
 }
 
-fn kept_node(node: &Pending<List>) -> KeptNode {
-    KeptNode {
-        key: node.key,
-        points: node.points.count(),
-        is_one_place: node.points.is_one_place,
-        is_inner: node.is_inner,
-        children: node.children.iter().map(kept_node).collect(),
-    }
+fn kept_nodes(node: &Pending<List>) -> Vec<KeptNode> {
+    let Pending { key, points, is_inner, children } = node;
+    let (is_one_place, points) = (points.is_one_place, points.count());
+    let mut nodes = vec![KeptNode { key: *key, points, is_one_place, is_inner: *is_inner }];
+    nodes.extend(children.iter().flat_map(kept_nodes));
+    nodes
 }
 
 fn write_pending(node: &Pending<List>, lists: &Lists, file: &mut UnitWriter) -> Result<(), ConvertError> {
@@ -137,9 +145,17 @@ fn write_list(list: &List, lists: &Lists, file: &mut UnitWriter) -> Result<(), C
 }
 
 /// All that a unit has left; `kept`: the output in each stream, if a job has it.
-pub(super) fn read(file: &UnitReader, lists: &Lists, kept: Option<&[KeptFile<'_>]>) -> Result<BuiltUnit, ConvertError> {
+pub(super) fn read(
+    file: &UnitReader,
+    of: Of,
+    lists: &Lists,
+    kept: Option<&[KeptFile<'_>]>,
+) -> Result<BuiltUnit, ConvertError> {
     let unit: Kept = file.get(KEPT)?;
     let places = if unit.is_in_place { Some(places_of(file, &unit, kept.unwrap_or_default())?) } else { None };
+    if !unit.can_be_of(of, lists.stride as u64, lengths(file, &unit, places.as_deref())) {
+        return Err(file.damaged(0));
+    }
     let (mut places, mut section) = (places.into_iter().flatten(), PIECES);
     let mut pieces = Vec::with_capacity(unit.pieces.len());
     for piece in unit.pieces {
@@ -163,10 +179,29 @@ pub(super) fn read(file: &UnitReader, lists: &Lists, kept: Option<&[KeptFile<'_>
             }
         });
     }
-    let root = unit.root.map(|root| read_pending(file, root, lists)).transpose()?;
-    let Kept { ledger, written, overfull_leaves, notes, .. } = Kept { pieces: Vec::new(), root: None, ..unit };
-    let outer = read_outer(file)?;
+    let root = read_pending(file, unit.root, lists)?;
+    let Kept { ledger, written, overfull_leaves, notes, .. } = Kept { pieces: Vec::new(), root: Vec::new(), ..unit };
+    let outer = read_outer(file, of)?;
     Ok(BuiltUnit { pieces, root, ledger, written, overfull_leaves, notes, outer, file: None })
+}
+
+/// How many bytes a unit has left of a piece in a stream.
+fn lengths(file: &UnitReader, unit: &Kept, places: Option<&[Place]>) -> impl Fn(usize, usize) -> Option<u64> {
+    let mut first = 0;
+    let firsts = unit.pieces.iter().map(|piece| {
+        let count = match piece {
+            KeptPiece::Nodes(runs) => runs.len(),
+            KeptPiece::Large { .. } => 1,
+        };
+        first += count;
+        first - count
+    });
+    let firsts: Vec<usize> = firsts.collect();
+    let bytes: Vec<u64> = match places {
+        Some(places) => places.iter().map(|place| place.bytes).collect(),
+        None => (PIECES..file.sections()).map(|section| file.len(section)).collect(),
+    };
+    move |piece, stream| bytes.get(firsts.get(piece)? + stream).copied()
 }
 
 /// Where the bytes of a unit are in the output, of each piece in each stream.
@@ -190,24 +225,43 @@ fn places_of(file: &UnitReader, unit: &Kept, kept: &[KeptFile<'_>]) -> Result<Ve
 }
 
 /// What a unit has taken near its borders.
-pub(super) fn read_outer(file: &UnitReader) -> Result<Outer, ConvertError> {
-    file.get(BORDERS)
+pub(super) fn read_outer(file: &UnitReader, of: Of) -> Result<Outer, ConvertError> {
+    let outer: Outer = file.get(BORDERS)?;
+    let is_there = |point: &TreePoint| point.0.iter().all(|t| t >> TREE_BITS == 0);
+    let is_sound = outer.iter().all(|(node, points)| lies_in(*node, of.key) && points.iter().all(is_there));
+    if is_sound { Ok(outer) } else { Err(file.damaged(0)) }
 }
 
 /// The root of a unit, with what is pending below it; `None`: that of the tree.
-pub(super) fn read_root(file: &UnitReader, lists: &Lists) -> Result<Option<Pending<List>>, ConvertError> {
+pub(super) fn read_root(file: &UnitReader, of: Of, lists: &Lists) -> Result<Option<Pending<List>>, ConvertError> {
     let kept: Kept = file.get(KEPT)?;
-    kept.root.map(|root| read_pending(file, root, lists)).transpose()
+    if !kept.can_be_of(of, lists.stride as u64, lengths(file, &kept, None)) {
+        return Err(file.damaged(0));
+    }
+    read_pending(file, kept.root, lists)
 }
 
-fn read_pending(file: &UnitReader, root: KeptNode, lists: &Lists) -> Result<Pending<List>, ConvertError> {
-    let (bytes, start) = file.place(PENDING)?;
-    let mut at = start;
-    let node = pending(root, &bytes, &mut at, lists)?;
-    if at - start == file.len(PENDING) { Ok(node) } else { Err(file.damaged(at)) }
+fn read_pending(file: &UnitReader, nodes: Vec<KeptNode>, lists: &Lists) -> Result<Option<Pending<List>>, ConvertError> {
+    let stride = lists.stride as u64;
+    let records = nodes.iter().try_fold(0u64, |all, node| all.checked_add(node.points));
+    if records.and_then(|records| records.checked_mul(stride)) != Some(file.len(PENDING)) {
+        return Err(file.damaged(0));
+    }
+    let (bytes, mut at) = file.place(PENDING)?;
+    let mut nodes = nodes.into_iter().peekable();
+    let root = nodes.next().map(|root| pending(root, &mut nodes, &bytes, &mut at, lists)).transpose()?;
+    // one that is no child of any before it
+    if nodes.next().is_none() { Ok(root) } else { Err(file.damaged(0)) }
 }
 
-fn pending(node: KeptNode, file: &Arc<DiskFile>, at: &mut u64, lists: &Lists) -> Result<Pending<List>, ConvertError> {
+/// A node and those below it, which come next. No deeper than levels go, since a child is one level below its parent.
+fn pending(
+    node: KeptNode,
+    next: &mut Peekable<impl Iterator<Item = KeptNode>>,
+    file: &Arc<DiskFile>,
+    at: &mut u64,
+    lists: &Lists,
+) -> Result<Pending<List>, ConvertError> {
     let (start, bytes) = (*at, node.points * lists.stride as u64);
     *at += bytes;
     let points = if bytes > LARGE_BYTES || node.is_one_place {
@@ -219,6 +273,12 @@ fn pending(node: KeptNode, file: &Arc<DiskFile>, at: &mut u64, lists: &Lists) ->
         lists.admit(&mut list)?;
         list
     };
-    let children = node.children.into_iter().map(|child| pending(child, file, at, lists)).collect::<Result<_, _>>()?;
+    let mut children = Vec::new();
+    while let Some(child) = next.next_if(|child| lies_in(child.key, node.key) && child.key.parent() == Some(node.key)) {
+        children.push(pending(child, next, file, at, lists)?);
+    }
     Ok(Pending { key: node.key, points, is_inner: node.is_inner, children })
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,7 +8,7 @@ use super::sinks::{Encoders, Sinks};
 use super::unit::{BuiltUnit, Shared, UnitBuilder};
 use super::units::{Unit, Work};
 use crate::error::ConvertError;
-use crate::job::{GroupUnits, KeptFile};
+use crate::job::{GroupUnits, KeptFile, UnitReader};
 
 /// What all threads share.
 pub(super) struct Making<'a, S> {
@@ -43,7 +43,7 @@ impl<S: Sinks> Making<'_, S> {
         self.shared.rt.check_stop()?; // it may have waited long
         let built = match self.kept {
             None => self.build(unit, index, builder, buffers)?,
-            Some(of) => match of.recall(index, |file| keep::read(file, &self.shared.lists, self.in_place))? {
+            Some(of) => match of.recall(index, |file| self.read(unit, file))? {
                 Some(built) => self.recalled(unit, index, built)?,
                 None if of.shared().is_some() => return Err(of.gone(index)),
                 None => {
@@ -62,6 +62,11 @@ impl<S: Sinks> Making<'_, S> {
         }
         self.shared.rt.advance(unit.points());
         Ok(())
+    }
+
+    fn read(&self, unit: &Unit, file: &UnitReader) -> Result<BuiltUnit, ConvertError> {
+        let of = keep::Of { key: unit.key, streams: self.sinks.count() };
+        keep::read(file, of, &self.shared.lists, self.in_place)
     }
 
     fn build<E: Encoders>(

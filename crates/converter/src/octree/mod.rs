@@ -88,7 +88,7 @@ fn build_for<S: Sinks>(build: Build<'_>, settings: OctreeSettings, sinks: &S) ->
     let chunk_points = division.chunk_points;
     let units = units::in_order(std::mem::take(&mut division.subtrees));
     let all: Vec<_> = units.iter().map(|unit| (unit.key, unit.points())).collect();
-    let kept = kept.map(|kept| kept.divided(&all)).transpose()?;
+    let kept = kept.map(|kept| kept.divided(cloud, &all)).transpose()?;
     let usual_points = chunk_points.min(cloud.points());
     let shared = Shared {
         plan: ChunkPlan {
@@ -97,6 +97,7 @@ fn build_for<S: Sinks>(build: Build<'_>, settings: OctreeSettings, sinks: &S) ->
             most_points,
             unit_points: unit_points.min(cloud.points()),
             usual_points,
+            is_of_others: kept.is_some_and(|of| of.is_of_others()),
         },
         rt,
         lists: Lists::new(cloud.frame.stride, &rt.memory, &rt.temp),

@@ -73,10 +73,11 @@ fn one<E: Encoders>(
     let mut roots = HashMap::new();
     for &need in &needs[index] {
         let is_child = units[need].key.parent() == Some(unit.key);
+        let unit = keep::Of { key: units[need].key, streams: builder.streams() };
         let (outer, root) = of
             .recall(need, |file| {
-                let root = if is_child { keep::read_root(file, &shared.lists)? } else { None };
-                Ok((keep::read_outer(file)?, root))
+                let root = if is_child { keep::read_root(file, unit, &shared.lists)? } else { None };
+                Ok((keep::read_outer(file, unit)?, root))
             })?
             .ok_or_else(|| gone(need))?;
         shared.borders.publish(outer)?;

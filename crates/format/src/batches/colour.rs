@@ -58,6 +58,12 @@ impl ColourSum {
         }
     }
 
+    /// True if so many points at most can have that sum.
+    pub fn can_be_of(&self, points: u64) -> bool {
+        let most = self.points.checked_mul(255);
+        self.points <= points && most.is_some_and(|most| self.channels.iter().all(|sum| *sum <= most))
+    }
+
     /// Points added.
     pub const fn points(&self) -> u64 {
         self.points

@@ -35,6 +35,19 @@ pub(super) struct Task {
     pub(super) is_sorted: bool,
 }
 
+impl Task {
+    /// True if these can be all of a cloud with so many points: where others have cut it, nobody has looked.
+    pub(super) fn can_be_of(tasks: &[Self], points: u64) -> bool {
+        let mut next = 0u64;
+        let follow = |task: &Self| {
+            let is_next = task.first_point == next && task.points == task.segments.points();
+            next = next.saturating_add(task.points);
+            is_next
+        };
+        tasks.iter().all(follow) && next == points
+    }
+}
+
 /// An aligned cube of the grid, by the Morton code of its first corner (21 bits per axis) and its level (0: all).
 type Bucket = (u64, u32);
 type Buckets = HashMap<Bucket, Segments>;

@@ -86,7 +86,7 @@ pub(super) fn finish(
 ) -> Result<Finished, ConvertError> {
     let state = output.take_state()?;
     let mut lod_points = results.lod_points;
-    let patches = patches(output.layout, results, &mut lod_points);
+    let patches = patches(output.layout, results, &mut lod_points)?;
     for (index, patch) in &patches {
         output.put_values(output.layout.colour, 4, *index, &patch.shown.to_le_bytes())?;
     }
@@ -102,7 +102,8 @@ pub(super) fn finish(
     clear_gaps(output, &layout)?;
     output.write(&record_bytes(&records), layout.records.offset)?;
     let changes = |when: usize| patches.values().filter(|patch| patch.changes()[when]).count() as u64;
-    let averaging = Averaging::of(results.changed - changes(0) + changes(1), settings.originals);
+    let changed = (results.changed + changes(1)).checked_sub(changes(0)).ok_or_else(unlike)?;
+    let averaging = Averaging::of(changed, settings.originals);
     if let Averaging::Changed { originals: Some(count) } = averaging {
         put_originals(output, &layout, &state, &patches, count)?;
     }
@@ -128,7 +129,11 @@ fn clear_gaps(output: &BatchFile<'_>, layout: &Layout) -> Result<(), ConvertErro
 }
 
 /// Candidates of the cells that tasks left open, by storage index; corrects the number of points of each level.
-fn patches(layout: &Layout, results: &TaskResults, lod_points: &mut [u64; LEVELS + 1]) -> BTreeMap<u32, Patch> {
+fn patches(
+    layout: &Layout,
+    results: &TaskResults,
+    lod_points: &mut [u64; LEVELS + 1],
+) -> Result<BTreeMap<u32, Patch>, ConvertError> {
     let mut patches: BTreeMap<u32, Patch> = BTreeMap::new();
     // coarser levels come later and win
     for level in (0..LEVELS).rev() {
@@ -142,10 +147,16 @@ fn patches(layout: &Layout, results: &TaskResults, lod_points: &mut [u64; LEVELS
     }
     for patch in patches.values() {
         let level = |word| usize::from(lod_of(word)).min(LEVELS);
-        lod_points[level(patch.written)] -= 1;
+        let written = &mut lod_points[level(patch.written)];
+        *written = written.checked_sub(1).ok_or_else(unlike)?;
         lod_points[level(patch.shown)] += 1;
     }
-    patches
+    Ok(patches)
+}
+
+/// What units came to contradicts itself.
+fn unlike() -> ConvertError {
+    ConvertError::Internal("the levels of detail of the tasks do not add up".into())
 }
 
 fn record_bytes(records: &[BatchRecord]) -> Vec<u8> {

@@ -17,6 +17,7 @@ mod settings;
 mod task;
 #[cfg(test)]
 mod tests;
+mod unit_check;
 
 use std::sync::Arc;
 
@@ -42,8 +43,9 @@ use content::Content;
 use finish::finish;
 use frame::{Frame, refused};
 use large::WORD_BYTES;
-use output::{BatchFile, Encoder, ORIGINAL_BYTES, Part, To};
+use output::{BatchFile, Encoder, ORIGINAL_BYTES, To};
 use task::{TaskResults, Worker, Workshop, bytes_per_point};
+use unit_check::{CameTo, can_be_of};
 
 /// Tasks per thread, so that threads end together; their sizes. Small ones share too much with each other, large ones
 /// leave the caches.
@@ -138,10 +140,13 @@ impl Output for BatchesSettings {
         let records = job.map(|(_, job)| job.more_records(&rt.temp)).transpose()?.flatten();
         let (records, records_name) = records.unzip();
         let sorted = Store::on(records, false, rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
-        let tasks = build.divided(|| buckets::tasks(cloud, rt, &frame, task_points))?;
+        let can_be = |tasks: &Vec<Task>| Task::can_be_of(tasks, points);
+        let tasks = build.divided(can_be, || buckets::tasks(cloud, rt, &frame, task_points))?;
         let cut = || large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points);
         let tasks = match job {
-            Some((units, job)) => job.settled_in(&format!("{}, cut", units.division()), &sorted, records_name, cut)?,
+            Some((units, job)) => {
+                job.settled_in(&format!("{}, cut", units.division()), &sorted, records_name, can_be, cut)?
+            }
             None => cut()?,
         };
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
@@ -157,7 +162,7 @@ impl Output for BatchesSettings {
             usual_points: task_points.min(points),
         };
         let division: Vec<_> = tasks.iter().map(|task| (task.first_point, task.points, task.start)).collect();
-        let units = units.map(|units| units.divided(&division)).transpose()?;
+        let units = units.map(|units| units.divided(cloud, &division)).transpose()?;
         let name = self.kind().marker_file();
         // what is compressed is written raw first, elsewhere
         let (made, raw) = match self.zstd_level {
@@ -235,28 +240,22 @@ impl Means<'_> {
     fn units(&self, units: GroupUnits<'_>, tasks: &[Task], kept: Option<KeptFile<'_>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = tasks.iter().map(|task| task.points).collect();
         let output = kept.as_ref().map(|kept| kept as &dyn InPlace<u64>);
-        make_units(
-            units,
-            &points,
-            output,
-            self.rt,
-            || (),
-            |(), index, file| {
-                let log = UnitLog::begin(file, output);
-                let came_to: (TaskResults, Part, Vec<u8>) = {
-                    let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
-                    let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
-                    let output = BatchFile::new(To::Unit(&put), self.layout, self.originals(), recovery, origin);
-                    let shop = self.shop(&output);
-                    let mut worker = Worker::new(&shop);
-                    worker.run(index, &tasks[index])?;
-                    let results = worker.finish();
-                    let (part, originals) = output.take_part()?;
-                    (results, part, originals)
-                };
-                log.end(&came_to)
-            },
-        )
+        let can_be = |index: usize, said: &_| can_be_of(said, index, &tasks[index], self.layout);
+        make_units(units, &points, output, self.rt, can_be, |index, file| {
+            let log = UnitLog::begin(file, output);
+            let came_to: CameTo = {
+                let put = |offset: u64, bytes: &[u8]| log.put(offset, bytes);
+                let (recovery, origin) = (Recovery::new(self.cloud), self.frame.grid.origin);
+                let output = BatchFile::new(To::Unit(&put), self.layout, self.originals(), recovery, origin);
+                let shop = self.shop(&output);
+                let mut worker = Worker::new(&shop);
+                worker.run(index, &tasks[index])?;
+                let results = worker.finish();
+                let (part, originals) = output.take_part()?;
+                (results, part, originals)
+            };
+            log.end(&came_to)
+        })
     }
 
     /// Takes what all units of a job came to.
@@ -271,8 +270,9 @@ impl Means<'_> {
             || (Encoder::default(), Vec::new()),
             |(encoder, all), index| {
                 let put = |at: &u64, from: u64, bytes: &[u8]| output.write(bytes, at + from);
-                let unit = units.recall(index, |unit| put_back(unit, 1, put, |_, _| ()))?;
-                let came_to: (TaskResults, Part, Vec<u8>) = unit.ok_or_else(|| units.gone(index))?;
+                let can_be = |said: &_| can_be_of(said, index, &tasks[index], self.layout);
+                let unit = units.recall(index, |unit| put_back(unit, 1, can_be, put, |_, _| ()))?;
+                let came_to: CameTo = unit.ok_or_else(|| units.gone(index))?;
                 let (results, part, originals) = came_to;
                 output.add_part(part, originals, encoder)?;
                 all.push(results);

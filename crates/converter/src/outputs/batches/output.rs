@@ -96,6 +96,36 @@ pub(super) struct Part {
     originals: Vec<(u32, u32)>,
 }
 
+impl Part {
+    /// True if it can be of a task of so many points in these pieces.
+    pub(super) fn can_be_of(&self, pieces: &[Piece], points: u64, layout: &Layout) -> bool {
+        let is_found = |found: &Found| {
+            let is_piece = |piece: &Piece| piece.batch == found.batch && piece.is_whole(layout);
+            layout.slot(found.batch).0 == found.slot && found.errors.points <= points && pieces.iter().any(is_piece)
+        };
+        let is_fragment = |batch: u32, Fragment { start, relative }: &Fragment| {
+            let is_piece = |piece: &Piece| {
+                (piece.batch, piece.start) == (batch, *start)
+                    && relative.iter().all(|axis| axis.len() == piece.range.len())
+                    && !piece.is_whole(layout)
+            };
+            pieces.iter().any(is_piece)
+        };
+        let mut fragments = self.fragments.iter().flat_map(|(batch, all)| all.iter().map(|one| (*batch, one)));
+        let count = self.found.len() + fragments.clone().count();
+        count == pieces.len()
+            && self.found.iter().all(is_found)
+            && fragments.all(|(batch, one)| is_fragment(batch, one))
+            && self.lost.points <= points
+            && self.lost.merged <= points
+    }
+
+    /// Of the originals: of pieces, the first storage index and the number of entries.
+    pub(super) fn originals(&self) -> &[(u32, u32)] {
+        &self.originals
+    }
+}
+
 /// Points of one task in one batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Piece {
@@ -105,6 +135,13 @@ pub(super) struct Piece {
     pub(super) start: u32,
     /// Its points, counted from the first of the task.
     pub(super) range: std::ops::Range<usize>,
+}
+
+impl Piece {
+    /// True if it has all points of its batch.
+    pub(super) fn is_whole(&self, layout: &Layout) -> bool {
+        self.range.len() == batch_points(self.batch, layout.points) as usize
+    }
 }
 
 /// The pieces of a task.

@@ -48,7 +48,32 @@ pub(super) struct Place {
     from: u64,
 }
 
+/// A leaf, as the nodes tell.
+pub(super) struct Leaf {
+    pub(super) path: Vec<bool>,
+    /// Points in the leaves before it, and its own.
+    pub(super) start: u64,
+    pub(super) points: u64,
+}
+
 impl Place {
+    /// True if so many points of it are in one of the leaves, which are in order.
+    pub(super) fn is_in(&self, leaves: &[Leaf], points: u64) -> bool {
+        let leaf = leaves.binary_search_by_key(&self.start, |leaf| leaf.start).ok().and_then(|at| leaves.get(at));
+        let is_inside = |leaf: &&Leaf| self.from.checked_add(points).is_some_and(|end| end <= leaf.points);
+        leaf.filter(is_inside).is_some_and(|leaf| leaf.path == self.path)
+    }
+
+    /// Points in the leaves before it, and in its own before this part.
+    pub(super) fn first_point(&self) -> u64 {
+        self.start + self.from
+    }
+
+    /// Where it begins in its file.
+    pub(super) fn offset(&self, stride: u64, is_packed: bool) -> u64 {
+        stride * if is_packed { self.first_point() } else { self.from }
+    }
+
     /// The leaf, if each has a file of its own.
     fn file_name(&self) -> String {
         leaf_file_name(self.path.iter().copied())
@@ -57,12 +82,12 @@ impl Place {
 
 impl InPlace<Place> for Leaves<'_> {
     fn write(&self, place: &Place, records: &[u8]) -> Result<u64, ConvertError> {
-        let (at, at_of_all) = (place.from * self.stride, (place.start + place.from) * self.stride);
+        let at = place.offset(self.stride, self.is_packed);
         match &self.to {
             To::Unit(_) => return Err(ConvertError::Internal("a unit holds no leaves".into())),
             To::File(to) => {
-                to.file.write_at(records, at_of_all, WRITING)?;
-                return Ok(at_of_all);
+                to.file.write_at(records, at, WRITING)?;
+                return Ok(at);
             }
             To::Files { staged, .. } if place.from > 0 => {
                 staged.open(&place.file_name())?.write_at(records, at, WRITING)
@@ -156,6 +181,11 @@ impl<'a> Leaves<'a> {
             To::Files { staged, .. } => staged.can_keep(),
         };
         is_kept.then_some(self)
+    }
+
+    /// True if all leaves are in one file.
+    pub(super) fn is_packed(&self) -> bool {
+        self.is_packed
     }
 
     /// Bytes of a point.

@@ -19,10 +19,11 @@ mod order;
 mod rule;
 mod settings;
 mod subtree;
+mod unit_check;
 mod upper;
 
 use std::io::BufWriter;
-use std::mem::take;
+use std::sync::{Mutex, PoisonError};
 
 use pointmill_format::bintree::{CORE_BYTES, Header, INDEX_FILE, IndexWriter, Layout, Node};
 use pointmill_format::{AttributeType, DatasetKind, Deviations};
@@ -35,6 +36,7 @@ use self::files::{Leaves, Place};
 use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
 use self::subtree::{Builder, Built, Room};
+use self::unit_check::can_be_of;
 use super::attributes::changed;
 use super::origin::own_key;
 use super::output::{DiskSize, Output, Target, Wants};
@@ -125,11 +127,12 @@ impl Output for BintreeSettings {
         let bytes_per_point = Builder::bytes_per_point(cloud.frame.stride, &columns.record, self.capacity);
         let task_points = rt.budget.task_points(bytes_per_point, MAX_TASK_POINTS);
         let task_points = if build.is_shared() { SHARED_TASK_POINTS } else { task_points };
-        let upper = build.divided(|| upper::split(cloud, rt, self, task_points))?;
+        let can_be = |upper: &upper::Upper| upper.can_be_of(cloud.points());
+        let upper = build.divided(can_be, || upper::split(cloud, rt, self, task_points))?;
         let mut room = Reservation::new(&rt.memory, Consumer::Cells);
         room.resize(upper.tasks.iter().map(upper::Task::bytes).sum())?;
         let division: Vec<_> = upper.tasks.iter().map(|task| (task.start, task.points())).collect();
-        let units = units.map(|units| units.divided(&division)).transpose()?;
+        let units = units.map(|units| units.divided(cloud, &division)).transpose()?;
         let make = Make { cloud, rt, settings: self, columns: &columns, tasks: &upper.tasks, task_points };
         let leaves = Leaves::new(self.layout, columns.record.stride(), to)?;
         if let Some(units) = units {
@@ -194,15 +197,20 @@ impl Make<'_> {
     fn units(&self, units: GroupUnits<'_>, output: Option<&dyn InPlace<Place>>) -> Result<(), ConvertError> {
         let points: Vec<u64> = self.tasks.iter().map(upper::Task::points).collect();
         let (layout, stride) = (self.settings.layout, self.columns.record.stride());
-        make_units(units, &points, output, self.rt, Room::default, |room, index, file| {
+        let is_packed = layout == Layout::Packed;
+        let can_be = |index: usize, said: &_| can_be_of(said, &self.tasks[index], stride as u64, is_packed);
+        // memory of units that are done, for the next
+        let rooms: Mutex<Vec<Room>> = Mutex::default();
+        make_units(units, &points, output, self.rt, can_be, |index, file| {
             let log = UnitLog::begin(file, output);
             let built = {
                 let put = |place: Place, records: &[u8]| log.put(place, records);
                 let leaves = Leaves::of_unit(layout, stride, &put);
-                let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves, take(room));
-                let built = self.one(&mut builder, index);
-                *room = builder.room;
-                built?
+                let room = rooms.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+                let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves, room);
+                let built = self.one(&mut builder, index)?;
+                rooms.lock().unwrap_or_else(PoisonError::into_inner).push(builder.room);
+                built
             };
             log.end(&built)
         })
@@ -227,7 +235,7 @@ impl Make<'_> {
             },
             |(builder, built, known), index| {
                 let subtree = match units {
-                    Some(units) => recalled(units, index, leaves)?,
+                    Some(units) => recalled(units, index, &tasks[index], leaves)?,
                     None => self.one(builder, index)?,
                 };
                 // they are copied once, when all are put together
@@ -256,11 +264,17 @@ impl Make<'_> {
 }
 
 /// A subtree that a unit has built, its leaves put where they belong.
-fn recalled(units: GroupUnits<'_>, index: usize, leaves: &Leaves<'_>) -> Result<Built, ConvertError> {
+fn recalled(
+    units: GroupUnits<'_>,
+    index: usize,
+    task: &upper::Task,
+    leaves: &Leaves<'_>,
+) -> Result<Built, ConvertError> {
     let mut there = Vec::new();
     let put = |place: &Place, byte: u64, records: &[u8]| leaves.put_back(place, byte, records);
+    let can_be = |said: &_| can_be_of(said, task, leaves.stride(), leaves.is_packed());
     let note = |place: Place, at: job::Place| there.push((place, at.offset, at.bytes));
-    let built = units.recall(index, |unit| put_back(unit, leaves.stride(), put, note))?;
+    let built = units.recall(index, |unit| put_back(unit, leaves.stride(), can_be, put, note))?;
     let built = built.ok_or_else(|| units.gone(index))?;
     leaves.take(&there)?;
     Ok(built)

@@ -1,6 +1,7 @@
 //! Splits of nodes that are too large for memory: planes from the sums of cells, and only the cells that a plane crosses
 //! are read.
 
+use pointmill_format::bintree::MAX_DEPTH;
 use serde::{Deserialize, Serialize};
 
 use super::rule;
@@ -70,6 +71,32 @@ pub(super) struct Split {
 pub(super) struct Upper {
     pub(super) splits: Vec<Option<Split>>,
     pub(super) tasks: Vec<Task>,
+}
+
+impl Upper {
+    /// True if it can be of a cloud with so many points: where others have split it, nobody has looked.
+    pub(super) fn can_be_of(&self, points: u64) -> bool {
+        let is_part = |part: &Part| part.points == part.segments.points();
+        let is_split = |split: &Split| split.axis < 3 && split.plane.is_finite();
+        let mut next = 0u64;
+        let mut follow = |task: &Task| {
+            let all = task.parts.iter().try_fold(next, |all, part| all.checked_add(part.points));
+            let is_next = task.start == next && task.path.len() <= MAX_DEPTH;
+            next = all.unwrap_or(u64::MAX);
+            is_next && all.is_some()
+        };
+        // one open end at first; a split opens one more, a task closes one
+        let ends = self.splits.iter().try_fold(1usize, |ends, split| match split {
+            _ if ends == 0 => None,
+            Some(split) => Some(ends + 1).filter(|_| is_split(split)),
+            None => Some(ends - 1),
+        });
+        self.tasks.iter().flat_map(|task| &task.parts).all(is_part)
+            && self.tasks.iter().all(&mut follow)
+            && next == points
+            && ends == Some(0)
+            && self.splits.iter().filter(|split| split.is_none()).count() == self.tasks.len()
+    }
 }
 
 /// Splits until every part has at most `task_points` points, or is a leaf, or shares one place.
