@@ -67,8 +67,8 @@ pub(crate) fn works_in(folder: &Path) {
 }
 
 /// What the user reads if the command is ended in its work, where not everything is lost.
-pub(crate) fn keeps(line: String) {
-    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(line);
+pub(crate) fn keeps(line: impl Into<Option<String>>) {
+    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = line.into();
 }
 
 /// That line, once.

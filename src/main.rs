@@ -30,7 +30,7 @@ use commands::{convert, export, extract, info, job, manual, measure, preview, va
 use exit::Failure;
 
 fn main() -> ExitCode {
-    allocator::give_back_early();
+    allocator::set_up(std::env::args_os().nth(1).is_some_and(|command| command == "job"));
     exit::remember_panics();
     interrupt::watch();
     let result = std::panic::catch_unwind(|| run(&profiles::command_line(&std::env::args_os().collect::<Vec<_>>())?))

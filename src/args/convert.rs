@@ -164,10 +164,10 @@ pub(crate) struct ConvertArgs {
     #[arg(long, help_heading = "Resources")]
     pub(crate) resume: bool,
     /// Whether a run that is ended leaves OUT.job for --resume: never, always, or auto: if the points are not expected to fit into
-    /// memory. A number of points: always, and what was read is safe each time that so many more are
-    #[arg(long, value_name = "WHEN|POINTS", default_value = "never", value_parser = parse_checkpoint,
-          allow_negative_numbers = true, help_heading = "Resources")]
-    pub(crate) checkpoint: CheckpointArg,
+    /// memory. A number of points: always, and what was read is safe each time that so many more are [default: auto]
+    #[arg(long, value_name = "WHEN|POINTS", value_parser = parse_checkpoint, allow_negative_numbers = true,
+          help_heading = "Resources")]
+    pub(crate) checkpoint: Option<CheckpointArg>,
 
     /// Writes a copy of the run report OUT/report.json to FILE
     #[arg(long, value_name = "FILE", help_heading = "Reporting")]

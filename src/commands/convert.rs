@@ -341,7 +341,7 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
     };
     plan.crs.clone_from(&args.inputs.reading.placing.crs);
     plan.resume = args.resume;
-    plan.checkpoint = match args.checkpoint {
+    plan.checkpoint = match args.checkpoint.unwrap_or(CheckpointArg::Auto) {
         CheckpointArg::Auto => Checkpoint::Auto,
         CheckpointArg::Always => Checkpoint::Always,
         CheckpointArg::Never => Checkpoint::Never,

@@ -144,7 +144,7 @@ fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
         ("--append", convert.append),
         ("--page", convert.page),
         ("--json", convert.json),
-        ("--checkpoint auto", matches!(convert.checkpoint, CheckpointArg::Auto)),
+        ("--checkpoint auto", matches!(convert.checkpoint, Some(CheckpointArg::Auto))),
     ];
     if let Some((option, _)) = useless.iter().find(|(_, given)| *given) {
         return Err(Failure::Usage(format!("{option} does not go with a job")));

@@ -203,11 +203,10 @@ impl Events for Progress {
         interrupt::works_in(folder);
     }
 
-    fn checkpoint(&self, folder: &Path) {
-        interrupt::keeps(format!(
-            "interrupted; what was read is safe in {}, and --resume goes on there",
-            folder.display()
-        ));
+    fn checkpoint(&self, folder: Option<&Path>) {
+        interrupt::keeps(folder.map(|folder| {
+            format!("interrupted; what was read is safe in {}, and --resume goes on there", folder.display())
+        }));
     }
 
     fn settling(&self) {

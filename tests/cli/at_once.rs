@@ -20,7 +20,7 @@ fn stage() -> Dir {
 }
 
 /// A run that is stopped.
-struct Stopped {
+pub(crate) struct Stopped {
     child: Child,
     stderr: BufReader<ChildStderr>,
     said: String,
@@ -28,7 +28,7 @@ struct Stopped {
 
 impl Stopped {
     /// Converts `scans`, and stops the run when it says that it begins to `phase`.
-    fn new(dir: &Dir, more: &[&str], phase: &str) -> Self {
+    pub(crate) fn new(dir: &Dir, more: &[&str], phase: &str) -> Self {
         let args = [&["convert", "scans", "-o", "out", "--progress", "json", "--threads", "1"], more].concat();
         let mut child = dir.command(args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut stderr = BufReader::new(child.stderr.take().unwrap());
@@ -40,8 +40,14 @@ impl Stopped {
         Self { child, stderr, said }
     }
 
+    /// Is killed.
+    pub(crate) fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
     /// Goes on to the end.
-    fn end(mut self) -> Ended {
+    pub(crate) fn end(mut self) -> Ended {
         signal(&self.child, "-CONT");
         std::io::Read::read_to_string(&mut self.stderr, &mut self.said).unwrap();
         let status = self.child.wait().unwrap();

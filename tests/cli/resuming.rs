@@ -10,6 +10,7 @@ use pointmill_testkit::Random;
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 
+use crate::at_once::Stopped;
 use crate::support::{Dir, Ended};
 
 const CONVERT: [&str; 7] = ["convert", "scans", "-o", "out", "--checkpoint", "50000", "-q"];
@@ -72,4 +73,83 @@ fn an_interrupted_run_says_what_is_safe_and_a_changed_one_is_refused() {
     assert!(dir.path("out.job").exists());
     dir.succeed(CONVERT);
     assert_eq!(dir.names(), ["out", "plain", "scans"]);
+}
+
+/// Points that do not fit into what the options below allow.
+fn large() -> Dir {
+    let dir = Dir::new();
+    dir.write("a.las", &Las::terrain(2000, 1).bytes());
+    for seed in 2..=3 {
+        dir.write(&format!("scans/{seed}.las"), &Las::terrain(700_000, seed).bytes());
+    }
+    dir
+}
+
+const SCARCE: [&str; 3] = ["--memory", "98MiB", "--overwrite"];
+
+#[test]
+fn a_run_that_spills_can_be_gone_on_with_unasked() {
+    let dir = large();
+    Stopped::new(&dir, &SCARCE, "build").kill();
+    assert!(dir.path("out.job").exists());
+    let on = ["convert", "scans", "-o", "out", "-q", "--threads", "1", "--resume"];
+    dir.succeed(on.iter().chain(&SCARCE));
+    assert_eq!(dir.report("out")["recalled_points"].as_u64(), Some(1_400_000));
+    assert_eq!(dir.names(), ["a.las", "out", "scans"]);
+    dir.validate("out", &["scans"]);
+    Stopped::new(&dir, &[&SCARCE[..], &["--checkpoint", "never"]].concat(), "build").kill();
+    assert!(!dir.path("out.job").exists());
+}
+
+#[test]
+fn what_a_run_has_left_goes_with_any_later_run_to_that_output_which_says_so() {
+    let dir = large();
+    let convert = |input, more: &[&'static str]| [&["convert", input, "-o", "out", "--threads", "1"], more].concat();
+    for (input, more) in
+        [("a.las", &["--overwrite"][..]), ("a.las", &["--overwrite", "--checkpoint", "never"]), ("scans", &SCARCE)]
+    {
+        Stopped::new(&dir, &SCARCE, "build").kill();
+        assert!(dir.path("out.job").exists());
+        let said = dir.succeed(convert(input, more)).stderr();
+        assert!(said.contains("out.job: removed; a run that was ended had left it"), "{said}");
+        assert_eq!(dir.names(), ["a.las", "out", "scans"]);
+        let said = dir.succeed(convert("a.las", &["--overwrite"])).stderr();
+        assert!(!said.contains("removed"), "{said}");
+    }
+    // one whose run lives is that run's
+    let first = Stopped::new(&dir, &SCARCE, "build");
+    let said = dir.succeed(convert("a.las", &["--overwrite"])).stderr();
+    assert!(!said.contains("removed"), "{said}");
+    assert_eq!(first.end().code(), 0);
+    dir.validate("out", &["scans"]);
+    assert_eq!(dir.names(), ["a.las", "out", "scans"]);
+}
+
+#[test]
+fn a_job_that_nobody_has_asked_for_costs_no_run() {
+    let dir = large();
+    dir.write("out.job/mine.txt", b"of mine");
+    let args = [&["convert", "scans", "-o", "out", "--threads", "1"], &SCARCE[..]].concat();
+    let said = dir.succeed(&args).stderr();
+    assert!(said.contains("no run can go on where this one ends") && said.contains("out.job"), "{said}");
+    dir.run([&args[..], &["--checkpoint", "always"]].concat()).failed_with(2, &["out.job"]);
+    dir.succeed(["convert", "a.las", "-o", "out", "--overwrite", "-q"]);
+    assert_eq!(std::fs::read(dir.path("out.job/mine.txt")).unwrap(), b"of mine");
+    assert_eq!(dir.names(), ["a.las", "out", "out.job", "scans"]);
+}
+
+#[test]
+fn what_ends_any_such_run_in_the_same_way_leaves_no_job() {
+    let dir = large();
+    let mut las = Las::terrain(700_000, 4);
+    las.points.iter_mut().for_each(|point| point.rgb = [0; 3]);
+    dir.write("scans/2.las", &las.bytes());
+    las.points.last_mut().unwrap().rgb = [256; 3];
+    dir.write("scans/3.las", &las.bytes());
+    let only = ["--threads", "1", "--checkpoint", "100000", "--rgb-depth", "8"];
+    let args = [&["convert", "scans", "-o", "out"], &only[..], &SCARCE].concat();
+    let said = dir.run(args);
+    said.failed_with(3, &["3.las", "255"]);
+    assert!(!said.stderr().contains("--resume"), "{}", said.stderr());
+    assert_eq!(dir.names(), ["a.las", "scans"]);
 }

@@ -88,8 +88,11 @@ fn run(
             match job {
                 // what another run would do the same with is not offered
                 Some(_) if matches!(error, ConvertError::Job(_) | ConvertError::Refused { .. }) => {}
-                Some(job) if job.has_units() => events.checkpoint(job.folder()),
-                Some(job) => job.end().iter().for_each(|left| events.warning(left)),
+                Some(job) if !error.comes_again() && job.has_units() => events.checkpoint(Some(job.folder())),
+                Some(job) => {
+                    events.checkpoint(None);
+                    job.end().iter().for_each(|left| events.warning(left));
+                }
                 None => {}
             }
             Err(error)
@@ -113,8 +116,7 @@ impl JobOf<'_> {
         }
     }
 
-    /// Begins, goes on, or checks that it is the job of this run. Returns true if there was nothing to go on with, though the plan
-    /// says so.
+    /// Begins, goes on, or checks that it is the job of this run. Returns what there is to say.
     fn join(
         &mut self,
         plan: &Plan,
@@ -123,15 +125,16 @@ impl JobOf<'_> {
         settings: serde_json::Map<String, serde_json::Value>,
         output: &Path,
         disk: &Arc<dyn Disk>,
-    ) -> Result<bool, ConvertError> {
+    ) -> Result<Vec<Warning>, ConvertError> {
         match self {
             Self::Own(job) => {
-                *job = Job::of(plan, is_large, sources, settings, output, disk)?;
-                Ok(plan.resume && job.as_ref().is_some_and(Job::is_new))
+                let (begun, warnings) = Job::of(plan, is_large, sources, settings, output, disk)?;
+                *job = begun;
+                Ok(warnings)
             }
             Self::Shared(job) => {
                 job.identify(&Identity::of(plan, sources, settings, !job.is_in_parts())?)?;
-                Ok(false)
+                Ok(Vec::new())
             }
         }
     }
@@ -205,10 +208,9 @@ fn write(
     let rt = Runtime::start(plan, budget, TempFiles::new(temp_dir, Arc::clone(disk)), events)?;
     let expected_bytes = sources.points_declared.saturating_mul(intake.schema.stride as u64);
     let is_large = expected_bytes > rt.budget.record_bytes(sources.points_declared);
-    if job.join(plan, is_large, &sources, settings(plan, targets), staged.output(), disk)? {
-        events.warning(&Warning::BeginsAnew);
-        warnings.push(Warning::BeginsAnew);
-    }
+    let of_job = job.join(plan, is_large, &sources, settings(plan, targets), staged.output(), disk)?;
+    of_job.iter().for_each(|warning| events.warning(warning));
+    warnings.extend(of_job);
     let keeper = job.keeper();
 
     let groups = outputs::groups(targets);

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{Aabb, DatasetKind, ReadError, system_reason};
+use pointmill_format::{Aabb, DatasetKind, ErrorKind, ReadError, system_reason};
 
 use crate::advice::Advice;
 use crate::plan::{ExportFormat, PlanError};
@@ -412,6 +412,15 @@ impl ConvertError {
             Self::Internal(what) => {
                 format!("internal fault: {what}; please report it with the command line and the input")
             }
+        }
+    }
+
+    /// True if a run with the same inputs and settings would end in the same way, whatever room it has.
+    pub(crate) fn comes_again(&self) -> bool {
+        match self {
+            Self::Read(error) => !matches!(error.kind(), ErrorKind::Io(_)),
+            Self::Plan(_) | Self::Unsupported(_) | Self::Input(_) | Self::Job(_) | Self::Refused { .. } => true,
+            Self::Output(_) | Self::Io { .. } | Self::Memory { .. } | Self::Interrupted | Self::Internal(_) => false,
         }
     }
 

@@ -18,11 +18,11 @@ pub(crate) const BLOCK_BYTES: usize = 8 << 20;
 /// An offset on the disk has the number of its file above these bits: 0 is the store's own, others were adopted.
 const OFFSET_BITS: u32 = 44;
 
-/// Bytes of a block that are checked together.
-const CHECK_BYTES: usize = 1 << 20;
-
 /// As many adopted files stay open.
 const MOST_OPEN: usize = 64;
+
+/// A page: smaller buffers are not worth being looked for. Of scans of a few points there are very many.
+const LEAST_SPARE: usize = 4 << 10;
 
 /// Blocks of records. A block holds records of one source and never changes; it is dropped once all of it was taken.
 pub(crate) struct Store {
@@ -40,6 +40,8 @@ pub(crate) struct Store {
     temp: TempFiles,
     /// The file outlives the run, if it is ended.
     is_kept: bool,
+    /// Other processes read the file, and this one does not need the records: none stays in memory.
+    is_for_others: bool,
     spill: Mutex<Option<Arc<DiskFile>>>,
     spilled: AtomicU64,
     adopted: Mutex<Adopted>,
@@ -109,12 +111,13 @@ impl Store {
     /// An empty store for `uses` outputs that each take every record once. What finds no room in `memory` goes into a
     /// temporary file.
     pub(crate) fn new(temp: TempFiles, stride: usize, uses: u32, memory: &Arc<Pool>) -> Arc<Self> {
-        Self::on(None, temp, stride, uses, memory)
+        Self::on(None, false, temp, stride, uses, memory)
     }
 
-    /// [`Self::new`] with a file that may outlive the run.
+    /// [`Self::new`] with a file that may outlive the run. `is_for_others`: other processes read it, and this one takes nothing back.
     pub(crate) fn on(
         file: Option<DiskFile>,
+        is_for_others: bool,
         temp: TempFiles,
         stride: usize,
         uses: u32,
@@ -130,6 +133,7 @@ impl Store {
             spare: Mutex::default(),
             temp,
             is_kept: file.is_some(),
+            is_for_others,
             spill: Mutex::new(file.map(Arc::new)),
             spilled: AtomicU64::new(0),
             adopted: Mutex::default(),
@@ -266,9 +270,9 @@ impl Store {
 
     /// True if a block is in the file as it was written.
     fn is_whole(&self, block: &SafeBlock) -> Result<bool, ConvertError> {
-        let (mut at, mut sum, mut part) = (0, 0, vec![0; CHECK_BYTES.min(block.bytes as usize)]);
+        let (mut at, mut sum, mut part) = (0, 0, vec![0; os_hints::PART_BYTES.min(block.bytes as usize)]);
         while at < block.bytes {
-            let part = &mut part[..CHECK_BYTES.min((block.bytes - at) as usize)];
+            let part = &mut part[..os_hints::PART_BYTES.min((block.bytes - at) as usize)];
             match self.read_disk(part, block.offset + at, "reading the records") {
                 Ok(()) => sum = crc32c::crc32c_append(sum, part),
                 Err(error) if is_missing(&error) => return Ok(false),
@@ -311,7 +315,9 @@ impl Store {
         let keeps_buffer = records.len() * 2 > records.capacity();
         let cost = if keeps_buffer { records.capacity() as u64 } else { bytes };
         let has_room = || self.memory.try_take(Consumer::Records, cost);
-        let place = if has_room() || (self.drop_spare(cost)? > 0 && has_room()) {
+        let place = if self.is_for_others {
+            self.spill(records)?
+        } else if has_room() || (self.drop_spare(cost)? > 0 && has_room()) {
             self.in_memory.fetch_add(cost, Ordering::Relaxed);
             let kept = if keeps_buffer { std::mem::take(records) } else { records.as_slice().to_vec() };
             Place::Memory(Arc::new(kept))
@@ -392,11 +398,11 @@ impl Store {
     fn keep(&self, bytes: Arc<Vec<u8>>) -> Result<(), ConvertError> {
         let size = bytes.capacity() as u64;
         match Arc::try_unwrap(bytes) {
-            Ok(mut buffer) => {
+            Ok(mut buffer) if buffer.capacity() >= LEAST_SPARE => {
                 buffer.clear();
                 self.spare.lock().map_err(|_| poisoned())?.push(buffer);
             }
-            Err(_) => self.give(size),
+            _ => self.give(size),
         }
         Ok(())
     }

@@ -96,7 +96,9 @@ impl<'a> Pass<'a> {
         rt: &'a Runtime<'a>,
     ) -> Self {
         let Start { plan, sources, intake, demand, hint, far_cut, number } = start.clone();
-        let store = Store::on(file, rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
+        let is_own = matches!(keeper, Some(Keeper::Own(_)));
+        let is_for_others = file.is_some() && !is_own;
+        let store = Store::on(file, is_for_others, rt.temp.clone(), intake.schema.stride, demand.uses, &rt.memory);
         let evict: Arc<dyn Evict> = Arc::clone(&store) as _;
         rt.memory.evict_from(Arc::downgrade(&evict));
         let context = Context {
@@ -211,7 +213,7 @@ impl<'a> Pass<'a> {
         unit.seen = self.context.take_touched()?;
         read_unit::keep(job, &self.context, number, pairs, first_block, &mut unit, self.rt)?;
         if job.is_safe() {
-            self.rt.events().checkpoint(job.folder());
+            self.rt.events().checkpoint(Some(job.folder()));
         }
         Ok(unit)
     }

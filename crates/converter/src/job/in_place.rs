@@ -5,9 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::ConvertError;
 use crate::runtime::DiskFile;
-
-/// Bytes that are read back together.
-const READ_BYTES: u64 = 1 << 20;
+use crate::runtime::os_hints::PART_BYTES;
 
 /// Where bytes are in the output, and their CRC-32C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,9 +38,9 @@ impl KeptFile<'_> {
         if end > self.file.len("looking at what was built")? {
             return Ok(false);
         }
-        let (mut buffer, mut sum) = (vec![0; READ_BYTES.min(place.bytes) as usize], 0);
+        let (mut buffer, mut sum) = (vec![0; place.bytes.min(PART_BYTES as u64) as usize], 0);
         while at < end {
-            let part = (end - at).min(READ_BYTES);
+            let part = (end - at).min(PART_BYTES as u64);
             let part_of_buffer = &mut buffer[..part as usize];
             self.file.read_at(part_of_buffer, at, "looking at what was built")?;
             sum = crc32c::crc32c_append(sum, part_of_buffer);
@@ -85,7 +83,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (path, disk): (_, Arc<dyn Disk>) = (dir.path().join("file"), Arc::new(SystemDisk));
         let file = DiskFile::create(&path, path.clone(), &disk).unwrap();
-        let bytes: Vec<u8> = (0..READ_BYTES + 77).map(|i| (i % 251) as u8).collect();
+        let bytes: Vec<u8> = (0..PART_BYTES as u64 + 77).map(|i| (i % 251) as u8).collect();
         file.write_at(&bytes, 10 + 5, "writing").unwrap();
         let kept = KeptFile { file: &file, start: 10 };
         let place = Place::of(5, &bytes);
@@ -99,7 +97,7 @@ mod tests {
         ] {
             assert!(!kept.holds(&other).unwrap(), "{other:?}");
         }
-        for at in [15, 15 + READ_BYTES, 15 + place.bytes - 1] {
+        for at in [15, 15 + PART_BYTES as u64, 15 + place.bytes - 1] {
             let was = bytes[(at - 15) as usize];
             file.write_at(&[was ^ 8], at, "writing").unwrap();
             assert!(!kept.holds(&place).unwrap(), "byte {at}");

@@ -88,7 +88,8 @@ pub(crate) fn folder_of(output: &Path, temp_dir: Option<&Path>) -> PathBuf {
 }
 
 impl Job {
-    /// The job of a run, as the plan has it; `is_large`: its points are not expected to fit into memory. `output`: its place.
+    /// The job of a run, as the plan has it, and what there is to say of it; `is_large`: its points are not expected to fit into memory.
+    /// `output`: its place. What a run that is over has left for this output goes, unless this one goes on with it.
     ///
     /// # Errors
     /// The run that is to go on is not this one, another run works with it, or the disk refuses.
@@ -99,26 +100,44 @@ impl Job {
         settings: serde_json::Map<String, serde_json::Value>,
         output: &Path,
         disk: &Arc<dyn Disk>,
-    ) -> Result<Option<Self>, ConvertError> {
+    ) -> Result<(Option<Self>, Vec<Warning>), ConvertError> {
+        let folder = folder_of(output, plan.temp_dir.as_deref());
         let is_wanted = match plan.checkpoint {
             Checkpoint::Always => true,
             Checkpoint::Auto => is_large,
             Checkpoint::Never => false,
         };
         if !is_wanted && !plan.resume {
-            return Ok(None);
+            return Ok((None, remove_dead(&folder).into_iter().collect()));
         }
-        let folder = folder_of(output, plan.temp_dir.as_deref());
         let identity = Identity::of(plan, sources, settings, true)?;
-        let resumed = if plan.resume { Self::resume(folder.clone(), &identity, disk)? } else { None };
-        resumed.map_or_else(|| Self::begin(folder, &identity, disk), Ok).map(Some)
+        let mut warnings = Vec::new();
+        if plan.resume {
+            if let Some(job) = Self::resume(folder.clone(), &identity, disk)? {
+                return Ok((Some(job), warnings));
+            }
+            warnings.push(Warning::BeginsAnew);
+        }
+        let is_asked_for = plan.resume || plan.checkpoint == Checkpoint::Always;
+        let begun = match folder.exists() {
+            true => remove(&folder).map(|()| warnings.push(Warning::JobRemoved { folder: folder.clone() })),
+            false => Ok(()),
+        };
+        match begun.and_then(|()| Self::begin(folder.clone(), &identity, disk)) {
+            Ok(job) => Ok((Some(job), warnings)),
+            Err(error @ ConvertError::Job(JobFault::InUse { .. })) => Err(error),
+            Err(error) if is_asked_for => Err(error),
+            // nobody has asked for it: the run is worth more
+            Err(error) => {
+                let _ = remove_files(&folder);
+                warnings.push(Warning::NoJob { why: error.to_string() });
+                Ok((None, warnings))
+            }
+        }
     }
 
-    /// Begins a job, in the place of one that is there, if its run is over.
+    /// Begins a job.
     fn begin(folder: PathBuf, identity: &Identity, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
-        if folder.exists() {
-            remove(&folder)?;
-        }
         create_folder(&**disk, &folder).map_err(|e| ConvertError::io(&folder, "making the job folder", e))?;
         let lock = lock(&folder, FileLock::create)?;
         let mut journal = Journal::create(&folder.join(JOURNAL), disk)?;
@@ -332,6 +351,19 @@ fn lock(folder: &Path, take: impl FnOnce(&Path) -> std::io::Result<Locked>) -> R
         Locked::Ours(lock) => Ok(Some(lock)),
         Locked::Taken => Err(JobFault::InUse { folder: folder.to_path_buf() }.into()),
         Locked::Unknown => Ok(None),
+    }
+}
+
+/// Removes what a run that is over has left, if that is a job; what there is to say.
+fn remove_dead(folder: &Path) -> Option<Warning> {
+    if !folder.join(JOURNAL).is_file() {
+        return None;
+    }
+    let folder = folder.to_path_buf();
+    match remove(&folder) {
+        Ok(()) => Some(Warning::JobRemoved { folder }),
+        Err(ConvertError::Job(_)) => None, // another run works with it, or it is none
+        Err(error) => Some(Warning::Leftover { path: folder, why: error.to_string() }),
     }
 }
 

@@ -15,17 +15,12 @@ use serde::de::DeserializeOwned;
 
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::disk::{rename, sync_folder};
+use crate::runtime::os_hints::PART_BYTES;
 use crate::runtime::{Disk, DiskFile};
 
 const MAGIC: &[u8; 16] = b"pointmill unit 1";
 const TAIL_BYTES: u64 = 28;
 const ENTRY_BYTES: usize = 20;
-
-/// Bytes that are written together.
-const WRITE_BYTES: usize = 1 << 20;
-
-/// Bytes that are read together where a section is only checked.
-const CHECK_BYTES: usize = 1 << 20;
 
 /// A section of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,10 +94,10 @@ impl UnitWriter {
     }
 
     fn append(&mut self, bytes: &[u8]) -> Result<(), ConvertError> {
-        if self.buffer.len() + bytes.len() > WRITE_BYTES {
+        if self.buffer.len() + bytes.len() > PART_BYTES {
             self.flush()?;
         }
-        if bytes.len() > WRITE_BYTES {
+        if bytes.len() > PART_BYTES {
             self.file.write_at(bytes, self.written, "writing a unit")?;
             self.written += bytes.len() as u64;
         } else {
@@ -234,9 +229,9 @@ impl UnitReader {
     /// The file, and where a section begins in it, once its bytes were found whole.
     pub(crate) fn place(&self, index: usize) -> Result<(Arc<DiskFile>, u64), ConvertError> {
         let mut reader = self.reader(index)?;
-        let mut buffer = vec![0; CHECK_BYTES];
+        let mut buffer = vec![0; reader.left().min(PART_BYTES as u64) as usize];
         while reader.left() > 0 {
-            let part = reader.left().min(CHECK_BYTES as u64) as usize;
+            let part = reader.left().min(PART_BYTES as u64) as usize;
             reader.read(&mut buffer[..part])?;
         }
         reader.end()?;

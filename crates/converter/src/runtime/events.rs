@@ -43,8 +43,8 @@ pub trait Events: Sync {
     /// All that the run has made so far is in this folder, but for temporary files without a name. It is removed if the
     /// run fails.
     fn works_in(&self, _folder: &Path) {}
-    /// What was read so far is safe in this folder, and another run can go on from there.
-    fn checkpoint(&self, _folder: &Path) {}
+    /// What was read so far is safe in this folder, and another run can go on from there; `None`: nothing is any more.
+    fn checkpoint(&self, _folder: Option<&Path>) {}
     /// From now on a request to stop changes nothing: the output gets its name, or what was made is removed.
     fn settling(&self) {}
     /// True if the run must end; asked often.

@@ -7,6 +7,10 @@
 
 use std::fs::File;
 
+/// Bytes of a file that are read or written together where only their number counts. The allocator keeps buffers of that size for
+/// the next; for much larger ones it asks the system each time, which costs a fault for each page.
+pub(crate) const PART_BYTES: usize = 256 << 10;
+
 /// An empty buffer of that capacity, in large pages where the system has them.
 pub(crate) fn buffer(capacity: usize) -> Vec<u8> {
     let mut buffer = Vec::with_capacity(capacity);

@@ -69,6 +69,16 @@ pub enum Warning {
     },
     /// There is no run to go on with: this one begins anew.
     BeginsAnew,
+    /// What a run had left to go on with was removed, as this one begins anew.
+    JobRemoved {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Another run cannot go on where this one ends, if it does not come to its end.
+    NoJob {
+        /// Why.
+        why: String,
+    },
     /// The declared bounds, or the coordinate step chosen from them, do not fit the points: they are read again.
     ReadAgain,
     /// The process took more memory than it was allowed.
@@ -218,6 +228,8 @@ impl Warning {
             Self::InputSkipped { .. } => "input_skipped",
             Self::PointsSkipped { .. } => "points_skipped",
             Self::BeginsAnew => "begins_anew",
+            Self::JobRemoved { .. } => "job_removed",
+            Self::NoJob { .. } => "no_job",
             Self::ReadAgain => "read_again",
             Self::AboveCeiling { .. } => "above_ceiling",
             Self::FinerStep { .. } => "finer_step",

@@ -21,6 +21,11 @@ impl Warning {
             Self::InputSkipped { error, .. } => format!("input skipped: {error}"),
             Self::PointsSkipped { points, error, .. } => format!("{points} points skipped: {error}"),
             Self::BeginsAnew => "there is no unfinished run to go on with; this one begins anew".to_owned(),
+            Self::JobRemoved { folder } => format!(
+                "{}: removed; a run that was ended had left it to go on with, and this one begins anew",
+                folder.display()
+            ),
+            Self::NoJob { why } => format!("no run can go on where this one ends: {why}"),
             Self::ReadAgain => "the points lie outside the bounds that were declared or sampled, or their extent does \
                                 not fit the chosen step; reading again with the measured bounds"
                 .to_owned(),

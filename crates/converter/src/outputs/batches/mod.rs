@@ -139,7 +139,7 @@ impl Output for BatchesSettings {
         let job = units.and_then(|units| Some((units, units.shared()?)));
         let records = job.map(|(_, job)| job.more_records(&rt.temp)).transpose()?.flatten();
         let (records, records_name) = records.unzip();
-        let sorted = Store::on(records, rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
+        let sorted = Store::on(records, false, rt.temp.clone(), cloud.frame.stride + WORD_BYTES, 1, &rt.memory);
         let can_be = |tasks: &Vec<Task>| Task::can_be_of(tasks, points);
         let tasks = build.divided(can_be, || buckets::tasks(cloud, rt, &frame, task_points))?;
         let cut = || large::cut(tasks, cloud, rt, (&frame, &content), &sorted, task_points);

@@ -7,7 +7,7 @@ use std::mem::take;
 use pointmill_format::Aabb;
 use pointmill_format::bintree::{LeafEncoder, Node, NodeKind, leaf_center};
 
-use super::subtree::{Builder, Built, record_offset, unite};
+use super::subtree::{Builder, Built, Room, record_offset, unite};
 use super::upper::Task;
 use crate::cloud::{BigSort, Cloud, Ledger, StoredPoint, morton, position};
 use crate::error::ConvertError;
@@ -36,7 +36,7 @@ impl Builder<'_> {
         rt: &Runtime<'_>,
         memory_bytes: u64,
     ) -> Result<Built, ConvertError> {
-        self.release();
+        self.room = Room::default();
         let Cloud { store, facts, frame, .. } = self.cloud;
         let (stride, columns, bounds) = (frame.stride, self.columns, task.moments().bounds);
         let [min, max] = [bounds.min, bounds.max].map(|q| frame.origin.stored(q));
@@ -102,7 +102,7 @@ impl Builder<'_> {
         lost: Option<&mut LostSort<'a>>,
     ) -> Result<(), ConvertError> {
         let (columns, stride) = (self.columns, self.cloud.frame.stride);
-        let mut bytes = take(&mut self.bytes);
+        let mut bytes = take(&mut self.room.bytes);
         bytes.clear();
         let mut encoder = LeafEncoder::new(&columns.record, center, &mut bytes);
         for record in records.chunks_exact(stride) {
@@ -121,7 +121,7 @@ impl Builder<'_> {
         }
         self.leaves.put_part(&leaf.path, start, leaf.written, &bytes)?;
         leaf.written += (records.len() / stride) as u64;
-        self.bytes = bytes;
+        self.room.bytes = bytes;
         Ok(())
     }
 }

@@ -23,6 +23,7 @@ mod unit_check;
 mod upper;
 
 use std::io::BufWriter;
+use std::sync::{Mutex, PoisonError};
 
 use pointmill_format::bintree::{CORE_BYTES, Header, INDEX_FILE, IndexWriter, Layout, Node};
 use pointmill_format::{AttributeType, DatasetKind, Deviations};
@@ -34,7 +35,7 @@ use self::assemble::{assemble, figures};
 use self::files::{Leaves, Place};
 use self::leaf::Columns;
 use self::settings::{RGBA, class_of};
-use self::subtree::{Builder, Built};
+use self::subtree::{Builder, Built, Room};
 use self::unit_check::can_be_of;
 use super::attributes::changed;
 use super::origin::own_key;
@@ -198,13 +199,18 @@ impl Make<'_> {
         let (layout, stride) = (self.settings.layout, self.columns.record.stride());
         let is_packed = layout == Layout::Packed;
         let can_be = |index: usize, said: &_| can_be_of(said, &self.tasks[index], stride as u64, is_packed);
+        // memory of units that are done, for the next
+        let rooms: Mutex<Vec<Room>> = Mutex::default();
         make_units(units, &points, output, self.rt, can_be, |index, file| {
             let log = UnitLog::begin(file, output);
             let built = {
                 let put = |place: Place, records: &[u8]| log.put(place, records);
                 let leaves = Leaves::of_unit(layout, stride, &put);
-                let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves);
-                self.one(&mut builder, index)?
+                let room = rooms.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+                let mut builder = Builder::new(self.cloud, self.settings, self.columns, &leaves, room);
+                let built = self.one(&mut builder, index)?;
+                rooms.lock().unwrap_or_else(PoisonError::into_inner).push(builder.room);
+                built
             };
             log.end(&built)
         })
@@ -222,7 +228,7 @@ impl Make<'_> {
             tasks.len(),
             || {
                 (
-                    Builder::new(cloud, settings, columns, leaves),
+                    Builder::new(cloud, settings, columns, leaves, Room::default()),
                     Vec::new(),
                     Reservation::new(&rt.memory, Consumer::Nodes),
                 )

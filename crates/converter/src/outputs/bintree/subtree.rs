@@ -38,16 +38,22 @@ pub(super) struct Builder<'a> {
     pub(super) settings: &'a BintreeSettings,
     pub(super) columns: &'a Columns,
     pub(super) leaves: &'a Leaves<'a>,
+    pub(super) room: Room,
+    pub(super) recovery: Recovery,
+    /// Of the subtree so far.
+    pub(super) deviations: Deviations,
+    pub(super) lost: Lost,
+}
+
+/// Memory for one subtree after the other.
+#[derive(Default)]
+pub(super) struct Room {
     records: Vec<u8>,
     items: Vec<Item>,
     swap: Vec<Item>,
     sorter: MortonSorter,
     order: Vec<u32>,
     pub(super) bytes: Vec<u8>,
-    pub(super) recovery: Recovery,
-    /// Of the subtree so far.
-    pub(super) deviations: Deviations,
-    pub(super) lost: Lost,
 }
 
 /// A node that is still to be divided.
@@ -78,45 +84,35 @@ impl<'a> Builder<'a> {
         settings: &'a BintreeSettings,
         columns: &'a Columns,
         leaves: &'a Leaves<'a>,
+        room: Room,
     ) -> Self {
         Self {
             cloud,
             settings,
             columns,
             leaves,
-            records: Vec::new(),
-            items: Vec::new(),
-            swap: Vec::new(),
-            sorter: MortonSorter::default(),
-            order: Vec::new(),
-            bytes: Vec::new(),
+            room,
             recovery: Recovery::new(cloud),
             deviations: Deviations::default(),
             lost: Lost::default(),
         }
     }
 
-    /// Gives back the memory of the tasks so far.
-    pub(super) fn release(&mut self) {
-        (self.records, self.items, self.swap) = (Vec::new(), Vec::new(), Vec::new());
-        (self.sorter, self.order, self.bytes) = (MortonSorter::default(), Vec::new(), Vec::new());
-    }
-
     /// Builds the subtree of a task and writes its leaves.
     pub(super) fn build(&mut self, task: &Task) -> Result<Built, ConvertError> {
         let stride = self.cloud.frame.stride;
         let mut ledger = Ledger::default();
-        self.records.clear();
-        os_hints::reserve(&mut self.records, task.points() as usize * stride);
+        self.room.records.clear();
+        os_hints::reserve(&mut self.room.records, task.points() as usize * stride);
         let Cloud { store, facts, .. } = self.cloud;
         for segment in task.segments() {
-            ledger.load(store, *segment, stride, &facts.widening, &mut self.records)?;
+            ledger.load(store, *segment, stride, &facts.widening, &mut self.room.records)?;
         }
-        self.items.clear();
-        let records = self.records.chunks_exact(stride).zip(0u32..);
-        self.items.extend(records.map(|(r, record)| Item { q: position(r), record }));
+        self.room.items.clear();
+        let records = self.room.records.chunks_exact(stride).zip(0u32..);
+        self.room.items.extend(records.map(|(r, record)| Item { q: position(r), record }));
         let mut nodes = Vec::new();
-        let mut stack = vec![Todo { range: 0..self.items.len(), path: task.path.clone(), what: What::Split }];
+        let mut stack = vec![Todo { range: 0..self.room.items.len(), path: task.path.clone(), what: What::Split }];
         // Nodes whose high side has not come yet, deepest last.
         let mut open: Vec<usize> = Vec::new();
         while let Some(todo) = stack.pop() {
@@ -160,7 +156,7 @@ impl<'a> Builder<'a> {
         let inner = |kind| Some(Node::new(Aabb::EMPTY, count as u64, kind));
         let leaves = match what {
             What::Split => {
-                let extent = Extent::of(&self.items[range.clone()]);
+                let extent = Extent::of(&self.room.items[range.clone()]);
                 if count <= capacity {
                     return self.leaf(&range, &extent, &path, start, true, ledger).map(Some);
                 }
@@ -186,7 +182,7 @@ impl<'a> Builder<'a> {
             What::Cut { leaves } => leaves,
         };
         if leaves == 1 {
-            let extent = Extent::of(&self.items[range.clone()]);
+            let extent = Extent::of(&self.room.items[range.clone()]);
             return self.leaf(&range, &extent, &path, start, false, ledger).map(Some);
         }
         // Runs differ by one point at most, larger ones first.
@@ -200,11 +196,11 @@ impl<'a> Builder<'a> {
 
     /// Moves what is not above `m` to the front, in order; returns how many these are.
     fn partition(&mut self, range: Range<usize>, axis: usize, m: i32) -> usize {
-        let items = &mut self.items[range];
-        if self.swap.len() < items.len() {
-            self.swap.resize(items.len(), Item::default());
+        let items = &mut self.room.items[range];
+        if self.room.swap.len() < items.len() {
+            self.room.swap.resize(items.len(), Item::default());
         }
-        let swap = &mut self.swap[..items.len()];
+        let swap = &mut self.room.swap[..items.len()];
         // Both places are written and one of them counts: no branch that half of the points mispredict.
         let (mut low, mut high) = (0, 0);
         for i in 0..items.len() {
@@ -220,7 +216,7 @@ impl<'a> Builder<'a> {
     }
 
     fn median(&self, range: Range<usize>, axis: usize, max: i32) -> i32 {
-        let mut values: Vec<i32> = self.items[range].iter().map(|i| i.q[axis]).collect();
+        let mut values: Vec<i32> = self.room.items[range].iter().map(|i| i.q[axis]).collect();
         let rank = rule::median_rank(values.len() as u64) as usize;
         let (_, value, _) = values.select_nth_unstable(rank);
         let value = *value;
@@ -231,10 +227,10 @@ impl<'a> Builder<'a> {
     /// Points of one place.
     fn put_in_order(&mut self, range: &Range<usize>) {
         let stride = self.cloud.frame.stride;
-        let (columns, records) = (self.columns, &self.records);
+        let (columns, records) = (self.columns, &self.room.records);
         let record = |item: &Item| &records[item.record as usize * stride..][..stride];
         // In place: there may be as many as a task has points.
-        self.items[range.clone()].sort_unstable_by(|a, b| columns.compare(record(a), record(b)));
+        self.room.items[range.clone()].sort_unstable_by(|a, b| columns.compare(record(a), record(b)));
     }
 
     /// Encodes and writes a leaf.
@@ -248,23 +244,23 @@ impl<'a> Builder<'a> {
         ledger: &mut Ledger,
     ) -> Result<Node, ConvertError> {
         let stride = self.cloud.frame.stride;
-        let (columns, records) = (self.columns, &self.records);
+        let (columns, records) = (self.columns, &self.room.records);
         let record = |item: &Item| &records[item.record as usize * stride..][..stride];
-        let items = &self.items[range.clone()];
+        let items = &self.room.items[range.clone()];
         if must_order {
-            order(items, extent.min, extent.max, &mut self.sorter, &mut self.order, |a, b| {
+            order(items, extent.min, extent.max, &mut self.room.sorter, &mut self.room.order, |a, b| {
                 columns.compare(record(a), record(b))
             });
         } else {
-            self.order.clear();
-            self.order.extend(0..items.len() as u32);
+            self.room.order.clear();
+            self.room.order.extend(0..items.len() as u32);
         }
         let world = World { lattice: &self.cloud.lattice.lattice, origin: self.cloud.frame.origin };
         let center = leaf_center(world.of(StoredPoint(extent.min)), world.of(StoredPoint(extent.max)));
-        self.bytes.clear();
-        self.bytes.reserve(items.len() * columns.record.stride());
-        let mut leaf = LeafEncoder::new(&columns.record, center, &mut self.bytes);
-        for &i in &self.order {
+        self.room.bytes.clear();
+        self.room.bytes.reserve(items.len() * columns.record.stride());
+        let mut leaf = LeafEncoder::new(&columns.record, center, &mut self.room.bytes);
+        for &i in &self.room.order {
             let item = &items[i as usize];
             let stored = record(item);
             ledger.written.add(stored);
@@ -277,18 +273,18 @@ impl<'a> Builder<'a> {
         if !self.recovery.is_certain(deviations.max) {
             self.lost.merge(self.lost_of(range, center));
         }
-        let start = self.leaves.put(path, start + range.start as u64, &self.bytes)?;
+        let start = self.leaves.put(path, start + range.start as u64, &self.room.bytes)?;
         Ok(Node::new(bounds, items.len() as u64, NodeKind::Leaf { center, start }))
     }
 
     /// Points of the leaf just encoded that do not come back from its bytes.
     fn lost_of(&self, range: &Range<usize>, center: [f64; 3]) -> Lost {
         let origin = self.cloud.frame.origin;
-        let points = self.order.iter().zip(self.bytes.chunks_exact(self.columns.record.stride()));
+        let points = self.room.order.iter().zip(self.room.bytes.chunks_exact(self.columns.record.stride()));
         self.recovery.count(points.map(|(&i, bytes)| {
             let offset = record_offset(bytes);
             let decoded = std::array::from_fn(|a| center[a] + f64::from(offset[a]));
-            (decoded, origin.job(self.items[range.start + i as usize].q).0)
+            (decoded, origin.job(self.room.items[range.start + i as usize].q).0)
         }))
     }
 }
