@@ -603,27 +603,41 @@ mod tests {
 
     #[test]
     fn emptied_blocks_hold_what_is_put_back_and_give_way_to_others() {
-        let (_dir, store) = store(1);
+        const KIB: usize = 1 << 10;
+        let dir = tempfile::tempdir().unwrap();
+        let temp = TempFiles::new(dir.path().to_path_buf(), Arc::new(SystemDisk));
+        let store = Store::new(temp, LEAST_SPARE, 1, &Arc::new(Pool::new(40 << 10, 40 << 10)));
+        let free = || store.memory.free() / KIB as u64;
         let a = store.open(0).unwrap();
-        store.fill(a, &mut vec![1; 20]).unwrap();
+        store.fill(a, &mut vec![1; 20 * KIB]).unwrap();
         let mut out = Vec::new();
         store.take_to_put_back(Segment { block: a, start: 0, count: 2 }, true, &mut out).unwrap();
-        assert_eq!(store.buffer(8).unwrap().capacity(), 8); // records of the block are still to be taken
+        assert_eq!(store.buffer(8 * KIB).unwrap().capacity(), 8 * KIB); // records of the block are still to be taken
         store.take_to_put_back(Segment { block: a, start: 2, count: 3 }, true, &mut out).unwrap();
-        assert_eq!((out.len(), store.memory.free()), (20, 20));
-        assert_eq!(store.buffer(9).unwrap().capacity(), 9); // twice as large as that: `fill` would copy
-        let mut buffer = store.buffer(16).unwrap();
-        assert_eq!((buffer.len(), buffer.capacity(), store.memory.free()), (0, 20, 40));
-        buffer.extend_from_slice(&[2; 16]);
+        assert_eq!((out.len(), free()), (20 * KIB, 20));
+        assert_eq!(store.buffer(9 * KIB).unwrap().capacity(), 9 * KIB); // twice as large as that: `fill` would copy
+        let mut buffer = store.buffer(16 * KIB).unwrap();
+        assert_eq!((buffer.len(), buffer.capacity(), free()), (0, 20 * KIB, 40));
+        buffer.resize(16 * KIB, 2);
         let b = store.open(0).unwrap();
         store.fill(b, &mut buffer).unwrap();
         store.take_to_put_back(Segment { block: b, start: 0, count: 4 }, true, &mut out).unwrap();
-        assert_eq!((store.memory.free(), store.spilled_bytes()), (20, 0));
+        assert_eq!((free(), store.spilled_bytes()), (20, 0));
         let c = store.open(0).unwrap();
-        store.fill(c, &mut vec![3; 40]).unwrap(); // has the room of the spare buffer
-        assert_eq!((store.memory.free(), store.spilled_bytes()), (0, 0));
+        store.fill(c, &mut vec![3; 40 * KIB]).unwrap(); // has the room of the spare buffer
+        assert_eq!((free(), store.spilled_bytes()), (0, 0));
         store.take_to_put_back(Segment { block: c, start: 0, count: 10 }, true, &mut out).unwrap();
         store.evict(1).unwrap();
-        assert_eq!((store.memory.free(), store.spilled_bytes()), (40, 0));
+        assert_eq!((free(), store.spilled_bytes()), (40, 0));
+    }
+
+    #[test]
+    fn buffers_of_a_few_records_are_not_kept() {
+        let (_dir, store) = store(1);
+        let a = store.open(0).unwrap();
+        store.fill(a, &mut vec![1; 20]).unwrap();
+        store.take_to_put_back(Segment { block: a, start: 0, count: 5 }, true, &mut Vec::new()).unwrap();
+        assert_eq!(store.memory.free(), 40);
+        assert_eq!(store.buffer(16).unwrap().capacity(), 16);
     }
 }
