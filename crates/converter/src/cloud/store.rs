@@ -488,7 +488,7 @@ fn damaged(file: &Path, byte: u64) -> ConvertError {
 
 impl Evict for Store {
     /// Spare buffers go first, then the last blocks: they are needed last.
-    fn evict(&self, bytes: u64) -> Result<(), ConvertError> {
+    fn evict(&self, bytes: u64) -> Result<u64, ConvertError> {
         let (mut freed, mut next) = (self.drop_spare(bytes)?, usize::MAX);
         while freed < bytes {
             let found = {
@@ -516,7 +516,7 @@ impl Evict for Store {
                 self.give(records.capacity() as u64);
             }
         }
-        Ok(())
+        Ok(freed)
     }
 }
 

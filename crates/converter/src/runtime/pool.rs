@@ -1,7 +1,8 @@
 //! Memory that is not known beforehand, shared out while a run goes on: who takes it, and who makes room.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Duration;
 
 use crate::error::{ConvertError, MemoryNeed};
 
@@ -40,12 +41,19 @@ impl Consumer {
 
 /// Something that can put memory on the disk.
 pub(crate) trait Evict: Send + Sync {
-    /// Gives back at least `bytes` to the pool, if it has as many.
+    /// Gives back at least `bytes` to the pool, if it has as many; returns how many it gave.
     ///
     /// # Errors
     /// Writing fails.
-    fn evict(&self, bytes: u64) -> Result<(), ConvertError>;
+    fn evict(&self, bytes: u64) -> Result<u64, ConvertError>;
 }
+
+/// Records may be counted already and not be there to be evicted yet, or be counted still: for moments, while another thread adds or
+/// takes them.
+const MOST_MOMENTS: u32 = 100;
+
+/// How long such a moment is.
+const MOMENT: Duration = Duration::from_millis(1);
 
 /// The shared part of the memory below the ceiling.
 pub(crate) struct Pool {
@@ -57,6 +65,8 @@ pub(crate) struct Pool {
     used: AtomicU64,
     by: [AtomicU64; CONSUMERS],
     evict: Mutex<Option<Weak<dyn Evict>>>,
+    /// One thread makes room at a time; others wait for what it frees.
+    evicting: Mutex<()>,
 }
 
 impl Pool {
@@ -69,6 +79,7 @@ impl Pool {
             used: AtomicU64::new(0),
             by: Default::default(),
             evict: Mutex::new(None),
+            evicting: Mutex::new(()),
         }
     }
 
@@ -118,20 +129,34 @@ impl Pool {
     /// # Errors
     /// There is no room; the error says what ceiling would have had it.
     pub(crate) fn take(&self, who: Consumer, bytes: u64) -> Result<(), ConvertError> {
+        let mut moments = 0;
         while !self.try_take(who, bytes) {
-            let missing = bytes.saturating_sub(self.free());
             let records = self.taken_by(Consumer::Records);
-            let evict = self.evict.lock().ok().and_then(|slot| slot.as_ref().and_then(Weak::upgrade));
-            if let Some(evict) = evict.filter(|_| records > 0) {
-                evict.evict(missing)?;
+            // what would be missing if there were none
+            let others = self.used.load(Ordering::Relaxed).saturating_sub(records);
+            let missing = others.saturating_add(bytes).saturating_sub(self.capacity);
+            if missing == 0 && (self.make_room(bytes)? || self.free() >= bytes) {
+                continue; // another thread may take it first, and has records to be put on the disk then
             }
-            if self.taken_by(Consumer::Records) >= records && self.free() < bytes {
+            if records == 0 || moments == MOST_MOMENTS {
                 // half of what is added goes to the chunks of the threads
+                let missing = missing.max(bytes.saturating_sub(self.free().saturating_add(records)));
                 let needed = self.ceiling + missing.saturating_mul(2).div_ceil(9) * 10 + (1 << 20);
                 return Err(ConvertError::Memory { ceiling: self.ceiling, needed, why: MemoryNeed::Part(who.name()) });
             }
+            moments += 1;
+            std::thread::sleep(MOMENT);
         }
         Ok(())
+    }
+
+    /// Puts records on the disk until `bytes` are free; false: there were none to be put there.
+    fn make_room(&self, bytes: u64) -> Result<bool, ConvertError> {
+        let evict = self.evict.lock().ok().and_then(|slot| slot.as_ref().and_then(Weak::upgrade));
+        let Some(evict) = evict.filter(|_| self.taken_by(Consumer::Records) > 0) else { return Ok(false) };
+        let _alone = self.evicting.lock().unwrap_or_else(PoisonError::into_inner);
+        let missing = bytes.saturating_sub(self.free());
+        Ok(missing == 0 || evict.evict(missing)? > 0)
     }
 
     /// Gives `bytes` back.
@@ -219,11 +244,40 @@ mod tests {
     struct Records(Weak<Pool>);
 
     impl Evict for Records {
-        fn evict(&self, bytes: u64) -> Result<(), ConvertError> {
+        fn evict(&self, bytes: u64) -> Result<u64, ConvertError> {
             let pool = self.0.upgrade().unwrap();
-            pool.give(Consumer::Records, bytes.min(pool.taken_by(Consumer::Records)));
-            Ok(())
+            let given = bytes.min(pool.taken_by(Consumer::Records));
+            pool.give(Consumer::Records, given);
+            Ok(given)
         }
+    }
+
+    /// As long as there are some, another thread takes what was freed for records of its own, or has them in hand.
+    struct Contended(Weak<Pool>, AtomicU64);
+
+    impl Evict for Contended {
+        fn evict(&self, bytes: u64) -> Result<u64, ConvertError> {
+            let pool = self.0.upgrade().unwrap();
+            match self.1.fetch_add(1, Ordering::Relaxed) {
+                0 => Ok(bytes), // given, and taken again
+                1 => Ok(0),     // in the hands of another
+                _ => {
+                    pool.give(Consumer::Records, bytes);
+                    Ok(bytes)
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn room_that_others_take_first_is_made_again() {
+        let pool = Arc::new(Pool::new(100, 1000));
+        let evict: Arc<dyn Evict> = Arc::new(Contended(Arc::downgrade(&pool), AtomicU64::new(0)));
+        pool.evict_from(Arc::downgrade(&evict));
+        assert!(pool.try_take(Consumer::Records, 100));
+        let mut cells = Reservation::new(&pool, Consumer::Cells);
+        cells.resize(30).unwrap();
+        assert_eq!((pool.taken_by(Consumer::Records), pool.free()), (70, 0));
     }
 
     #[test]
