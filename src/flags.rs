@@ -19,6 +19,8 @@ fn option(setting: Setting) -> &'static str {
         Setting::Bounds => "--bounds",
         Setting::TempDir => "--temp-dir",
         Setting::Attributes => "--attributes",
+        Setting::Derive => "--derive",
+        Setting::Neighbours => "--neighbours",
         Setting::Crs => "--crs",
         Setting::Inputs => "INPUT",
         other => other.name(),

@@ -8,6 +8,7 @@ use pointmill_converter::{BatchesSettings, BintreeSettings, PositionPrecision, P
 use pointmill_format::Aabb;
 
 use super::common::{InputArgs, TalkArgs};
+use super::derive::DeriveArgs;
 use super::values::{
     Attributes, CheckpointArg, Planes, Scale, ZSTD_LEVEL, or_auto, parse_attributes, parse_bounds, parse_bytes,
     parse_checkpoint, parse_class, parse_compress, parse_planes, parse_precision, parse_scale, parse_threads, whole,
@@ -103,6 +104,8 @@ pub(crate) struct ConvertArgs {
     /// [default: all for potree2 and copc, colour for potree1 and batches, classification for bintree]
     #[arg(long, value_name = "all|scene|LIST", value_parser = parse_attributes, help_heading = "Selecting data")]
     pub(crate) attributes: Option<Attributes>,
+    #[command(flatten)]
+    pub(crate) derive: DeriveArgs,
     /// Keeps only points inside this box, in world coordinates
     #[arg(long, value_name = "X,Y,Z..X,Y,Z", value_parser = parse_bounds, allow_hyphen_values = true,
           help_heading = "Selecting data")]

@@ -311,6 +311,7 @@ fn plan(args: &ConvertArgs, inputs: Inputs) -> Result<Plan, Failure> {
         Some(Attributes::Scene) => AttributeChoice::Scene,
         Some(Attributes::List(names)) => AttributeChoice::List(names.clone()),
     };
+    plan.derive = args.derive.plan();
     plan.scale = match (args.scale.0, args.precision) {
         (Some(step), _) => ScaleChoice::Fixed(step),
         (None, Some(precision)) => ScaleChoice::Within(precision),

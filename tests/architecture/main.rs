@@ -107,7 +107,7 @@ const LAYERS: [(&str, Layers<'static>); 9] = [
             &["sources"],
             &["cloud"],
             &["job"],
-            &["gather"],
+            &["gather", "derive"],
             &["report"],
             &["octree"],
             &["outputs"],

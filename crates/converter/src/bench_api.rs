@@ -2,8 +2,10 @@
 
 use pointmill_format::{Attribute, Lattice, NodeKey};
 
-use crate::cloud::{Checksum, Cube, JobBounds, JobPoint, RecordFrame, StoredOrigin, TreePoint, position};
-use crate::octree::{NodeEncoder, OrderScratch, Point, Sampler, Sampling, Spacing, order};
+use crate::cloud::{
+    Checksum, Cube, JobBounds, JobPoint, OrderScratch, Point, RecordFrame, StoredOrigin, TreePoint, order, position,
+};
+use crate::octree::{NodeEncoder, Sampler, Sampling, Spacing};
 use crate::outputs::potree2::{Encoding, OutputLayout, PayloadEncoder};
 use crate::runtime::Silent;
 use crate::sources::Schema;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::cloud::Intake;
+use crate::derive::derive;
 use crate::error::{ConvertError, JobFault};
 use crate::gather::{Demand, gather, is_coarse};
 use crate::job::{Build, GroupUnits, Identity, Job, Keeper, SharedJob};
@@ -216,9 +217,11 @@ fn write(
     let groups = outputs::groups(targets);
     let demand = Demand { moments: wants.moments, uses: groups.len() as u32 };
     let reading = rt.budget.reading(&rt.memory)?;
-    let cloud = gather(plan, &sources, &intake, demand, warnings, keeper, &rt, clock)?;
+    let mut cloud = gather(plan, &sources, &intake, demand, warnings, keeper, &rt, clock)?;
     drop(reading);
     report::check_lattice(&cloud)?;
+    derive(&mut cloud, &rt, clock)?;
+    let cloud = cloud;
 
     let (mut outputs, mut open) = (Vec::new(), Vec::new());
     for (number, group) in groups.into_iter().enumerate() {

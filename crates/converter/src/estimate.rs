@@ -29,7 +29,7 @@ pub fn estimate(plan: &Plan, targets: &[Target]) -> Result<Estimate, ConvertErro
     let lattice = from_headers(plan, &sources)?;
     // Which attributes are constant is not known before the points are read.
     let ranges: Vec<Range> = schema.attributes.iter().map(|a| Range::new(a.elements)).collect();
-    let kept = choose_attributes(&plan.attributes, schema, &intake.unread, &ranges, &[]).kept;
+    let kept = choose_attributes(plan, schema, &intake.unread, &ranges, &[]).kept;
     warnings.extend(targets.iter().flat_map(|t| t.output().foresee(schema, &kept, &crs)));
     let kept_bytes = kept.iter().map(|i| schema.attributes[*i].size()).sum::<usize>() as u64;
     let sizes: Vec<DiskSize> = targets.iter().map(|t| t.output().disk_size(plan, schema, kept_bytes)).collect();

@@ -35,6 +35,7 @@ mod advice;
 pub mod bench_api;
 mod cloud;
 mod convert;
+mod derive;
 mod error;
 mod estimate;
 mod export;
@@ -65,15 +66,16 @@ pub use outputs::potree1::{Potree1Settings, Potree1Version};
 pub use outputs::potree2::{DarkColours, Encoding, Potree2Settings};
 pub use outputs::{StagedFiles, Target, WorkFolder, resolve_path};
 pub use plan::{
-    AttributeChoice, Checkpoint, Duplicates, ExportFormat, Filter, LengthUnit, OnFault, OriginPoints, Outliers, Plan,
-    PlanError, PlanFault, PositionPrecision, RgbDepth, ScaleChoice, Setting,
+    AttributeChoice, Checkpoint, Derive, DeriveNormals, Duplicates, ExportFormat, Filter, LengthUnit, NEIGHBOURS,
+    Neighbourhood, OnFault, Orient, OriginPoints, Outliers, Plan, PlanError, PlanFault, PositionPrecision, RgbDepth,
+    ScaleChoice, Setting,
 };
 pub use reason::{AxisReason, BuiltAnew, Coarser, CoarserCause, GridReason, LatticeBasis, LatticeReason};
 pub use report::{
-    Accuracy, AttributeReport, ChangedAttribute, ChangedValues, ChoiceReason, DropReason, DroppedAttribute, Estimate,
-    GridReport, How, InputReport, Integers, Merged, Metres, MissingValues, OtherFilesReport, OutputReport, PhaseReport,
-    PlannedChoice, PointsReport, PositionErrors, PrecisionReport, Report, SavedBytes, SharedPlaceReport, TakenOver,
-    TreeReport,
+    Accuracy, AttributeReport, ChangedAttribute, ChangedValues, ChoiceReason, DerivedReport, DropReason,
+    DroppedAttribute, Estimate, GridReport, How, InputReport, Integers, Merged, Metres, MissingValues,
+    OtherFilesReport, OutputReport, PhaseReport, PlannedChoice, PointsReport, PositionErrors, PrecisionReport, Report,
+    SavedBytes, SharedPlaceReport, TakenOver, TreeReport,
 };
 pub use runtime::{Disk, DiskOperation, Events, Phase, Replacing, Silent, SystemDisk};
 pub use shared_job::{finish_job, job_units, plan_job, run_units};

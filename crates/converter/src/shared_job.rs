@@ -11,7 +11,7 @@ use crate::convert::{JobOf, Verify, make};
 use crate::error::{ConvertError, JobFault};
 use crate::job::{SharedJob, Task};
 use crate::outputs::{self, StagedFolder, Target};
-use crate::plan::Plan;
+use crate::plan::{Plan, PlanError, PlanFault, Setting};
 use crate::report::Report;
 use crate::runtime::{Disk, Events, Phase, SystemDisk};
 use crate::unit_name::{JobUnits, Stage, UnitName};
@@ -25,6 +25,9 @@ pub fn plan_job(plan: &Plan, targets: &[Target], folder: &Path, events: &dyn Eve
     let disk = disk();
     // what is in the way of the output is better known now than when all is done
     outputs::check(plan, targets)?;
+    if !plan.derive.is_nothing() {
+        return Err(PlanError::new(Setting::Derive, PlanFault::NotInJobs).into());
+    }
     drop(StagedFolder::new(&plan.output, plan.overwrite, Arc::clone(&disk), events)?);
     let job = SharedJob::begin(folder, &disk)?;
     in_parts(&job, plan, targets, events, &disk).inspect_err(|_| {

@@ -67,7 +67,20 @@ impl Facts {
         let relations = match &stats.relations {
             Some(relations) => {
                 let is_constant: Vec<bool> = ranges.iter().map(|range| range.constant().is_some()).collect();
-                relations.choose(schema, &is_constant)
+                let mut chosen = relations.choose(schema, &is_constant);
+                // what is computed is not there yet
+                let is_derived = |i: usize| intake.derived.all().any(|derived| derived == i);
+                for (i, relation) in chosen.iter_mut().enumerate() {
+                    let of = match relation {
+                        Some(Relation::SameAs(other)) => Some(*other),
+                        Some(Relation::FollowsFrom { attribute, .. }) => Some(*attribute),
+                        None => None,
+                    };
+                    if is_derived(i) || of.is_some_and(is_derived) {
+                        *relation = None;
+                    }
+                }
+                chosen
             }
             None => vec![None; schema.attributes.len()],
         };

@@ -3,7 +3,7 @@
 use pointmill_format::Wanted;
 
 use super::widening::Group;
-use crate::plan::{Duplicates, Plan, RgbDepth};
+use crate::plan::{CURVATURE, Derive, Duplicates, NORMALS, Orient, Plan, RADIUS, RgbDepth};
 use crate::sources::{Layout, Recast, Schema, Source, Sources};
 
 /// The attributes that are read, and where each source has them.
@@ -13,11 +13,42 @@ pub(crate) struct Intake {
     /// Where a stored record has the mark that tells apart points which only the lattice makes equal; needed if duplicates
     /// are to be dropped. No output writes it.
     pub(crate) mark: Option<usize>,
+    /// What is computed, by attribute of the schema.
+    pub(crate) derived: DerivedFields,
     /// Names of the attributes of the inputs that no output needs.
     pub(crate) unread: Vec<String>,
     /// By layout of the sources.
     layouts: Vec<LayoutIntake>,
     rgb_depth: RgbDepth,
+    orient: Orient,
+}
+
+/// Where records have what is computed: index of the schema.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct DerivedFields {
+    /// Components of the normal, and the curvature.
+    pub(crate) normal: Option<([usize; 3], usize)>,
+    pub(crate) radius: Option<usize>,
+}
+
+impl DerivedFields {
+    /// What a record has in the place of the curvature while those of the normal have the direction to the scanner.
+    pub(crate) const IS_DIRECTION: f32 = -1.0;
+
+    fn of(derive: &Derive, schema: &Schema) -> Self {
+        let find = |name: &str| schema.find(name).filter(|_| derive.makes(name));
+        let normal = match (NORMALS.map(find), find(CURVATURE)) {
+            ([Some(x), Some(y), Some(z)], Some(curvature)) => Some(([x, y, z], curvature)),
+            _ => None,
+        };
+        Self { normal, radius: find(RADIUS) }
+    }
+
+    /// All of them.
+    pub(crate) fn all(&self) -> impl Iterator<Item = usize> {
+        let of_normal = self.normal.into_iter().flat_map(|([x, y, z], curvature)| [x, y, z, curvature]);
+        of_normal.chain(self.radius)
+    }
 }
 
 /// What is read of the sources of one layout.
@@ -49,7 +80,9 @@ impl Intake {
         let unread = all.attributes.iter().zip(needed).filter(|(_, needed)| !**needed);
         let unread = unread.map(|(a, _)| a.name.clone()).collect();
         let of_layout = |layout: &Layout| {
-            let columns: Vec<Option<usize>> = layout.columns.iter().map(|c| places[c.attribute]).collect();
+            let is_replaced = |i: usize| plan.derive.replaces(&all.attributes[i].name);
+            let place = |i: usize| places[i].filter(|_| !is_replaced(i));
+            let columns: Vec<Option<usize>> = layout.columns.iter().map(|c| place(c.attribute)).collect();
             let read = layout.columns.iter().enumerate().filter(|(i, _)| columns[*i].is_some());
             let recasts = read.filter_map(|(i, c)| Some((i, c.recast.clone()?))).collect();
             let is_filtered = |i: usize| plan.filter.classes.is_some() && layout.attributes[i].name == "classification";
@@ -59,12 +92,25 @@ impl Intake {
             LayoutIntake { columns, recasts, wanted, present }
         };
         let layouts = sources.layouts.iter().map(of_layout).collect();
-        Self { schema, mark, unread, layouts, rgb_depth: plan.rgb_depth }
+        let derived = DerivedFields::of(&plan.derive, &schema);
+        Self { schema, mark, derived, unread, layouts, rgb_depth: plan.rgb_depth, orient: plan.derive.orient }
     }
 
     /// What is read of a source.
     pub(crate) fn of(&self, source: &Source) -> &LayoutIntake {
         &self.layouts[source.layout as usize]
+    }
+
+    /// True if records of a source have the direction to the scanner until normals are computed.
+    pub(crate) fn wants_directions(&self, source: &Source) -> bool {
+        let has = |(normal, _): ([usize; 3], usize)| normal.into_iter().any(|i| self.of(source).has(Some(i)));
+        self.orient == Orient::Scanner && self.derived.normal.is_some_and(|fields| !has(fields))
+    }
+
+    /// Byte offsets in a record of what a direction takes the place of: the normal, and the curvature.
+    pub(crate) fn directed(&self) -> Option<([usize; 3], usize)> {
+        let at = |i: usize| self.schema.offsets[i];
+        self.derived.normal.map(|(normal, curvature)| (normal.map(at), at(curvature)))
     }
 
     /// The sources whose records may be in the blocks of the source with that index: those whose colours turn out to be

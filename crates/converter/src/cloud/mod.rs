@@ -6,6 +6,7 @@ mod cell;
 mod checksum;
 mod colour_range;
 mod cube;
+mod divide;
 mod facts;
 mod frames;
 mod grouping;
@@ -15,6 +16,7 @@ mod ledger;
 mod moments;
 pub(crate) mod morton;
 mod morton_sort;
+mod order;
 mod range;
 mod record;
 mod regroup;
@@ -29,14 +31,16 @@ pub(crate) use big_sort::BigSort;
 pub(crate) use cell::{Cell, Census, CensusCell, SharedPlace, add_up, are_in_order, lies_in, node, xyz};
 pub(crate) use checksum::Checksum;
 pub(crate) use cube::{Cube, MOST_STEPS, TREE_BITS, high, tidy_world};
+pub(crate) use divide::{divided, highest_nodes};
 pub(crate) use facts::Facts;
 pub(crate) use frames::{JobBounds, JobColumns, JobPoint, StoredOrigin, StoredPoint, TreePoint};
 pub(crate) use grouping::{CellHash, Grouping};
-pub(crate) use intake::{Intake, LayoutIntake};
+pub(crate) use intake::{DerivedFields, Intake, LayoutIntake};
 pub(crate) use lattice::JobLattice;
 pub(crate) use ledger::Ledger;
 pub(crate) use moments::Moments;
 pub(crate) use morton_sort::MortonSorter;
+pub(crate) use order::{OrderScratch, Point, order};
 pub(crate) use range::Range;
 pub(crate) use record::{RecordFrame, copy_record, position};
 pub(crate) use regroup::{Regrouper, Sifted};
@@ -78,10 +82,25 @@ pub(crate) struct Cloud<'a> {
     pub(crate) facts: Facts,
     /// Points outside were dropped as outliers.
     pub(crate) far_cut: Option<Aabb>,
+    /// What came of attributes that are computed from the points.
+    pub(crate) derived: Option<Derived>,
     /// Places that very many points share, the fullest first.
     pub(crate) shared_places: Vec<SharedPlace>,
     /// Of headers and points, in order of discovery.
     pub(crate) warnings: Vec<Warning>,
+}
+
+/// What came of attributes that are computed from the points around each.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Derived {
+    pub(crate) points: u64,
+    /// Normals of the scans.
+    pub(crate) kept_normals: u64,
+    /// Points through which there is no plane.
+    pub(crate) without_normal: u64,
+    /// Radii of the scans.
+    pub(crate) kept_radii: u64,
+    pub(crate) without_radius: u64,
 }
 
 /// What a pass over the sources has gathered.
@@ -128,6 +147,7 @@ impl<'a> Cloud<'a> {
             stats,
             facts,
             far_cut,
+            derived: None,
             shared_places,
             warnings,
         })

@@ -21,8 +21,12 @@ pub(crate) struct Shortfall {
 
 /// By index of the schema.
 pub(super) fn shortfalls(sources: &Sources, intake: &Intake, stats: &Stats) -> Vec<Shortfall> {
+    let is_derived = |attribute: usize| intake.derived.all().any(|i| i == attribute);
     let of_attribute = |attribute: usize| {
         let mut sum = Shortfall::default();
+        if is_derived(attribute) {
+            return sum; // every point gets it
+        }
         for (source, seen) in sources.all.iter().zip(&stats.sources) {
             let changes = seen.changes.get(attribute).copied().unwrap_or_default();
             let missing = if intake.of(source).has(Some(attribute)) { changes.missing } else { seen.kept };

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::columns::{Part, RowsOf};
-use crate::cloud::{Checksum, JobColumns, StoredOrigin, copy_record};
+use crate::cloud::{Checksum, DerivedFields, JobColumns, StoredOrigin, copy_record};
 use crate::runtime::{TILE_POINTS, Vectors, vectorized};
 use crate::sources::{MARK_BYTES, POSITION_BYTES, Schema};
 
@@ -16,7 +16,12 @@ pub(super) struct Assembly<'a> {
     pub(super) rows: &'a Rows<'a>,
     /// Where in a record its mark is, and the marks.
     pub(super) marks: Option<(usize, &'a [u64])>,
+    /// The directions to the scanner, and where in a record they go.
+    pub(super) directions: Option<(Directed, &'a [[f32; 3]])>,
 }
+
+/// Byte offsets in a record of the normal and the curvature, whose places a direction has until they are computed.
+pub(super) type Directed = ([usize; 3], usize);
 
 /// Rows of a batch that are taken together.
 pub(crate) enum Rows<'a> {
@@ -138,7 +143,20 @@ impl Assembly<'_> {
                 record[at..at + MARK_BYTES].copy_from_slice(&mark.to_le_bytes());
             }
         }
+        if let Some((at, directions)) = self.directions {
+            directed(tile, stride, at, &directions[first..]);
+        }
         checksum.add_all(tile, stride);
+    }
+}
+
+/// Puts directions into records.
+fn directed(tile: &mut [u8], stride: usize, (normal, curvature): Directed, directions: &[[f32; 3]]) {
+    for (record, direction) in tile.chunks_exact_mut(stride).zip(directions) {
+        if *direction != [0.0; 3] {
+            let values = normal.into_iter().zip(*direction).chain([(curvature, DerivedFields::IS_DIRECTION)]);
+            values.for_each(|(at, v)| record[at..at + 4].copy_from_slice(&v.to_le_bytes()));
+        }
     }
 }
 
@@ -174,6 +192,7 @@ mod tests {
                         parts: Part::of(&columns, &given, &schema),
                         rows: &Rows::Consecutive(0..points as usize),
                         marks: None,
+                        directions: None,
                     };
                     let mut records = vec![0; points as usize * schema.stride];
                     let mut checksum = Checksum::default();

@@ -33,6 +33,8 @@ pub(super) struct Worker<'a> {
     q: JobColumns,
     /// See [`exact::marks`]; empty if they are not needed.
     marks: Vec<u64>,
+    /// To where points were seen from.
+    directions: Vec<[f32; 3]>,
     change: [Vec<f64>; 3],
     selection: Vec<u32>,
     cells: Vec<u64>,
@@ -57,6 +59,7 @@ impl<'a> Worker<'a> {
             room: Reservation::new(pass.memory, Consumer::Cells),
             q: JobColumns::default(),
             marks: Vec::new(),
+            directions: Vec::new(),
             change: Default::default(),
             selection: Vec::new(),
             cells: Vec::new(),
@@ -129,6 +132,9 @@ impl<'a> Worker<'a> {
             let (own, job) = (visit.lattice(), &self.pass.lattice);
             exact::marks(&visit.map, own, job, batch, &self.q, |i| rows.row(i), &mut self.marks);
         }
+        if let Some(scanners) = &visit.scanners {
+            scanners.directions(batch, rows, &self.q, &self.pass.lattice, &mut self.directions);
+        }
         let points = self.q.len();
         self.stats.points += points as u64;
         visit.seen.kept += points as u64;
@@ -141,6 +147,7 @@ impl<'a> Worker<'a> {
             parts: Part::of(columns, &visit.intake.columns, &self.pass.intake.schema),
             rows,
             marks: self.pass.intake.mark.map(|at| (at, &self.marks[..])),
+            directions: visit.scanners.as_ref().and(self.pass.intake.directed()).map(|at| (at, &self.directions[..])),
         };
         let written = self.records.len();
         self.records.resize(written + points * assembly.schema.stride, 0);

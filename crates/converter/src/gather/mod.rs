@@ -28,6 +28,7 @@ mod ranges;
 mod read_unit;
 mod select;
 mod unit_check;
+mod views;
 mod visit;
 
 use std::sync::Arc;

@@ -7,6 +7,7 @@ use pointmill_format::{Aabb, AxisGrid, Column, Lattice, PointBatch, Scan, ScanIn
 use super::axis::SourceMap;
 use super::cut::Cut;
 use super::origins::Origins;
+use super::views::Scanners;
 use crate::cloud::{Group, Intake, LayoutIntake, SourceStats};
 use crate::error::ConvertError;
 use crate::plan::Plan;
@@ -69,6 +70,8 @@ pub(crate) struct Visit<'a> {
     pub(super) regions: Vec<Cut>,
     pub(super) far_cut: Option<Cut>,
     pub(super) origins: Origins,
+    /// Where its points were seen from, if normals are to point there.
+    pub(super) scanners: Option<Scanners>,
     /// Axes on which every point has to prove the claim that a grid holds it.
     pub(super) claims: [bool; 3],
     pub(crate) seen: SourceStats,
@@ -89,6 +92,7 @@ impl<'a> Visit<'a> {
             regions: pass.plan.filter.regions.iter().map(|bounds| Cut::new(bounds, info)).collect(),
             far_cut: pass.far_cut.map(|bounds| Cut::new(&bounds, info)),
             origins: Origins::of(info),
+            scanners: pass.intake.wants_directions(source).then(|| Scanners::of(info)).flatten(),
             claims: claims(source, &pass.lattice),
             seen: SourceStats::default(),
             scan,

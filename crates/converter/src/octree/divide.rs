@@ -2,14 +2,10 @@
 //! built in memory. Which nodes are the roots of subtrees is part of the result ([`super::units`]); which are chunks is
 //! not.
 
-use std::collections::BTreeMap;
-
 use pointmill_format::NodeKey;
 use serde::{Deserialize, Serialize};
 
-use crate::cloud::{
-    Cell, Cloud, Moments, RecordFrame, Regrouper, Segments, TREE_BITS, TreePoint, add_up, are_in_order, morton,
-};
+use crate::cloud::{Cell, Cloud, Regrouper, Segments, add_up, are_in_order, divided, highest_nodes};
 use crate::error::ConvertError;
 use crate::job::Build;
 use crate::runtime::{Consumer, Reservation, Runtime};
@@ -53,9 +49,6 @@ pub(super) struct Division {
     _room: Reservation,
 }
 
-/// Levels by which a cell that is too large is divided at once.
-const SPLIT_LEVELS: u32 = 3;
-
 /// The largest subtrees of at most `unit_points` in Morton order, in chunks of at most `chunk_points`, unless the points of
 /// one share one place; and what these lists take.
 pub(super) fn divide(build: Build<'_>, unit_points: u64, chunk_points: u64) -> Result<Division, ConvertError> {
@@ -78,27 +71,13 @@ fn divide_now(
     room: &mut Reservation,
 ) -> Result<Vec<Subtree>, ConvertError> {
     let max_points = unit_points.min(chunk_points);
-    let mut lists = 0;
     let mut regrouper = Regrouper::new(&cloud.store, cloud.frame.stride);
-    let mut cells = Vec::with_capacity(cloud.cells.len());
-    // The stack returns the last first.
-    let mut stack: Vec<Cell> = cloud.cells.iter().rev().cloned().collect();
-    while let Some(cell) = stack.pop() {
-        if cell.points <= max_points || cell.is_one_place {
-            cells.push(cell);
-        } else {
-            rt.check_stop()?;
-            let parts = divide_cell(&cell, &cloud.frame, &mut regrouper)?;
-            lists += parts.iter().map(|part| part.segments.bytes() + size_of::<Cell>() as u64).sum::<u64>();
-            room.grow_to(lists)?;
-            stack.extend(parts.into_iter().rev());
-        }
-    }
+    let mut cells = divided(&cloud.cells, &cloud.frame, &mut regrouper, max_points, rt, room)?;
     cloud.store.drop_spare(u64::MAX)?;
     let mut subtrees = Vec::new();
-    choose(NodeKey::ROOT, &mut cells, unit_points, &mut |key, cells| {
+    highest_nodes(NodeKey::ROOT, &mut cells, unit_points, &mut |key, cells| {
         let mut chunks = Vec::new();
-        choose(key, cells, chunk_points, &mut |key, cells| chunks.push(Chunk::of(key, cells)));
+        highest_nodes(key, cells, chunk_points, &mut |key, cells| chunks.push(Chunk::of(key, cells)));
         subtrees.push(Subtree { key, chunks });
     });
     Ok(subtrees)
@@ -113,49 +92,4 @@ impl Chunk {
         segments.sort();
         Self { key, points, segments }
     }
-}
-
-/// The parts of a cell some levels below it, in Morton order.
-fn divide_cell(cell: &Cell, frame: &RecordFrame, regrouper: &mut Regrouper<'_>) -> Result<Vec<Cell>, ConvertError> {
-    let levels = SPLIT_LEVELS.min(TREE_BITS - u32::from(cell.key.level));
-    let shift = TREE_BITS - u32::from(cell.key.level) - levels;
-    let mut extremes: Option<(TreePoint, TreePoint)> = None;
-    let code = |record: &[u8]| {
-        let t = frame.tree(record);
-        let (lo, hi) = extremes.get_or_insert((t, t));
-        for a in 0..3 {
-            lo[a] = lo[a].min(t[a]);
-            hi[a] = hi[a].max(t[a]);
-        }
-        morton::path(t, shift, levels)
-    };
-    let mut parts = BTreeMap::<u64, Segments>::new();
-    regrouper.regroup(&cell.segments, code, |path, segment| parts.entry(path).or_default().push(segment))?;
-    let is_one_place = extremes.is_some_and(|(lo, hi)| lo == hi);
-    let part = |(path, segments): (u64, Segments)| {
-        let key = (0..levels).rev().fold(cell.key, |key, l| key.child((path >> (3 * l) & 7) as u8).unwrap_or(key));
-        Cell { is_one_place, ..Cell::new(key, segments, Moments::default()) }
-    };
-    Ok(parts.into_iter().map(part).collect())
-}
-
-/// Finds the highest nodes that are small enough (or hold one place only), and the cells in each.
-fn choose(node: NodeKey, cells: &mut [Cell], max_points: u64, found: &mut impl FnMut(NodeKey, &mut [Cell])) {
-    let points: u64 = cells.iter().map(|c| c.points).sum();
-    if points == 0 {
-        return;
-    }
-    let is_last = cells.len() == 1 && (cells[0].is_one_place || cells[0].key == node);
-    if points <= max_points || is_last {
-        found(node, cells);
-        return;
-    }
-    let mut rest = cells;
-    for child in (0..8).filter_map(|c| node.child(c)) {
-        let inside = rest.iter().take_while(|c| c.key.ancestor(child.level) == Some(child)).count();
-        let (mine, others) = rest.split_at_mut(inside);
-        choose(child, mine, max_points, found);
-        rest = others;
-    }
-    debug_assert!(rest.is_empty());
 }

@@ -2,7 +2,7 @@
 //!
 //! 1. [`divide`] cuts the cloud into subtrees, and these into chunks, small enough to be built in memory.
 //! 2. [`units`] puts subtrees and the nodes above them into the order in which they are made, [`unit`] makes one.
-//! 3. [`chunk`] puts the points of a chunk in Morton order ([`order`]), divides them into nodes and moves points up the
+//! 3. [`chunk`] puts the points of a chunk in Morton order ([`crate::cloud::order`]), divides them into nodes and moves points up the
 //!    tree by the rule of [`raise`]; inner nodes take a [`sample`] of their children, and keep the distance to what
 //!    neighbours have taken over their [`borders`]. Nodes above a chunk do the same with [`lists`] of records, in memory or
 //!    on the disk.
@@ -24,7 +24,6 @@ mod keep;
 mod list;
 mod lists;
 mod make;
-mod order;
 mod place;
 mod raise;
 mod sample;
@@ -35,8 +34,6 @@ mod unit;
 mod units;
 
 pub(crate) use commit::Octree;
-#[cfg(feature = "bench")]
-pub(crate) use order::{OrderScratch, Point, order};
 #[cfg(feature = "bench")]
 pub(crate) use sample::Sampler;
 pub use sample::Sampling;

@@ -3,7 +3,7 @@
 use pointmill_format::{Attribute, AttributeType, Changes, DatasetKind};
 
 use crate::cloud::{Range, Relation};
-use crate::plan::AttributeChoice;
+use crate::plan::{AttributeChoice, Derive, Plan};
 use crate::report::{ChangedAttribute, DropReason, DroppedAttribute};
 use crate::sources::Schema;
 use crate::warning::Warning;
@@ -15,22 +15,22 @@ pub(crate) struct Choice {
     pub(crate) dropped: Vec<DroppedAttribute>,
 }
 
-/// All, those that the scene requires, or those that were named. `unread`: names that were not even read; `relations`: what
+/// All, those that the scene requires, or those that were named; and what is computed. `unread`: names that were not even read; `relations`: what
 /// attributes follow from, nothing where the format could not give them back.
 pub(crate) fn choose(
-    choice: &AttributeChoice,
+    plan: &Plan,
     schema: &Schema,
     unread: &[String],
     ranges: &[Range],
     relations: &[Option<Relation>],
 ) -> Choice {
     let all = 0..schema.attributes.len();
-    match choice {
+    match &plan.attributes {
         AttributeChoice::Usual | AttributeChoice::All => Choice { kept: all.collect(), dropped: Vec::new() },
         AttributeChoice::Scene => {
             let (mut kept, mut dropped) = (Vec::new(), Vec::new());
             for i in all {
-                match not_required(schema, ranges, relations, i) {
+                match not_required(schema, ranges, relations, i).filter(|_| !is_derived(&plan.derive, schema, i)) {
                     Some(why) => dropped.push(DroppedAttribute { name: schema.attributes[i].name.clone(), why }),
                     None => kept.push(i),
                 }
@@ -40,7 +40,7 @@ pub(crate) fn choose(
         AttributeChoice::List(names) => {
             // A name that no input has was refused before anything was read.
             let mut kept: Vec<usize> = Vec::new();
-            for i in names.iter().filter_map(|name| schema.find(name)) {
+            for i in names.iter().filter_map(|name| schema.find(name)).chain(derived(&plan.derive, schema)) {
                 if !kept.contains(&i) {
                     kept.push(i);
                 }
@@ -49,6 +49,16 @@ pub(crate) fn choose(
             Choice { kept, dropped }
         }
     }
+}
+
+/// What is computed, by its index in the schema: it goes into every output, or nobody would have asked for it.
+pub(super) fn derived(derive: &Derive, schema: &Schema) -> impl Iterator<Item = usize> {
+    derive.names().filter_map(|name| schema.find(name))
+}
+
+/// True if an attribute of the schema is computed.
+pub(super) fn is_derived(derive: &Derive, schema: &Schema, i: usize) -> bool {
+    derive.makes(&schema.attributes[i].name)
 }
 
 /// Why the scene does not require an attribute of the schema; `None`: it does.

@@ -152,10 +152,13 @@ impl Wants {
     /// The attributes that the plan asks for; `is_usual`: whether the format keeps an attribute where the plan leaves it
     /// to the format.
     pub(super) fn chosen(plan: &Plan, all: &Schema, is_usual: bool) -> Self {
-        let is_chosen = |name: &String| match &plan.attributes {
-            AttributeChoice::Usual => is_usual,
-            AttributeChoice::All | AttributeChoice::Scene => true,
-            AttributeChoice::List(names) => names.contains(name),
+        let is_chosen = |name: &String| {
+            plan.derive.makes(name)
+                || match &plan.attributes {
+                    AttributeChoice::Usual => is_usual,
+                    AttributeChoice::All | AttributeChoice::Scene => true,
+                    AttributeChoice::List(names) => names.contains(name),
+                }
         };
         let attributes = all.attributes.iter().map(|a| is_chosen(&a.name)).collect();
         Self { attributes, other_names: &[], moments: false }

@@ -37,6 +37,10 @@ pub enum Setting {
     TempDir,
     /// Attributes to keep.
     Attributes,
+    /// Attributes to compute.
+    Derive,
+    /// The points from which they are computed.
+    Neighbours,
     /// Coordinate reference system.
     Crs,
 }
@@ -59,6 +63,8 @@ impl Setting {
             Self::Bounds => "bounds",
             Self::TempDir => "folder of temporary files",
             Self::Attributes => "attributes",
+            Self::Derive => "derived attributes",
+            Self::Neighbours => "neighbours",
             Self::Crs => "coordinate reference system",
         }
     }
@@ -126,6 +132,14 @@ pub enum PlanFault {
          the coordinates"
     )]
     UnknownUnit,
+    /// A neighbourhood may reach from new points into old ones.
+    #[error(
+        "cannot be computed while scans are added: what the dataset has depends on the new points; convert all scans at once"
+    )]
+    NotWhenAppending,
+    /// What several processes do together needs the points around each unit.
+    #[error("cannot be computed by a job that several processes share; convert on one machine")]
+    NotInJobs,
     /// A box without content.
     #[error("the minimum is above the maximum")]
     EmptyBox,

@@ -1,5 +1,6 @@
 //! What was requested: every setting resolved, nothing left to guess.
 
+mod derive;
 mod error;
 mod export;
 mod precision;
@@ -8,9 +9,14 @@ use std::path::PathBuf;
 
 use pointmill_format::{Aabb, OpenOptions};
 
+pub(crate) use derive::{CURVATURE, NORMALS, RADIUS};
+pub use derive::{Derive, DeriveNormals, NEIGHBOURS, Neighbourhood, Orient};
 pub use error::{PlanError, PlanFault, Setting};
 pub use export::ExportFormat;
 pub use precision::{LengthUnit, PositionPrecision};
+
+/// The most points of a neighbourhood.
+const MOST_NEIGHBOURS: u32 = 1000;
 
 /// Points after which what was read is safe, unless the plan says otherwise.
 const CHECKPOINT_POINTS: u64 = 64_000_000;
@@ -33,6 +39,8 @@ pub struct Plan {
     pub name: String,
     /// Which attributes go in.
     pub attributes: AttributeChoice,
+    /// What is computed beside them.
+    pub derive: Derive,
     /// Coordinate step.
     pub scale: ScaleChoice,
     /// Ceiling for the resident set of the whole process, bytes.
@@ -221,6 +229,7 @@ impl Plan {
             output,
             name: String::new(),
             attributes: AttributeChoice::Usual,
+            derive: Derive::default(),
             scale: ScaleChoice::Auto,
             memory_bytes: crate::memory::default_ceiling_bytes(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
@@ -259,6 +268,15 @@ impl Plan {
         }
         if self.filter.bounds.is_some_and(|b| b.is_empty()) {
             return refuse(Setting::Bounds, PlanFault::EmptyBox);
+        }
+        match self.derive.neighbourhood {
+            Neighbourhood::Nearest(3..=MOST_NEIGHBOURS) => {}
+            Neighbourhood::Nearest(_) => return refuse(Setting::Neighbours, PlanFault::NotOneOf("3 to 1000")),
+            Neighbourhood::Within(radius) if radius.is_finite() && radius > 0.0 => {}
+            Neighbourhood::Within(_) => return refuse(Setting::Neighbours, PlanFault::NotPositive),
+        }
+        if !self.derive.is_nothing() && self.append {
+            return refuse(Setting::Derive, PlanFault::NotWhenAppending);
         }
         match &self.temp_dir {
             Some(dir) if !dir.is_dir() => refuse(Setting::TempDir, PlanFault::NotAFolder(dir.clone())),

@@ -7,13 +7,15 @@ use pointmill_format::{Aabb, Crs, DatasetKind};
 use serde_json::{Map, Value, json};
 
 use super::types::{
-    AttributeReport, GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport,
-    Report, SharedPlaceReport,
+    AttributeReport, DerivedReport, GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport,
+    PhaseReport, PointsReport, Report, SharedPlaceReport,
 };
-use crate::cloud::{Cloud, Cube, JobLattice, SharedPlace};
+use crate::cloud::{Cloud, Cube, Derived, JobLattice, SharedPlace};
 use crate::error::ConvertError;
 use crate::memory;
-use crate::plan::{AttributeChoice, Filter, OriginPoints, Plan, ScaleChoice};
+use crate::plan::{
+    AttributeChoice, Derive, DeriveNormals, Filter, Neighbourhood, Orient, OriginPoints, Plan, ScaleChoice,
+};
 use crate::reason::GridReason;
 use crate::runtime::{Phase, PhaseTime};
 use crate::sources::{Source, Sources, resolve_crs};
@@ -50,6 +52,7 @@ pub(crate) fn report(mut cloud: Cloud<'_>, account: Account) -> Result<Report, C
         inputs: input_reports(cloud.sources, Some(cloud)),
         other_files,
         attributes: attribute_reports(cloud),
+        derived: cloud.derived.map(derived),
         grid: grid_report(&cloud.lattice, cloud.is_lossless, &cloud.frame.cube),
         points: points_report(cloud, &outputs)?,
         shared_places: cloud.shared_places.iter().map(shared_place).collect(),
@@ -93,12 +96,17 @@ fn points_report(cloud: &Cloud<'_>, outputs: &[OutputReport]) -> Result<PointsRe
     Err(ConvertError::Internal(format!("the points do not add up: {points:?}")))
 }
 
+fn derived(derived: Derived) -> DerivedReport {
+    let Derived { points, kept_normals, without_normal, kept_radii, without_radius } = derived;
+    DerivedReport { points, kept_normals, without_normal, kept_radii, without_radius }
+}
+
 fn shared_place(place: &SharedPlace) -> SharedPlaceReport {
     SharedPlaceReport { position: place.position, points: place.points }
 }
 
 fn phase_report(time: &PhaseTime, points: u64) -> PhaseReport {
-    let points = if matches!(time.phase, Phase::Read | Phase::Build) { points } else { 0 };
+    let points = if matches!(time.phase, Phase::Read | Phase::Derive | Phase::Build) { points } else { 0 };
     let points_per_second = if time.seconds > 0.0 { points as f64 / time.seconds } else { 0.0 };
     PhaseReport { name: time.phase.name().into(), seconds: time.seconds, points, points_per_second }
 }
@@ -166,11 +174,33 @@ pub(crate) fn settings(plan: &Plan, kinds: &[DatasetKind]) -> Map<String, Value>
     }
     settings.insert("memory".into(), plan.memory_bytes.into());
     settings.insert("threads".into(), plan.threads.into());
+    if !plan.derive.is_nothing() {
+        settings.insert("derive".into(), derive_settings(&plan.derive));
+    }
     settings.insert("duplicates".into(), plan.duplicates.name().into());
     settings.insert("outliers".into(), plan.outliers.name().into());
     settings.insert("rgb-depth".into(), plan.rgb_depth.name().into());
     for (name, value) in plan.open.maps.iter().flat_map(|maps| maps.settings()) {
         settings.insert(name.into(), value.into());
+    }
+    settings
+}
+
+/// What is computed, and how.
+fn derive_settings(derive: &Derive) -> Value {
+    let mut settings = json!({
+        "normals": derive.normals.map(DeriveNormals::name),
+        "radius": derive.radius,
+        "orient": match derive.orient {
+            Orient::Scanner => json!("scanner"),
+            Orient::Up => json!("up"),
+            Orient::None => json!("none"),
+            Orient::Towards(place) => json!(place),
+        },
+    });
+    match derive.neighbourhood {
+        Neighbourhood::Nearest(count) => settings["neighbours"] = count.into(),
+        Neighbourhood::Within(radius) => settings["neighbour_radius"] = radius.into(),
     }
     settings
 }

@@ -14,7 +14,7 @@ pub use choices::{ChoiceReason, PlannedChoice};
 pub use precision::{PrecisionReport, SavedBytes};
 pub(crate) use precision::{check_lattice, precision};
 pub use types::{
-    AttributeReport, ChangedAttribute, ChangedValues, DropReason, DroppedAttribute, Estimate, GridReport, InputReport,
-    MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report, SharedPlaceReport, TakenOver,
-    TreeReport,
+    AttributeReport, ChangedAttribute, ChangedValues, DerivedReport, DropReason, DroppedAttribute, Estimate,
+    GridReport, InputReport, MissingValues, OtherFilesReport, OutputReport, PhaseReport, PointsReport, Report,
+    SharedPlaceReport, TakenOver, TreeReport,
 };

@@ -34,6 +34,9 @@ pub struct Report {
     pub shared_places: Vec<SharedPlaceReport>,
     /// One entry per attribute that was read, in the order of the stored records.
     pub attributes: Vec<AttributeReport>,
+    /// What came of attributes that were computed from the points around each; `None`: none were.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub derived: Option<DerivedReport>,
     /// One entry per dataset written, in the order requested.
     pub outputs: Vec<OutputReport>,
     /// Order-independent checksum of the points that passed the filter; that of every output equals it, or the run fails.
@@ -56,6 +59,22 @@ pub struct Report {
     pub output_bytes: u64,
     /// What the user should know, an object with `kind` and `text` each.
     pub warnings: Vec<Warning>,
+}
+
+/// Attributes that were computed (`docs/surfels.md`), in counts of points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct DerivedReport {
+    /// All.
+    pub points: u64,
+    /// With the normal of their scan.
+    pub kept_normals: u64,
+    /// Through which there is no plane: their normal is 0 0 0.
+    pub without_normal: u64,
+    /// With the radius of their scan.
+    pub kept_radii: u64,
+    /// Whose radius is 0.
+    pub without_radius: u64,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]

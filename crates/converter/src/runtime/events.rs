@@ -11,6 +11,8 @@ pub enum Phase {
     Probe,
     /// Decoding every point once; the unit is points.
     Read,
+    /// Computing attributes from the points around each; the unit is points.
+    Derive,
     /// Building and writing nodes; the unit is points.
     Build,
     /// Hierarchy, metadata, syncing and renaming; no unit.
@@ -25,6 +27,7 @@ impl Phase {
         match self {
             Self::Probe => "probe",
             Self::Read => "read",
+            Self::Derive => "derive",
             Self::Build => "build",
             Self::Finish => "finish",
             Self::CleanUp => "clean up",

@@ -4,6 +4,7 @@ mod bytes;
 mod crs;
 mod decimals;
 mod degrees;
+mod derived;
 mod divisor;
 mod open_scans;
 mod opener;
@@ -157,7 +158,8 @@ impl Sources {
             }
         }
         drop(probe);
-        let sources = found.combine(open)?;
+        let mut sources = found.combine(open)?;
+        derived::add(&mut sources.attributes, &mut sources.layouts, &plan.derive);
         sources.warnings.iter().for_each(|w| events.warning(w));
         Ok(sources)
     }

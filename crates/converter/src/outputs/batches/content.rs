@@ -4,7 +4,7 @@ use pointmill_format::batches::{ColourSource, colour_word, eight_bit};
 use pointmill_format::{Attribute, AttributeType, DatasetKind};
 
 use crate::cloud::{Cloud, Widening};
-use crate::outputs::attributes::{choose, left_out, not_required};
+use crate::outputs::attributes::{choose, derived, left_out, not_required};
 use crate::outputs::colour::{colour_notes, colour_of, extremes, grey_of};
 use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
@@ -55,8 +55,8 @@ impl Content {
         let colour_index = colour_of(schema);
         let is_rgb = schema.rgb().is_some();
         let choice = match requested {
-            AttributeChoice::Usual => Vec::new(),
-            other => choose(other, schema, &cloud.intake.unread, &facts.ranges, &facts.relations).kept,
+            AttributeChoice::Usual => derived(&cloud.plan.derive, schema).collect(),
+            _ => choose(cloud.plan, schema, &cloud.intake.unread, &facts.ranges, &facts.relations).kept,
         };
         let extras: Vec<usize> = choice.into_iter().filter(|i| !(is_rgb && Some(*i) == colour_index)).collect();
         let mut kept: Vec<usize> = colour_index.filter(|_| is_rgb).into_iter().collect();

@@ -93,7 +93,7 @@ impl Output for BatchesSettings {
     fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize {
         let colour = colour_of(schema).map_or(0, |i| schema.attributes[i].size() as u64);
         let is_usual = plan.attributes == AttributeChoice::Usual;
-        let extras = if is_usual { 0 } else { kept.saturating_sub(colour) };
+        let extras = if is_usual { plan.derive.bytes() } else { kept.saturating_sub(colour) };
         let planes = u64::from(self.planes.unwrap_or(3));
         // Colour word, and at most an index and word of an original.
         let originals = if self.originals { 8 } else { 0 };

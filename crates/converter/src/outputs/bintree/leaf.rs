@@ -8,7 +8,7 @@ use pointmill_format::{Attribute, AttributeType};
 use super::settings::{RGBA, class_of};
 use crate::cloud::{Cloud, Facts};
 use crate::error::{ConvertError, Unsupported};
-use crate::outputs::attributes::{left_out, not_required};
+use crate::outputs::attributes::{derived, is_derived, left_out, not_required};
 use crate::outputs::number::number;
 use crate::plan::AttributeChoice;
 use crate::report::{DropReason, DroppedAttribute};
@@ -131,17 +131,27 @@ enum Extra {
 
 /// Optional columns, and why others are omitted.
 fn extras(cloud: &Cloud<'_>, class: Option<usize>) -> (Vec<Extra>, DropReason) {
-    let schema = cloud.schema();
+    let (schema, derive) = (cloud.schema(), &cloud.plan.derive);
     let others = (0..schema.attributes.len()).filter(|i| Some(*i) != class);
+    let computed = || derived(derive, schema).map(Extra::Own);
     match &cloud.plan.attributes {
-        AttributeChoice::Usual => (Vec::new(), DropReason::NotUsual),
+        AttributeChoice::Usual => (computed().collect(), DropReason::NotUsual),
         AttributeChoice::All => (others.map(Extra::Own).collect(), DropReason::NotUsual),
         AttributeChoice::Scene => {
             let facts = &cloud.facts;
-            let is_required = |i: &usize| not_required(schema, &facts.ranges, &facts.relations, *i).is_none();
+            let is_required = |i: &usize| {
+                is_derived(derive, schema, *i) || not_required(schema, &facts.ranges, &facts.relations, *i).is_none()
+            };
             (others.filter(is_required).map(Extra::Own).collect(), DropReason::NotUsual)
         }
-        AttributeChoice::List(names) => (named(schema, names, class), DropReason::NotRequested),
+        AttributeChoice::List(names) => {
+            let mut extras = named(schema, names, class);
+            let is_new =
+                |extra: &Extra| !extras.iter().any(|e| matches!((e, extra), (Extra::Own(a), Extra::Own(b)) if a == b));
+            let more: Vec<Extra> = computed().filter(is_new).collect();
+            extras.extend(more);
+            (extras, DropReason::NotRequested)
+        }
     }
 }
 

@@ -102,7 +102,7 @@ impl Output for BintreeSettings {
         let nodes = 3000 / u64::from(self.capacity).max(1) + 1;
         let class = class_of(schema).map_or(0, |i| schema.attributes[i].size() as u64);
         let is_usual = plan.attributes == AttributeChoice::Usual;
-        let extras = if is_usual { 0 } else { kept.saturating_sub(class).next_multiple_of(4) };
+        let extras = if is_usual { plan.derive.bytes() } else { kept.saturating_sub(class).next_multiple_of(4) };
         DiskSize { per_point: CORE_BYTES as u64 + extras, per_1000_points: nodes * INDEX_NODE_BYTES }
     }
 

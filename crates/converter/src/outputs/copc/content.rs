@@ -35,7 +35,7 @@ impl Content {
     /// Attributes that a record of LAS has no room for.
     pub(super) fn choose(cloud: &Cloud<'_>) -> Result<Self, ConvertError> {
         let schema = cloud.schema();
-        let choice = choose(&cloud.plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]);
+        let choice = choose(cloud.plan, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]);
         let kept: Vec<Attribute> = choice.kept.iter().map(|&i| schema.attributes[i].clone()).collect();
         let kind = DatasetKind::Copc;
         let layout = RecordLayout::choose(&kept, &POINT_FORMATS)

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 pub(super) use accuracy::{errors, half_ulp};
 pub(crate) use spacing::ChosenSpacing;
 
-use super::attributes::choose;
+use super::attributes::{choose, is_derived};
 use crate::cloud::Cloud;
 use crate::error::ConvertError;
 use crate::octree::{Octree, OctreeSettings, Sampling};
@@ -98,10 +98,12 @@ fn chosen_bytes(cloud: &Cloud<'_>) -> usize {
     POSITION_BYTES
         + match &plan.attributes {
             AttributeChoice::Usual | AttributeChoice::All => of(all, &|_| true),
-            AttributeChoice::List(names) => of(all, &|i| names.contains(&all.attributes[i].name)),
+            AttributeChoice::List(names) => {
+                of(all, &|i| names.contains(&all.attributes[i].name) || is_derived(&plan.derive, all, i))
+            }
             AttributeChoice::Scene => {
                 let schema = cloud.schema();
-                let kept = choose(&plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]).kept;
+                let kept = choose(plan, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]).kept;
                 of(schema, &|i| kept.contains(&i))
             }
         }

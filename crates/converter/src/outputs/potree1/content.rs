@@ -9,7 +9,7 @@ use super::notes;
 use super::settings::Potree1Version;
 use crate::cloud::Cloud;
 use crate::error::{ConvertError, Unsupported};
-use crate::outputs::attributes::{choose, left_out};
+use crate::outputs::attributes::{choose, derived, left_out};
 use crate::outputs::colour::{colour_notes, colour_of, extremes};
 use crate::outputs::potree2::{MAX_ELEMENTS, Names, viewable};
 use crate::plan::AttributeChoice;
@@ -65,8 +65,8 @@ impl Content {
     pub(super) fn choose(cloud: &Cloud<'_>, version: Potree1Version) -> Result<Self, ConvertError> {
         let (schema, requested) = (cloud.schema(), &cloud.plan.attributes);
         let asked = match requested {
-            AttributeChoice::Usual => Vec::new(),
-            other => choose(other, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]).kept,
+            AttributeChoice::Usual => derived(&cloud.plan.derive, schema).collect(),
+            _ => choose(cloud.plan, schema, &cloud.intake.unread, &cloud.facts.ranges, &[]).kept,
         };
         if let Some(wide) = asked.iter().map(|&i| &schema.attributes[i]).find(|a| a.elements > MAX_ELEMENTS) {
             let (kind, name, elements) = (DatasetKind::Potree1, wide.name.clone(), wide.elements);

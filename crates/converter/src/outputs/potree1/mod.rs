@@ -87,7 +87,8 @@ impl Output for Potree1Settings {
     fn disk_size(&self, plan: &Plan, schema: &Schema, kept: u64) -> DiskSize {
         let nodes = 3000 / u64::from(self.capacity()).max(1) + 1;
         let colour = schema.rgb().map_or(0, |i| schema.attributes[i].size() as u64);
-        let others = if plan.attributes == AttributeChoice::Usual { 0 } else { kept.saturating_sub(colour) };
+        let others =
+            if plan.attributes == AttributeChoice::Usual { plan.derive.bytes() } else { kept.saturating_sub(colour) };
         let per_point = (POSITION_BYTES + COLOUR_BYTES) as u64 + others;
         DiskSize { per_point, per_1000_points: nodes * if self.archive { ARCHIVED_BYTES } else { NODE_BYTES } }
     }

@@ -139,8 +139,7 @@ impl OctreeOutput for Potree2Settings {
         to: &'a StagedDataset,
     ) -> Result<Box<dyn OctreeWriter + 'a>, ConvertError> {
         let schema = cloud.schema();
-        let choice =
-            choose(&cloud.plan.attributes, schema, &cloud.intake.unread, &cloud.facts.ranges, &cloud.facts.relations);
+        let choice = choose(cloud.plan, schema, &cloud.intake.unread, &cloud.facts.ranges, &cloud.facts.relations);
         if let Some(wide) = choice.kept.iter().map(|&i| &schema.attributes[i]).find(|a| a.elements > MAX_ELEMENTS) {
             let (kind, name, elements) = (self.kind(), wide.name.clone(), wide.elements);
             return Err(Unsupported::WideAttribute { kind, name, elements, max: MAX_ELEMENTS }.into());

@@ -1,17 +1,21 @@
-//! The points of a chunk in Morton order.
+//! The points of a part of the cloud in Morton order.
 
-use crate::cloud::{MortonSorter, RecordFrame, TREE_BITS, TreePoint, morton};
+use super::cube::TREE_BITS;
+use super::frames::TreePoint;
+use super::morton;
+use super::morton_sort::MortonSorter;
+use super::record::RecordFrame;
 use crate::runtime::{Vectors, vectorized};
 
-/// A point of a chunk: where it is, and which record it has.
+/// A point of a part: where it is, and which record it has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Point {
     pub(crate) t: TreePoint,
-    /// Index of the record in the chunk.
+    /// Index of the record in the part.
     pub(crate) record: u32,
 }
 
-/// Memory that is reused from chunk to chunk.
+/// Memory that is reused from part to part.
 #[derive(Debug, Default)]
 pub(crate) struct OrderScratch {
     vectors: Vectors,
@@ -19,7 +23,7 @@ pub(crate) struct OrderScratch {
     sorter: MortonSorter,
 }
 
-/// Sorts the records of a chunk below a node of `level` into `out`: Morton order, and records that share a place by
+/// Sorts records below a node of `level` into `out`: Morton order, and records that share a place by
 /// their bytes, so that the order depends on the points alone.
 pub(crate) fn order(records: &[u8], frame: &RecordFrame, level: u8, scratch: &mut OrderScratch, out: &mut Vec<Point>) {
     let stride = frame.stride;

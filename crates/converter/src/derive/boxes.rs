@@ -1,0 +1,228 @@
+//! A hierarchy of boxes over runs of points: which runs can hold a point that is near enough.
+
+use std::ops::Range;
+
+use super::space::{Space, outside, squared};
+
+/// Children of a node.
+const WIDTH: usize = 8;
+
+/// The box of some points, closed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Box3 {
+    pub(super) min: [i32; 3],
+    pub(super) max: [i32; 3],
+}
+
+impl Box3 {
+    const EMPTY: Self = Self { min: [i32::MAX; 3], max: [i32::MIN; 3] };
+
+    /// Of points whose coordinates are in columns.
+    pub(super) fn of([x, y, z]: [&[i32]; 3]) -> Self {
+        let ends = |axis: &[i32]| axis.iter().fold((i32::MAX, i32::MIN), |(min, max), v| (min.min(*v), max.max(*v)));
+        let [x, y, z] = [ends(x), ends(y), ends(z)];
+        Self { min: [x.0, y.0, z.0], max: [x.1, y.1, z.1] }
+    }
+
+    fn join(&mut self, other: &Self) {
+        for a in 0..3 {
+            self.min[a] = self.min[a].min(other.min[a]);
+            self.max[a] = self.max[a].max(other.max[a]);
+        }
+    }
+}
+
+/// The boxes of eight children, axis by axis.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    min: [[i32; WIDTH]; 3],
+    max: [[i32; WIDTH]; 3],
+    /// How many there are.
+    children: u32,
+}
+
+impl Node {
+    /// Squares of the distances of a place from the boxes.
+    #[inline(always)]
+    fn distances(&self, q: [i32; 3], space: &Space) -> [f32; WIDTH] {
+        let mut sums = [0.0; WIDTH];
+        for (i, sum) in sums.iter_mut().enumerate() {
+            let beside = [
+                outside(q[0], self.min[0][i], self.max[0][i]),
+                outside(q[1], self.min[1][i], self.max[1][i]),
+                outside(q[2], self.min[2][i], self.max[2][i]),
+            ];
+            *sum = squared(beside, space.scale);
+        }
+        sums
+    }
+}
+
+/// Boxes over boxes, eight to one, over runs of points in Morton order.
+#[derive(Debug, Default)]
+pub(super) struct Boxes {
+    /// The nodes of each level; those of the first have the boxes of runs. The last level has one node.
+    levels: Vec<Vec<Node>>,
+}
+
+/// A node or a run that is still to be looked at.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Waiting {
+    distance: f32,
+    level: u32,
+    index: u32,
+}
+
+impl Boxes {
+    /// Over runs with these boxes; the memory of an earlier hierarchy is used again.
+    pub(super) fn build(&mut self, runs: impl Iterator<Item = Box3>) {
+        let mut spare = std::mem::take(&mut self.levels).into_iter();
+        let mut above = self.level(&mut spare, runs);
+        while above.len() > 1 {
+            let boxes: Vec<Box3> = std::mem::take(&mut above);
+            above = self.level(&mut spare, boxes.into_iter());
+        }
+    }
+
+    /// Adds a level; returns the boxes of its nodes.
+    fn level(
+        &mut self,
+        spare: &mut impl Iterator<Item = Vec<Node>>,
+        mut below: impl Iterator<Item = Box3>,
+    ) -> Vec<Box3> {
+        let mut nodes = spare.next().unwrap_or_default();
+        nodes.clear();
+        let mut boxes = Vec::new();
+        loop {
+            let mut node = Node { min: [[i32::MAX; WIDTH]; 3], max: [[i32::MIN; WIDTH]; 3], children: 0 };
+            let mut all = Box3::EMPTY;
+            for child in below.by_ref().take(WIDTH) {
+                for a in 0..3 {
+                    node.min[a][node.children as usize] = child.min[a];
+                    node.max[a][node.children as usize] = child.max[a];
+                }
+                node.children += 1;
+                all.join(&child);
+            }
+            if node.children == 0 {
+                break;
+            }
+            nodes.push(node);
+            boxes.push(all);
+            if node.children < WIDTH as u32 {
+                break;
+            }
+        }
+        self.levels.push(nodes);
+        boxes
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> u64 {
+        self.levels.iter().map(|nodes| (nodes.capacity() * size_of::<Node>()) as u64).sum()
+    }
+
+    /// Calls `run` with each run, but for those in `known`, whose box may hold a point at most as far from `q` as the square
+    /// of a distance, nearer boxes first by and large. `run` returns what that bound is then; `stack` is memory.
+    #[inline(always)]
+    pub(super) fn visit<E>(
+        &self,
+        q: [i32; 3],
+        space: &Space,
+        mut bound: f32,
+        known: &Range<u32>,
+        stack: &mut Vec<Waiting>,
+        mut run: impl FnMut(u32) -> Result<f32, E>,
+    ) -> Result<(), E> {
+        stack.clear();
+        stack.push(Waiting { distance: 0.0, level: self.levels.len() as u32, index: 0 });
+        while let Some(Waiting { distance, level, index }) = stack.pop() {
+            if distance > bound {
+                continue;
+            }
+            if level == 0 {
+                bound = run(index)?;
+                continue;
+            }
+            let Some(node) = self.levels.get(level as usize - 1).and_then(|nodes| nodes.get(index as usize)) else {
+                continue;
+            };
+            let distances = node.distances(q, space);
+            let base = stack.len();
+            for (child, distance) in distances.into_iter().take(node.children as usize).enumerate() {
+                if distance > bound {
+                    continue;
+                }
+                let child = Waiting { distance, level: level - 1, index: index * WIDTH as u32 + child as u32 };
+                if child.is_within(known) {
+                    continue;
+                }
+                // the nearest last: it is looked at first
+                let mut at = stack.len();
+                stack.push(child);
+                while at > base && stack[at - 1].distance < distance {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = child;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Waiting {
+    /// True if all its runs are among `known`.
+    #[inline(always)]
+    fn is_within(&self, known: &Range<u32>) -> bool {
+        let width = 3 * self.level;
+        let first = u64::from(self.index) << width;
+        first >= u64::from(known.start) && first + (1 << width) <= u64::from(known.end)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use pointmill_testkit::Random;
+
+    use super::*;
+
+    #[test]
+    fn every_run_that_can_be_near_enough_is_found_and_known_ones_are_not() {
+        let mut random = Random::new(8);
+        let space = Space::new([0.01, 0.01, 0.02]);
+        let mut boxes = Boxes::default();
+        for runs in [1usize, 2, 7, 8, 9, 64, 65, 700] {
+            let all: Vec<Box3> = (0..runs)
+                .map(|_| {
+                    let min: [i32; 3] = std::array::from_fn(|_| random.below(1000) as i32);
+                    Box3 { min, max: min.map(|v| v + random.below(50) as i32) }
+                })
+                .collect();
+            boxes.build(all.iter().copied());
+            for _ in 0..50 {
+                let q: [i32; 3] = std::array::from_fn(|_| random.below(1000) as i32);
+                let bound = random.below(200_000) as f32;
+                let known = random.below(runs as u64 + 1) as u32;
+                let known = known..known + random.below(u64::from(runs as u32 - known) + 1) as u32;
+                let mut found = Vec::new();
+                let visited = boxes.visit::<Infallible>(q, &space, bound, &known, &mut Vec::new(), |run| {
+                    found.push(run);
+                    Ok(bound)
+                });
+                assert!(visited.is_ok());
+                found.retain(|run| !known.contains(run)); // a node may have some of both
+                found.sort_unstable();
+                let is_near = |run: &u32| {
+                    let Box3 { min, max } = all[*run as usize];
+                    let beside = std::array::from_fn(|a| outside(q[a], min[a], max[a]));
+                    squared(beside, space.scale) <= bound && !known.contains(run)
+                };
+                let expected: Vec<u32> = (0..runs as u32).filter(is_near).collect();
+                assert_eq!(found, expected, "{runs} runs");
+            }
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The surfaces through the points of a unit: a thread's part of the work.
+
+use std::ops::Range;
+
+use super::boxes::{Box3, Boxes, Waiting};
+use super::collect::Collect;
+use super::runs::{Lookup, Runs};
+use super::space::{Space, between, squared};
+use super::surface::Surface;
+use crate::error::ConvertError;
+use crate::runtime::Workers;
+
+/// Points of a leaf of the hierarchy over a unit: two vectors of single precision.
+const LEAF_POINTS: usize = 16;
+
+/// Points that are compared at once.
+const LANES: usize = 8;
+
+/// Points after which a thread looks whether the run is to stop.
+const POINTS_PER_LOOK: usize = 2048;
+
+/// What is known of the points outside of a unit.
+#[derive(Clone, Copy)]
+pub(super) struct Others<'a> {
+    pub(super) runs: &'a Runs,
+    pub(super) unit: usize,
+}
+
+/// A thread's memory.
+pub(super) struct Finder {
+    /// Coordinates of the points of the unit, in Morton order.
+    pub(super) columns: [Vec<i32>; 3],
+    /// By point.
+    pub(super) surfaces: Vec<Surface>,
+    leaves: Boxes,
+    stack: Vec<Waiting>,
+    lookup: Lookup,
+}
+
+impl Finder {
+    pub(super) fn new() -> Self {
+        let columns = std::array::from_fn(|_| Vec::new());
+        Self { columns, surfaces: Vec::new(), leaves: Boxes::default(), stack: Vec::new(), lookup: Lookup::new() }
+    }
+
+    /// Finds the surface through each point of the unit. `others`: nothing, if the unit is the cloud.
+    #[inline(always)]
+    pub(super) fn find<C: Collect>(
+        &mut self,
+        space: &Space,
+        others: Option<Others<'_>>,
+        workers: &Workers<'_>,
+        collect: &mut C,
+    ) -> Result<(), ConvertError> {
+        let points = self.columns[0].len();
+        let leaf = |i: usize| i * LEAF_POINTS..((i + 1) * LEAF_POINTS).min(points);
+        let columns = self.columns.each_ref().map(Vec::as_slice);
+        let of = |range: Range<usize>| columns.map(|axis| &axis[range.clone()]);
+        self.leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(of(leaf(i)))));
+        self.surfaces.clear();
+        self.surfaces.reserve(points);
+        let mut before = None;
+        for i in 0..points {
+            if i % POINTS_PER_LOOK == 0 {
+                workers.check_stop()?;
+            }
+            let q = columns.map(|axis| axis[i]);
+            if let Some((place, surface)) = before
+                && place == q
+            {
+                self.surfaces.push(surface);
+                continue;
+            }
+            collect.begin(q);
+            // its own leaf first: then there is a bound
+            let own = i / LEAF_POINTS;
+            scan::<C>(of(leaf(own)), q, space, collect);
+            let known = own as u32..own as u32 + 1;
+            self.leaves.visit::<ConvertError>(q, space, collect.bound(), &known, &mut self.stack, |run| {
+                scan::<C>(of(leaf(run as usize)), q, space, collect);
+                Ok(collect.bound())
+            })?;
+            if let Some(others) = others {
+                beyond::<C>(q, space, others, &mut self.stack, &mut self.lookup, collect)?;
+            }
+            let surface = collect.surface(space);
+            before = Some((q, surface));
+            self.surfaces.push(surface);
+        }
+        Ok(())
+    }
+
+    /// Offers the points of other units to a neighbourhood of which this one has offered its own.
+    pub(super) fn look_beyond<C: Collect>(
+        &mut self,
+        q: [i32; 3],
+        space: &Space,
+        others: Others<'_>,
+        collect: &mut C,
+    ) -> Result<(), ConvertError> {
+        beyond::<C>(q, space, others, &mut self.stack, &mut self.lookup, collect)
+    }
+}
+
+/// Offers the points of other units.
+#[inline(always)]
+fn beyond<C: Collect>(
+    q: [i32; 3],
+    space: &Space,
+    Others { runs, unit }: Others<'_>,
+    stack: &mut Vec<Waiting>,
+    lookup: &mut Lookup,
+    collect: &mut C,
+) -> Result<(), ConvertError> {
+    let own = runs.of(unit);
+    runs.boxes.visit::<ConvertError>(q, space, collect.bound(), &own, stack, |run| {
+        if !own.contains(&run) {
+            scan::<C>(lookup.columns(runs, run)?, q, space, collect);
+        }
+        Ok(collect.bound())
+    })
+}
+
+/// Offers some points.
+#[inline(always)]
+fn scan<C: Collect>([x, y, z]: [&[i32]; 3], q: [i32; 3], space: &Space, collect: &mut C) {
+    let distance = |place: [i32; 3]| squared([0, 1, 2].map(|a| between(place[a], q[a])), space.scale);
+    let ((xs, x_rest), (ys, y_rest), (zs, z_rest)) =
+        (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), z.as_chunks::<LANES>());
+    for ((x, y), z) in xs.iter().zip(ys).zip(zs) {
+        let bound = collect.bound();
+        let mut distances = [0.0; LANES];
+        for (i, d) in distances.iter_mut().enumerate() {
+            *d = distance([x[i], y[i], z[i]]);
+        }
+        let mut hits = 0u32;
+        for (i, d) in distances.iter().enumerate() {
+            hits |= u32::from(*d <= bound) << i;
+        }
+        while hits != 0 {
+            let i = hits.trailing_zeros() as usize % LANES;
+            hits &= hits - 1;
+            collect.offer(distances[i], [x[i], y[i], z[i]]);
+        }
+    }
+    for ((x, y), z) in x_rest.iter().zip(y_rest).zip(z_rest) {
+        let d = distance([*x, *y, *z]);
+        if d <= collect.bound() {
+            collect.offer(d, [*x, *y, *z]);
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! What a thread does with a unit: its points in order, the surfaces through them, its records back.
+
+use super::collect::{AllWithin, Collect as _, Collector, SoMany};
+use super::fields::{Fields, Written};
+use super::finder::{Finder, Others};
+use super::runs::{Runs, UnitRuns};
+use super::space::Space;
+use super::surface::Surface;
+use super::units::{Placed, Unit};
+use crate::cloud::{Checksum, Cloud, OrderScratch, Point, Segment, Store, order, position};
+use crate::error::ConvertError;
+use crate::runtime::{Runtime, Vectors, Workers, vectorized};
+
+/// Points of a place that very many share that are taken at a time.
+const PLACE_POINTS: u32 = 65_536;
+
+/// What a unit takes: records, and those that go back; columns, boxes, tree coordinates, keys twice, points, surfaces.
+pub(super) fn bytes_per_point(stride: usize) -> u64 {
+    2 * stride as u64 + 12 + 4 + 12 + 16 + 16 + size_of::<Surface>() as u64
+}
+
+/// What all threads share.
+pub(super) struct Task<'a> {
+    pub(super) rt: &'a Runtime<'a>,
+    cloud: &'a Cloud<'a>,
+    fields: Fields,
+    space: Space,
+    unit_points: u64,
+}
+
+impl<'a> Task<'a> {
+    pub(super) fn new(cloud: &'a Cloud<'a>, rt: &'a Runtime<'a>, fields: Fields, space: Space) -> Self {
+        let unit_points = rt.budget.task_points(bytes_per_point(cloud.frame.stride), super::MAX_UNIT_POINTS);
+        Self { rt, cloud, fields, space, unit_points }
+    }
+
+    pub(super) fn worker(&self) -> Worker<'_> {
+        Worker {
+            task: self,
+            vectors: Vectors::default(),
+            records: Vec::new(),
+            sources: Vec::new(),
+            of_record: Vec::new(),
+            points: Vec::new(),
+            scratch: OrderScratch::default(),
+            finder: Finder::new(),
+            collector: Collector::new(self.cloud.plan.derive.neighbourhood, &self.space),
+            written: Written::default(),
+            taken: Checksum::default(),
+            put: Checksum::default(),
+        }
+    }
+}
+
+/// A thread and its memory.
+pub(super) struct Worker<'a> {
+    task: &'a Task<'a>,
+    vectors: Vectors,
+    records: Vec<u8>,
+    /// Of the records, ascending.
+    sources: Vec<u32>,
+    /// By record: index in `sources`.
+    of_record: Vec<u32>,
+    points: Vec<Point>,
+    scratch: OrderScratch,
+    finder: Finder,
+    collector: Collector,
+    written: Written,
+    /// Of records as they were, and as they are.
+    taken: Checksum,
+    put: Checksum,
+}
+
+impl Worker<'_> {
+    /// What it has done.
+    pub(super) fn finish(self) -> (Written, Checksum, Checksum) {
+        (self.written, self.taken, self.put)
+    }
+
+    /// Keeps the positions of a unit in `store`.
+    pub(super) fn list(&mut self, unit: &Unit, store: &Store) -> Result<UnitRuns, ConvertError> {
+        let mut runs = UnitRuns::default();
+        if !unit.is_large_place(self.task.unit_points) {
+            self.load(unit, false)?;
+            let columns = self.finder.columns.each_ref().map(Vec::as_slice);
+            runs.add(columns, store, &mut self.records)?;
+            return Ok(runs);
+        }
+        let cloud = self.task.cloud;
+        for part in unit.cells.iter().flat_map(|cell| &cell.segments).flat_map(|s| s.split(PLACE_POINTS)) {
+            self.task.rt.check_stop()?;
+            self.records.clear();
+            cloud.store.read(part, &mut self.records)?;
+            self.finder.columns.iter_mut().for_each(Vec::clear);
+            for record in self.records.chunks_exact(cloud.frame.stride) {
+                self.finder.columns.iter_mut().zip(position(record).0).for_each(|(axis, v)| axis.push(v));
+            }
+            let columns = self.finder.columns.each_ref().map(Vec::as_slice);
+            runs.add(columns, store, &mut self.records)?;
+        }
+        Ok(runs)
+    }
+
+    /// Takes a unit, and puts it back with what is computed.
+    pub(super) fn unit(&mut self, unit: &Unit, number: usize, runs: Option<&Runs>) -> Result<Placed, ConvertError> {
+        let others = runs.map(|runs| Others { runs, unit: number });
+        if unit.is_large_place(self.task.unit_points) {
+            return self.large_place(unit, others);
+        }
+        self.load(unit, true)?;
+        let Task { rt, space, .. } = self.task;
+        let (vectors, finder, workers) = (self.vectors, &mut self.finder, &**rt);
+        match &mut self.collector {
+            Collector::SoMany(collect) => so_many(vectors, finder, space, others, workers, collect)?,
+            Collector::AllWithin(collect) => all_within(vectors, finder, space, others, workers, collect)?,
+        }
+        self.put_back(unit)
+    }
+
+    /// Reads or takes the records of a unit, and puts its points in order.
+    fn load(&mut self, unit: &Unit, takes: bool) -> Result<(), ConvertError> {
+        let Cloud { store, frame, .. } = self.task.cloud;
+        self.records.clear();
+        self.records.reserve_exact(unit.points() as usize * frame.stride);
+        self.sources.clear();
+        self.of_record.clear();
+        for segment in unit.cells.iter().flat_map(|cell| &cell.segments) {
+            let source = if takes {
+                store.take_to_put_back(*segment, true, &mut self.records)?
+            } else {
+                store.read(*segment, &mut self.records)?
+            };
+            self.of_record.resize(self.records.len() / frame.stride, source);
+        }
+        if takes {
+            self.taken.add_all(&self.records, frame.stride);
+            self.sources.extend(&self.of_record);
+            self.sources.dedup();
+            self.sources.sort_unstable();
+            self.sources.dedup();
+            let index = |source: &u32| self.sources.binary_search(source).unwrap_or(0) as u32;
+            self.of_record.iter_mut().for_each(|source| *source = index(source));
+        }
+        order(&self.records, frame, unit.key.level, &mut self.scratch, &mut self.points);
+        for (a, axis) in self.finder.columns.iter_mut().enumerate() {
+            let place = |point: &Point| position(&self.records[point.record as usize * frame.stride..]).0[a];
+            axis.clear();
+            axis.extend(self.points.iter().map(place));
+        }
+        Ok(())
+    }
+
+    /// Puts the records back, those of each source into a block.
+    fn put_back(&mut self, unit: &Unit) -> Result<Placed, ConvertError> {
+        let Cloud { store, frame, .. } = self.task.cloud;
+        let stride = frame.stride;
+        let mut counts = vec![0u32; self.sources.len()];
+        self.of_record.iter().for_each(|source| counts[*source as usize] += 1);
+        let mut buffers: Vec<Vec<u8>> =
+            counts.iter().map(|count| store.buffer(*count as usize * stride)).collect::<Result<_, _>>()?;
+        let blocks: Vec<u32> = self.sources.iter().map(|source| store.open(*source)).collect::<Result<_, _>>()?;
+        let columns = &self.finder.columns;
+        let (mut placed, mut next) = (Vec::with_capacity(unit.cells.len()), 0);
+        for cell in &unit.cells {
+            let starts: Vec<usize> = buffers.iter().map(|buffer| buffer.len() / stride).collect();
+            let end = next + cell.points as usize;
+            for i in next..end {
+                let record = self.points[i].record as usize;
+                let buffer = &mut buffers[self.of_record[record] as usize];
+                let at = buffer.len();
+                buffer.extend_from_slice(&self.records[record * stride..][..stride]);
+                let place = [columns[0][i], columns[1][i], columns[2][i]];
+                self.task.fields.put(&mut buffer[at..], place, &self.finder.surfaces[i], &mut self.written);
+            }
+            next = end;
+            let of_block = blocks.iter().zip(&buffers).zip(starts);
+            let segment = |((block, buffer), start): ((&u32, &Vec<u8>), usize)| {
+                let count = buffer.len() / stride - start;
+                (count > 0).then_some(Segment { block: *block, start: start as u32, count: count as u32 })
+            };
+            placed.push(of_block.filter_map(segment).collect());
+        }
+        for (block, mut buffer) in blocks.into_iter().zip(buffers) {
+            self.put.add_all(&buffer, stride);
+            store.fill(block, &mut buffer)?;
+        }
+        Ok(placed)
+    }
+
+    /// A place that more points share than are worked on together: one neighbourhood for all.
+    fn large_place(&mut self, unit: &Unit, others: Option<Others<'_>>) -> Result<Placed, ConvertError> {
+        let Cloud { store, frame, .. } = self.task.cloud;
+        let mut surface = None;
+        let mut placed = Vec::with_capacity(unit.cells.len());
+        for cell in &unit.cells {
+            let mut segments = Vec::new();
+            for part in cell.segments.iter().flat_map(|segment| segment.split(PLACE_POINTS)) {
+                self.task.rt.check_stop()?;
+                let mut records = store.buffer(part.count as usize * frame.stride)?;
+                let source = store.take_to_put_back(part, true, &mut records)?;
+                self.taken.add_all(&records, frame.stride);
+                let place = position(&records).0;
+                let surface = match surface {
+                    Some(surface) => surface,
+                    None => *surface.insert(self.surface_of_place(place, unit.points(), others)?),
+                };
+                for record in records.chunks_exact_mut(frame.stride) {
+                    self.task.fields.put(record, place, &surface, &mut self.written);
+                }
+                self.put.add_all(&records, frame.stride);
+                let block = store.open(source)?;
+                store.fill(block, &mut records)?;
+                segments.push(Segment { block, start: 0, count: part.count });
+            }
+            placed.push(segments);
+        }
+        Ok(placed)
+    }
+
+    /// The surface through a place that so many points share.
+    fn surface_of_place(
+        &mut self,
+        place: [i32; 3],
+        points: u64,
+        others: Option<Others<'_>>,
+    ) -> Result<Surface, ConvertError> {
+        let space = &self.task.space;
+        // more points than any number of neighbours: all of them are here
+        let Collector::AllWithin(collect) = &mut self.collector else { return Ok(Surface::default()) };
+        collect.begin(place);
+        collect.add_middle(points);
+        if let Some(others) = others {
+            self.finder.look_beyond(place, space, others, collect)?;
+        }
+        Ok(collect.surface(space))
+    }
+}
+
+vectorized! {
+    fn so_many(
+        finder: &mut Finder,
+        space: &Space,
+        others: Option<Others<'_>>,
+        workers: &Workers<'_>,
+        collect: &mut SoMany,
+    ) -> Result<(), ConvertError> = Finder::find;
+}
+
+vectorized! {
+    fn all_within(
+        finder: &mut Finder,
+        space: &Space,
+        others: Option<Others<'_>>,
+        workers: &Workers<'_>,
+        collect: &mut AllWithin,
+    ) -> Result<(), ConvertError> = Finder::find;
+}
