@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use super::lanes::{LANES, at_most};
 use super::space::{Space, outside, squared};
 
 /// Children of a node.
-const WIDTH: usize = 8;
+const WIDTH: usize = LANES;
 
 /// The box of some points, closed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,52 +123,69 @@ impl Boxes {
         self.levels.iter().map(|nodes| (nodes.capacity() * size_of::<Node>()) as u64).sum()
     }
 
-    /// Calls `run` with each run, but for those in `known`, whose box may hold a point at most as far from `q` as the square
-    /// of a distance, nearer boxes first by and large. `run` returns what that bound is then; `stack` is memory.
+    /// The runs whose boxes may hold a point that is near enough to `q`, but for those in `known`; nearer boxes first, by and large.
+    /// `stack` is memory.
     #[inline(always)]
-    pub(super) fn visit<E>(
-        &self,
+    pub(super) fn near<'a>(
+        &'a self,
         q: [i32; 3],
-        space: &Space,
-        mut bound: f32,
-        known: &Range<u32>,
-        stack: &mut Vec<Waiting>,
-        mut run: impl FnMut(u32) -> Result<f32, E>,
-    ) -> Result<(), E> {
+        space: &'a Space,
+        known: &'a Range<u32>,
+        stack: &'a mut Vec<Waiting>,
+    ) -> Near<'a> {
         stack.clear();
         stack.push(Waiting { distance: 0.0, level: self.levels.len() as u32, index: 0 });
-        while let Some(Waiting { distance, level, index }) = stack.pop() {
+        Near { boxes: self, q, space, known, stack }
+    }
+}
+
+/// A walk through the boxes near a place.
+pub(super) struct Near<'a> {
+    boxes: &'a Boxes,
+    q: [i32; 3],
+    space: &'a Space,
+    known: &'a Range<u32>,
+    stack: &'a mut Vec<Waiting>,
+}
+
+impl Near<'_> {
+    /// The next run whose box is at most as far away as the square of a distance, which may become less from one to the next.
+    #[inline(always)]
+    pub(super) fn next(&mut self, bound: f32) -> Option<u32> {
+        while let Some(Waiting { distance, level, index }) = self.stack.pop() {
             if distance > bound {
                 continue;
             }
             if level == 0 {
-                bound = run(index)?;
-                continue;
+                return Some(index);
             }
-            let Some(node) = self.levels.get(level as usize - 1).and_then(|nodes| nodes.get(index as usize)) else {
+            let Some(node) = self.boxes.levels.get(level as usize - 1).and_then(|nodes| nodes.get(index as usize))
+            else {
                 continue;
             };
-            let distances = node.distances(q, space);
-            let base = stack.len();
-            for (child, distance) in distances.into_iter().take(node.children as usize).enumerate() {
-                if distance > bound {
-                    continue;
-                }
-                let child = Waiting { distance, level: level - 1, index: index * WIDTH as u32 + child as u32 };
-                if child.is_within(known) {
+            let distances = node.distances(self.q, self.space);
+            let base = self.stack.len();
+            let mut hits = at_most(&distances, bound);
+            hits &= (1 << node.children) - 1;
+            while hits != 0 {
+                let i = hits.trailing_zeros() as usize % WIDTH;
+                hits &= hits - 1;
+                let child =
+                    Waiting { distance: distances[i], level: level - 1, index: index * WIDTH as u32 + i as u32 };
+                if child.is_within(self.known) {
                     continue;
                 }
                 // the nearest last: it is looked at first
-                let mut at = stack.len();
-                stack.push(child);
-                while at > base && stack[at - 1].distance < distance {
-                    stack[at] = stack[at - 1];
+                let mut at = self.stack.len();
+                self.stack.push(child);
+                while at > base && self.stack[at - 1].distance < child.distance {
+                    self.stack[at] = self.stack[at - 1];
                     at -= 1;
                 }
-                stack[at] = child;
+                self.stack[at] = child;
             }
         }
-        Ok(())
+        None
     }
 }
 
@@ -183,8 +201,6 @@ impl Waiting {
 
 #[cfg(test)]
 mod tests {
-    use std::convert::Infallible;
-
     use pointmill_testkit::Random;
 
     use super::*;
@@ -208,11 +224,11 @@ mod tests {
                 let known = random.below(runs as u64 + 1) as u32;
                 let known = known..known + random.below(u64::from(runs as u32 - known) + 1) as u32;
                 let mut found = Vec::new();
-                let visited = boxes.visit::<Infallible>(q, &space, bound, &known, &mut Vec::new(), |run| {
+                let mut stack = Vec::new();
+                let mut near = boxes.near(q, &space, &known, &mut stack);
+                while let Some(run) = near.next(bound) {
                     found.push(run);
-                    Ok(bound)
-                });
-                assert!(visited.is_ok());
+                }
                 found.retain(|run| !known.contains(run)); // a node may have some of both
                 found.sort_unstable();
                 let is_near = |run: &u32| {

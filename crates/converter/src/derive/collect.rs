@@ -1,15 +1,21 @@
 //! The neighbourhood of a point while it is put together: the nearest points, or all within a distance.
 
-use super::nearest::{Near, Nearest};
+use super::nearest::Nearest;
 use super::space::Space;
 use super::sums::Sums;
 use super::surface::Surface;
 use crate::plan::Neighbourhood;
 
+/// More than all roundings of a sum of two distances together.
+const ROUNDED_UP: f32 = 1.0 + 1e-5;
+
+/// More than what squares of lengths lose that are nearly too small for single precision; in steps.
+const LEAST: f32 = 1e-18;
+
 /// Takes the points around one.
 pub(super) trait Collect {
-    /// Begins with the next point.
-    fn begin(&mut self, q: [i32; 3]);
+    /// Begins with the next point; the square of its distance from the one before, if there is one.
+    fn begin(&mut self, q: [i32; 3], step: Option<f32>);
     /// The square of the distance up to which points matter.
     fn bound(&self) -> f32;
     /// Takes a point whose distance is at most the bound.
@@ -49,9 +55,14 @@ impl SoMany {
 
 impl Collect for SoMany {
     #[inline(always)]
-    fn begin(&mut self, q: [i32; 3]) {
+    fn begin(&mut self, q: [i32; 3], step: Option<f32>) {
         self.q = q;
-        self.nearest.clear();
+        // the neighbours of the point before are at most as far as they were from that, and the step to this one
+        let before = self.nearest.reach();
+        self.nearest.begin(step.map_or(f32::INFINITY, |step| {
+            let reach = (before.sqrt() + step.sqrt()) * ROUNDED_UP + LEAST;
+            reach * reach
+        }));
     }
 
     #[inline(always)]
@@ -61,17 +72,15 @@ impl Collect for SoMany {
 
     #[inline(always)]
     fn offer(&mut self, squared: f32, place: [i32; 3]) {
-        self.nearest.offer(Near::new(squared, place));
+        self.nearest.offer(squared, place);
     }
 
     #[inline]
     fn surface(&self, space: &Space) -> Surface {
-        let all = self.nearest.all();
-        let Some(last) = all.last() else { return Surface::default() };
-        let place = last.place();
+        let Some(place) = self.nearest.farthest() else { return Surface::default() };
         let along = |a: usize| (f64::from(place[a]) - f64::from(self.q[a])) * space.ratio[a];
         let reach = [0, 1, 2].map(along).iter().map(|d| d * d).sum::<f64>().sqrt() * space.step;
-        Surface::of(&Sums::of(self.q, all), reach, space)
+        Surface::of(&Sums::of(self.q, self.nearest.places()), reach, space)
     }
 }
 
@@ -97,7 +106,7 @@ impl AllWithin {
 
 impl Collect for AllWithin {
     #[inline(always)]
-    fn begin(&mut self, q: [i32; 3]) {
+    fn begin(&mut self, q: [i32; 3], _: Option<f32>) {
         self.q = q;
         self.sums = Sums::default();
     }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::boxes::{Box3, Boxes, Waiting};
 use super::collect::Collect;
+use super::lanes::{LANES, at_most};
 use super::runs::{Lookup, Runs};
 use super::space::{Space, between, squared};
 use super::surface::Surface;
@@ -12,9 +13,6 @@ use crate::runtime::Workers;
 
 /// Points of a leaf of the hierarchy over a unit: two vectors of single precision.
 const LEAF_POINTS: usize = 16;
-
-/// Points that are compared at once.
-const LANES: usize = 8;
 
 /// Points after which a thread looks whether the run is to stop.
 const POINTS_PER_LOOK: usize = 2048;
@@ -59,29 +57,31 @@ impl Finder {
         self.leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(of(leaf(i)))));
         self.surfaces.clear();
         self.surfaces.reserve(points);
-        let mut before = None;
+        let mut before: Option<([i32; 3], Surface)> = None;
         for i in 0..points {
             if i % POINTS_PER_LOOK == 0 {
                 workers.check_stop()?;
             }
             let q = columns.map(|axis| axis[i]);
-            if let Some((place, surface)) = before
-                && place == q
-            {
-                self.surfaces.push(surface);
-                continue;
+            let mut step = None;
+            if let Some((place, surface)) = before {
+                if place == q {
+                    self.surfaces.push(surface);
+                    continue;
+                }
+                step = Some(squared([0, 1, 2].map(|a| between(q[a], place[a])), space.scale));
             }
-            collect.begin(q);
-            // its own leaf first: then there is a bound
+            collect.begin(q, step);
+            // its own leaf first: then the bound is near to what it will be
             let own = i / LEAF_POINTS;
-            scan::<C>(of(leaf(own)), q, space, collect);
             let known = own as u32..own as u32 + 1;
-            self.leaves.visit::<ConvertError>(q, space, collect.bound(), &known, &mut self.stack, |run| {
-                scan::<C>(of(leaf(run as usize)), q, space, collect);
-                Ok(collect.bound())
-            })?;
+            scan(of(leaf(own)), q, space, collect);
+            let mut near = self.leaves.near(q, space, &known, &mut self.stack);
+            while let Some(run) = near.next(collect.bound()) {
+                scan(of(leaf(run as usize)), q, space, collect);
+            }
             if let Some(others) = others {
-                beyond::<C>(q, space, others, &mut self.stack, &mut self.lookup, collect)?;
+                beyond(q, space, others, &mut self.stack, &mut self.lookup, collect)?;
             }
             let surface = collect.surface(space);
             before = Some((q, surface));
@@ -98,7 +98,7 @@ impl Finder {
         others: Others<'_>,
         collect: &mut C,
     ) -> Result<(), ConvertError> {
-        beyond::<C>(q, space, others, &mut self.stack, &mut self.lookup, collect)
+        beyond(q, space, others, &mut self.stack, &mut self.lookup, collect)
     }
 }
 
@@ -113,12 +113,13 @@ fn beyond<C: Collect>(
     collect: &mut C,
 ) -> Result<(), ConvertError> {
     let own = runs.of(unit);
-    runs.boxes.visit::<ConvertError>(q, space, collect.bound(), &own, stack, |run| {
+    let mut near = runs.boxes.near(q, space, &own, stack);
+    while let Some(run) = near.next(collect.bound()) {
         if !own.contains(&run) {
-            scan::<C>(lookup.columns(runs, run)?, q, space, collect);
+            scan(lookup.columns(runs, run)?, q, space, collect);
         }
-        Ok(collect.bound())
-    })
+    }
+    Ok(())
 }
 
 /// Offers some points.
@@ -128,19 +129,17 @@ fn scan<C: Collect>([x, y, z]: [&[i32]; 3], q: [i32; 3], space: &Space, collect:
     let ((xs, x_rest), (ys, y_rest), (zs, z_rest)) =
         (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), z.as_chunks::<LANES>());
     for ((x, y), z) in xs.iter().zip(ys).zip(zs) {
-        let bound = collect.bound();
         let mut distances = [0.0; LANES];
         for (i, d) in distances.iter_mut().enumerate() {
             *d = distance([x[i], y[i], z[i]]);
         }
-        let mut hits = 0u32;
-        for (i, d) in distances.iter().enumerate() {
-            hits |= u32::from(*d <= bound) << i;
-        }
+        let mut hits = at_most(&distances, collect.bound());
         while hits != 0 {
             let i = hits.trailing_zeros() as usize % LANES;
             hits &= hits - 1;
-            collect.offer(distances[i], [x[i], y[i], z[i]]);
+            if distances[i] <= collect.bound() {
+                collect.offer(distances[i], [x[i], y[i], z[i]]);
+            }
         }
     }
     for ((x, y), z) in x_rest.iter().zip(y_rest).zip(z_rest) {

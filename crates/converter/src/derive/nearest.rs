@@ -1,76 +1,107 @@
-//! The nearest points of a place, in an order that depends on these points alone.
+//! The nearest points of a place: which these are depends on the points alone, not on the order in which they are found.
 
-/// A point near a place: the square of its distance, then its coordinates. Points of the same distance come in the order of their
-/// coordinates, so it does not matter in which order they are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Near(u128);
+use super::lanes::{LANES, at_most};
 
-/// The sign bit: with it turned, integers are in the order of their bits.
-const SIGN: u32 = 1 << 31;
-
-impl Near {
-    /// `squared`: 0 or more.
-    #[inline(always)]
-    pub(super) fn new(squared: f32, [x, y, z]: [i32; 3]) -> Self {
-        let bits = |v: i32| u128::from(v.cast_unsigned() ^ SIGN);
-        Self(u128::from(squared.to_bits()) << 96 | bits(x) << 64 | bits(y) << 32 | bits(z))
-    }
-
-    #[inline(always)]
-    fn squared(self) -> f32 {
-        f32::from_bits((self.0 >> 96) as u32)
-    }
-
-    /// Its coordinates.
-    #[inline(always)]
-    pub(super) fn place(self) -> [i32; 3] {
-        [64, 32, 0].map(|shift| ((self.0 >> shift) as u32 ^ SIGN).cast_signed())
-    }
-}
-
-/// The nearest ones so far, nearest first.
+/// So many points of the least distance. Of points at the same distance those with the smaller coordinates count.
+///
+/// They are in no order: the farthest is known, and a nearer point takes its place. For the few points of a neighbourhood that is
+/// two or three vectors of comparisons, without a branch that the processor has to guess.
 #[derive(Debug)]
 pub(super) struct Nearest {
-    all: Vec<Near>,
     most: usize,
+    count: usize,
+    /// Squares of distances; behind the last one they are less than any, up to whole vectors.
+    squared: Vec<f32>,
+    places: Vec<[i32; 3]>,
+    /// Index of the farthest, once there are `most`.
+    farthest: usize,
+    /// What is farther does not matter any more.
+    bound: f32,
 }
 
 impl Nearest {
     pub(super) fn new(most: usize) -> Self {
-        Self { all: Vec::with_capacity(most), most }
+        Self {
+            most,
+            count: 0,
+            squared: vec![f32::NEG_INFINITY; most.next_multiple_of(LANES)],
+            places: vec![[0; 3]; most],
+            farthest: 0,
+            bound: f32::INFINITY,
+        }
     }
 
-    pub(super) fn clear(&mut self) {
-        self.all.clear();
+    /// Begins anew, with points within the square of a distance: there must be as many as are wanted.
+    #[inline(always)]
+    pub(super) fn begin(&mut self, within: f32) {
+        (self.count, self.bound) = (0, within);
     }
 
     /// What is farther does not matter any more.
     #[inline(always)]
     pub(super) fn bound(&self) -> f32 {
-        if self.all.len() < self.most { f32::INFINITY } else { self.all[self.most - 1].squared() }
+        self.bound
     }
 
-    /// Takes a point, if it is one of the nearest.
+    /// The square of the greatest distance; infinite, if there are fewer points than are wanted.
     #[inline(always)]
-    pub(super) fn offer(&mut self, near: Near) {
-        let mut at = if self.all.len() < self.most {
-            self.all.push(near);
-            self.all.len() - 1
-        } else if near < self.all[self.most - 1] {
-            self.most - 1
-        } else {
-            return;
-        };
-        while at > 0 && near < self.all[at - 1] {
-            self.all[at] = self.all[at - 1];
-            at -= 1;
-        }
-        self.all[at] = near;
+    pub(super) fn reach(&self) -> f32 {
+        if self.count < self.most { f32::INFINITY } else { self.bound }
     }
 
-    /// Nearest first.
-    pub(super) fn all(&self) -> &[Near] {
-        &self.all
+    /// Takes a point within the bound, if it is one of the nearest.
+    #[inline(always)]
+    pub(super) fn offer(&mut self, squared: f32, place: [i32; 3]) {
+        if self.count < self.most {
+            (self.squared[self.count], self.places[self.count]) = (squared, place);
+            self.count += 1;
+            if self.count == self.most {
+                self.find_farthest();
+            }
+        } else if squared < self.bound || squared == self.bound && place < self.places[self.farthest] {
+            (self.squared[self.farthest], self.places[self.farthest]) = (squared, place);
+            self.find_farthest();
+        }
+    }
+
+    #[inline(always)]
+    fn find_farthest(&mut self) {
+        let (vectors, _) = self.squared.as_chunks::<LANES>();
+        let mut most = [f32::NEG_INFINITY; LANES];
+        for vector in vectors {
+            for (most, v) in most.iter_mut().zip(vector) {
+                *most = if *v > *most { *v } else { *most };
+            }
+        }
+        let bound = most.into_iter().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
+        self.bound = bound;
+        let mut found = None;
+        for (i, vector) in vectors.iter().enumerate() {
+            // none is greater: those that are not less are equal
+            let mut equal = at_most(&vector.map(|v| -v), -bound);
+            while equal != 0 {
+                let at = i * LANES + equal.trailing_zeros() as usize;
+                equal &= equal - 1;
+                if found.is_none_or(|found: usize| self.places[at] > self.places[found]) {
+                    found = Some(at);
+                }
+            }
+        }
+        self.farthest = found.unwrap_or(0);
+    }
+
+    /// All of them.
+    pub(super) fn places(&self) -> &[[i32; 3]] {
+        &self.places[..self.count]
+    }
+
+    /// The farthest of them.
+    pub(super) fn farthest(&self) -> Option<[i32; 3]> {
+        if self.count == self.most {
+            return self.places.get(self.farthest).copied();
+        }
+        let all = self.squared[..self.count].iter().zip(self.places());
+        all.max_by(|a, b| a.0.total_cmp(b.0).then_with(|| a.1.cmp(b.1))).map(|(_, place)| *place)
     }
 }
 
@@ -81,20 +112,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_ones_in_order_however_they_are_found() {
+    fn the_nearest_ones_however_they_are_found() {
         let mut random = Random::new(4);
-        for most in [1, 3, 16] {
-            for points in [0, 2, 16, 300] {
-                let places: Vec<[i32; 3]> = (0..points).map(|_| [(); 3].map(|()| random.below(9) as i32 - 4)).collect();
-                let near = |p: [i32; 3]| Near::new(p.iter().map(|v| (v * v) as f32).sum(), p);
-                let mut nearest = Nearest::new(most);
-                places.iter().for_each(|p| nearest.offer(near(*p)));
-                let mut expected = places.clone();
-                expected.sort_by_key(|p| (p.iter().map(|v| v * v).sum::<i32>(), *p));
-                expected.truncate(most);
-                let found: Vec<[i32; 3]> = nearest.all().iter().map(|near| near.place()).collect();
-                assert_eq!(found, expected, "{most} of {points}");
-                assert_eq!(nearest.bound() == f32::INFINITY, points < most);
+        let mut nearest_of: Vec<Nearest> = [3, 8, 16, 17].map(Nearest::new).into();
+        for points in [0usize, 2, 16, 300, 4, 40] {
+            let places: Vec<[i32; 3]> = (0..points).map(|_| [(); 3].map(|()| random.below(9) as i32 - 4)).collect();
+            let square = |p: &[i32; 3]| p.iter().map(|v| v * v).sum::<i32>();
+            let mut expected = places.clone();
+            expected.sort_by_key(|p| (square(p), *p));
+            for nearest in &mut nearest_of {
+                nearest.begin(f32::INFINITY);
+                for p in &places {
+                    if square(p) as f32 <= nearest.bound() {
+                        nearest.offer(square(p) as f32, *p);
+                    }
+                }
+                let mut found = nearest.places().to_vec();
+                found.sort_by_key(|p| (square(p), *p));
+                let expected = &expected[..points.min(nearest.most)];
+                assert_eq!(found, expected, "{} of {points}", nearest.most);
+                let farthest = expected.last().map(square);
+                assert_eq!(nearest.farthest().as_ref().map(square), farthest);
+                let reach = if points < nearest.most { None } else { farthest };
+                assert_eq!(nearest.reach(), reach.map_or(f32::INFINITY, |v| v as f32));
             }
         }
     }

@@ -1,7 +1,6 @@
 //! Sums over a neighbourhood, exact, so that no order of its points gives other bits.
 
 use super::eigen::Symmetric;
-use super::nearest::Near;
 
 /// Differences below this have squares of which a thousand add up in 64 bits.
 const SMALL: i64 = 1 << 26;
@@ -19,14 +18,11 @@ pub(super) struct Sums {
 impl Sums {
     /// Of the neighbourhood of `q`.
     #[inline]
-    pub(super) fn of(q: [i32; 3], all: &[Near]) -> Self {
-        let difference = |near: &Near| {
-            let place = near.place();
-            [0, 1, 2].map(|a| i64::from(place[a]) - i64::from(q[a]))
-        };
+    pub(super) fn of(q: [i32; 3], all: &[[i32; 3]]) -> Self {
+        let difference = |place: &[i32; 3]| [0, 1, 2].map(|a| i64::from(place[a]) - i64::from(q[a]));
         let (mut first, mut second, mut largest) = ([0i64; 3], [0i64; 6], 0);
-        for near in all {
-            let d = difference(near);
+        for place in all {
+            let d = difference(place);
             largest = d.iter().fold(largest, |most: i64, v| most.max(v.abs()));
             first.iter_mut().zip(d).for_each(|(sum, d)| *sum += d);
             second.iter_mut().zip(products(d)).for_each(|(sum, p)| *sum = sum.wrapping_add(p));
@@ -35,7 +31,7 @@ impl Sums {
             return Self { count: all.len() as u64, first, second: second.map(i128::from) };
         }
         let mut sums = Self::default();
-        all.iter().for_each(|near| sums.add(difference(near)));
+        all.iter().for_each(|place| sums.add(difference(place)));
         sums
     }
 
@@ -85,17 +81,13 @@ fn products([x, y, z]: [i64; 3]) -> [i64; 6] {
 mod tests {
     use super::*;
 
-    fn near(places: &[[i32; 3]]) -> Vec<Near> {
-        places.iter().map(|p| Near::new(1.0, *p)).collect()
-    }
-
     #[test]
     fn the_covariance_is_that_of_the_points_wherever_and_however_far_they_are() {
         let cross = [[0, 0, 0], [2, 0, 0], [-2, 0, 0], [0, 4, 0], [0, -4, 0]];
         for middle in [[0; 3], [7, -9, i32::MAX - 9], [i32::MIN + 20, 5, 5]] {
             let places = cross.map(|p| [0, 1, 2].map(|a| p[a] + middle[a]));
             for q in [middle, places[1]] {
-                let covariance = Sums::of(q, &near(&places)).covariance([1.0, 0.5, 3.0]);
+                let covariance = Sums::of(q, &places).covariance([1.0, 0.5, 3.0]);
                 assert_eq!(
                     covariance,
                     [8.0 / 5.0, 0.0, 0.0, 0.25 * 32.0 / 5.0, 0.0, 0.0].map(|v: f64| (v * 25.0) / 25.0)
@@ -103,7 +95,7 @@ mod tests {
             }
         }
         let far = [[i32::MIN, 0, 3], [i32::MAX, 0, 3]];
-        let covariance = Sums::of(far[0], &near(&far)).covariance([1.0; 3]);
+        let covariance = Sums::of(far[0], &far).covariance([1.0; 3]);
         assert_eq!(covariance, [((1u64 << 32) - 1) as f64 * ((1u64 << 32) - 1) as f64 / 4.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     }
 
@@ -112,9 +104,9 @@ mod tests {
         let places = [[5, 6, 7], [-90_000_000, 4, 3], [90_000_000, -4, 100]];
         let mut sums = Sums::default();
         places.iter().for_each(|p| sums.add([0, 1, 2].map(|a| i64::from(p[a] - places[0][a]))));
-        assert_eq!(Sums::of(places[0], &near(&places)), sums);
+        assert_eq!(Sums::of(places[0], &places), sums);
         assert!(!sums.is_one_place());
-        let mut one = Sums::of([1; 3], &near(&[[1; 3]; 4]));
+        let mut one = Sums::of([1; 3], &[[1; 3]; 4]);
         one.add_middle(3);
         assert!(one.is_one_place() && one.count == 7);
     }

@@ -2,6 +2,7 @@
 
 use super::collect::{AllWithin, Collect as _, Collector, SoMany};
 use super::fields::{Fields, Written};
+use super::filling::Filling;
 use super::finder::{Finder, Others};
 use super::runs::{Runs, UnitRuns};
 use super::space::Space;
@@ -150,40 +151,31 @@ impl Worker<'_> {
         Ok(())
     }
 
-    /// Puts the records back, those of each source into a block.
+    /// Puts the records back, those of each source into blocks of their own.
     fn put_back(&mut self, unit: &Unit) -> Result<Placed, ConvertError> {
         let Cloud { store, frame, .. } = self.task.cloud;
-        let stride = frame.stride;
-        let mut counts = vec![0u32; self.sources.len()];
+        let mut counts = vec![0usize; self.sources.len()];
         self.of_record.iter().for_each(|source| counts[*source as usize] += 1);
-        let mut buffers: Vec<Vec<u8>> =
-            counts.iter().map(|count| store.buffer(*count as usize * stride)).collect::<Result<_, _>>()?;
-        let blocks: Vec<u32> = self.sources.iter().map(|source| store.open(*source)).collect::<Result<_, _>>()?;
+        let filling = |(source, count): (&u32, usize)| Filling::new(*source, count, store, frame.stride);
+        let mut all: Vec<Filling<'_>> = self.sources.iter().zip(counts).map(filling).collect();
         let columns = &self.finder.columns;
         let (mut placed, mut next) = (Vec::with_capacity(unit.cells.len()), 0);
         for cell in &unit.cells {
-            let starts: Vec<usize> = buffers.iter().map(|buffer| buffer.len() / stride).collect();
+            let mut segments = Vec::new();
             let end = next + cell.points as usize;
             for i in next..end {
                 let record = self.points[i].record as usize;
-                let buffer = &mut buffers[self.of_record[record] as usize];
-                let at = buffer.len();
-                buffer.extend_from_slice(&self.records[record * stride..][..stride]);
+                let of = &mut all[self.of_record[record] as usize];
+                let record = &self.records[record * frame.stride..][..frame.stride];
+                let own = of.add(record, &mut segments, &mut self.put)?;
                 let place = [columns[0][i], columns[1][i], columns[2][i]];
-                self.task.fields.put(&mut buffer[at..], place, &self.finder.surfaces[i], &mut self.written);
+                self.task.fields.put(own, place, &self.finder.surfaces[i], &mut self.written);
             }
             next = end;
-            let of_block = blocks.iter().zip(&buffers).zip(starts);
-            let segment = |((block, buffer), start): ((&u32, &Vec<u8>), usize)| {
-                let count = buffer.len() / stride - start;
-                (count > 0).then_some(Segment { block: *block, start: start as u32, count: count as u32 })
-            };
-            placed.push(of_block.filter_map(segment).collect());
+            all.iter_mut().for_each(|of| of.end_cell(&mut segments));
+            placed.push(segments);
         }
-        for (block, mut buffer) in blocks.into_iter().zip(buffers) {
-            self.put.add_all(&buffer, stride);
-            store.fill(block, &mut buffer)?;
-        }
+        all.iter_mut().try_for_each(|of| of.end_block(&mut self.put))?;
         Ok(placed)
     }
 
@@ -227,7 +219,7 @@ impl Worker<'_> {
         let space = &self.task.space;
         // more points than any number of neighbours: all of them are here
         let Collector::AllWithin(collect) = &mut self.collector else { return Ok(Surface::default()) };
-        collect.begin(place);
+        collect.begin(place, None);
         collect.add_middle(points);
         if let Some(others) = others {
             self.finder.look_beyond(place, space, others, collect)?;
