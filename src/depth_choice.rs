@@ -21,11 +21,15 @@ pub(crate) fn check(files: &[PathBuf], options: &OpenOptions) -> Result<(), Fail
     let depths: Vec<&PathBuf> = files.iter().filter(may_be_depth).collect();
     if depths.is_empty() {
         let option = first(&options.depth);
-        return Err(Failure::Usage(format!("{option}: no input is a depth map, to which alone it applies; leave it out")));
+        return Err(Failure::Usage(format!(
+            "{option}: no input is a depth map, to which alone it applies; leave it out"
+        )));
     }
     if let Some(folder) = depths.into_iter().find(|path| path.is_dir()).filter(|_| options.depth.pose.is_some()) {
         let folder = folder.display();
-        return Err(Failure::Usage(format!("--pose: {folder} has its poses in its trajectory; --transform moves its points")));
+        return Err(Failure::Usage(format!(
+            "--pose: {folder} has its poses in its trajectory; --transform moves its points"
+        )));
     }
     Ok(())
 }

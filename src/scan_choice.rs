@@ -18,7 +18,8 @@ pub(crate) fn check(files: &[PathBuf], options: &OpenOptions) -> Result<(), Fail
     let mut everything = options.clone();
     everything.scans = None;
     for file in files {
-        if !matches!(ScanKind::of_file(file), Ok(Some(ScanKind::E57 | ScanKind::Text(TextKind::Ptx) | ScanKind::Depth))) {
+        if !matches!(ScanKind::of_file(file), Ok(Some(ScanKind::E57 | ScanKind::Text(TextKind::Ptx) | ScanKind::Depth)))
+        {
             continue;
         }
         match open_scan(file, &everything) {

@@ -89,7 +89,8 @@ fn parse_intrinsics(text: &str) -> Result<Intrinsics, String> {
 
 fn parse_depth_scale(text: &str) -> Result<f64, String> {
     let scale = text.parse().ok().filter(|scale| DepthOptions::is_scale(*scale));
-    scale.ok_or_else(|| "expected the units of depth in a metre, 10 to 1000000, such as 1000 for millimetres".to_owned())
+    scale
+        .ok_or_else(|| "expected the units of depth in a metre, 10 to 1000000, such as 1000 for millimetres".to_owned())
 }
 
 fn parse_depth_range(text: &str) -> Result<RangeInclusive<f64>, String> {
@@ -139,7 +140,9 @@ mod tests {
         }
         let both = [DepthFilter::Median { window: 3 }, DepthFilter::Bilateral { window: 5, range_sigma: 0.03 }];
         assert_eq!(parse_filters("median:3,bilateral:5,0.03").unwrap().0, both);
-        for text in ["", "median", "median:4", "median:1", "median:33", "bilateral:5", "bilateral:5,0", "mean:3", "0.03"] {
+        for text in
+            ["", "median", "median:4", "median:1", "median:33", "bilateral:5", "bilateral:5,0", "mean:3", "0.03"]
+        {
             assert!(parse_filters(text).is_err(), "{text}");
         }
         assert_eq!(parse_depth_range("0.4..5").unwrap(), 0.4..=5.0);

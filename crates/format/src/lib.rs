@@ -86,10 +86,10 @@ pub use open_octree::open_octree;
 pub use open_scan::open_scan;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Batches, Blob, Counted, Crs, DatasetNote, Decimal, DepthFilter, DepthOptions, ImageEncoding, ImageGeometry, ImageKind, ImagePose, Intrinsics,
-    MAX_BATCH_BYTES, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, PointMap, Resolution, Scan, ScanImage, ScanInfo,
-    ScanKind, ScanMap, ScanMaps, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, scans_named,
-    supported_scans,
+    Batches, Blob, Counted, Crs, DatasetNote, Decimal, DepthFilter, DepthOptions, ImageEncoding, ImageGeometry,
+    ImageKind, ImagePose, Intrinsics, MAX_BATCH_BYTES, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, PointMap,
+    Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanMap, ScanMaps, ScanPart, ScanWarning, Scratch, Sink, Unit,
+    UnknownAttribute, Wanted, scans_named, supported_scans,
 };
 pub use write_error::WriteError;
 

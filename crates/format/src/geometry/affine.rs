@@ -122,7 +122,8 @@ impl Affine {
     pub(crate) fn misplaced_row(&self) -> Option<usize> {
         let factors = Lattice::FINEST_STEP..=1.0 / Lattice::FINEST_STEP;
         let largest = |row: &[f64; 3]| row.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
-        let is_sound = |(row, offset): (&[f64; 3], f64)| factors.contains(&largest(row)) && Lattice::is_sound_offset(offset);
+        let is_sound =
+            |(row, offset): (&[f64; 3], f64)| factors.contains(&largest(row)) && Lattice::is_sound_offset(offset);
         self.linear.iter().zip(self.translation).position(|row| !is_sound(row))
     }
 

@@ -14,14 +14,7 @@ mod open;
 mod other_kind;
 #[cfg(feature = "text")]
 mod partial;
-#[cfg(any(
-    feature = "depth",
-    feature = "e57",
-    feature = "las",
-    feature = "pcd",
-    feature = "ply",
-    feature = "text"
-))]
+#[cfg(any(feature = "depth", feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 #[cfg_attr(not(all(feature = "e57", feature = "las", feature = "text")), allow(dead_code))]
 mod quantities;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]

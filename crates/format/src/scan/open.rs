@@ -290,7 +290,7 @@ pub fn supported_scans() -> String {
 pub(crate) fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
     #[cfg(feature = "depth")]
     if crate::scan::depth::is_sequence(path) {
-        return crate::scan::depth::open(path, options);
+        return crate::scan::depth::open(path, &options.depth, options.scans.as_deref());
     }
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
@@ -330,7 +330,7 @@ pub(crate) fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Sc
             Ok(super::partial::choose(scan, choices))
         }
         #[cfg(feature = "depth")]
-        ScanKind::Depth => crate::scan::depth::open(path, options),
+        ScanKind::Depth => crate::scan::depth::open(path, &options.depth, options.scans.as_deref()),
     }
 }
 

@@ -184,9 +184,10 @@ mod tests {
 
     #[test]
     fn options_go_before_files_and_nothing_is_guessed() {
-        let file = sidecar(r#"{"fx": 1, "fy": 2, "ppx": 3, "ppy": 4, "width": 8, "height": 6, "depth_scale": 1000, "a": {}}"#);
+        let file =
+            sidecar(r#"{"fx": 1, "fy": 2, "ppx": 3, "ppy": 4, "width": 8, "height": 6, "depth_scale": 1000, "a": {}}"#);
         let mut options = DepthOptions::default();
-        let camera = |options: &DepthOptions, file| Camera::of(Path::new("a.png"), options, &[file]);
+        let camera = |options: &DepthOptions, file: &Sidecar| Camera::of(Path::new("a.png"), options, &[file]);
         let found = camera(&options, &file).unwrap();
         assert_eq!(found.intrinsics, Intrinsics { focal: [1.0, 2.0], centre: [3.0, 4.0], size: Some([8, 6]) });
         options.units_per_metre = Some(5000.0);
@@ -197,11 +198,13 @@ mod tests {
             (r#"{"fx": -1, "fy": 2, "cx": 3, "cy": 4}"#, "no lengths above 0"),
             ("{}", "nothing says the intrinsics"),
         ] {
-            let line = camera(&options, &sidecar(text)).unwrap_err().to_string();
+            let file = sidecar(text);
+            let line = camera(&options, &file).unwrap_err().to_string();
             assert!(line.contains(what), "{line}");
         }
-        let line = camera(&DepthOptions::default(), &sidecar(r#"{"fx": 1, "fy": 1, "cx": 3, "cy": 4, "depth_scale": 0.001}"#));
-        assert!(line.unwrap_err().to_string().contains("depth_scale is 0.001; it counts units in a metre"));
+        let file = sidecar(r#"{"fx": 1, "fy": 1, "cx": 3, "cy": 4, "depth_scale": 0.001}"#);
+        let line = camera(&DepthOptions::default(), &file).unwrap_err().to_string();
+        assert!(line.contains("depth_scale is 0.001; it counts units in a metre"), "{line}");
     }
 
     #[test]

@@ -1,7 +1,5 @@
 //! Colour pictures that are registered to a depth image: PNG and JPEG.
 
-use std::fs::File;
-use std::io::{BufReader, Read as _};
 use std::path::Path;
 
 use png::{BitDepth, Transformations};
@@ -10,14 +8,12 @@ use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 
-use super::picture::{Header, check_size, open_png, refuse};
+use super::picture::{Header, check_size, first_bytes, open_png, refuse};
+use super::tracked::{Place, Tracked};
 use crate::{Advice, ReadError};
 
 /// Start of a JPEG file.
 const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
-
-/// Bytes that show what a picture is.
-const START: u64 = 64;
 
 /// The pixels of a colour picture, as they are stored.
 #[derive(Debug)]
@@ -62,7 +58,7 @@ pub(super) fn is_jpeg(first_bytes: &[u8]) -> bool {
 
 /// Width and height of a picture.
 pub(super) fn size(path: &Path) -> Result<[u32; 2], ReadError> {
-    let start = start(path)?;
+    let start = first_bytes(path)?;
     if let Some(header) = Header::of(&start) {
         return Ok(header.size);
     }
@@ -71,7 +67,7 @@ pub(super) fn size(path: &Path) -> Result<[u32; 2], ReadError> {
 
 /// Reads a picture, which must be of that size.
 pub(super) fn read(path: &Path, expected: [u32; 2]) -> Result<Colours, ReadError> {
-    let start = start(path)?;
+    let start = first_bytes(path)?;
     let colours = match Header::of(&start) {
         Some(_) => read_png(path, expected)?,
         None => read_jpeg(path, &start, expected)?,
@@ -86,18 +82,11 @@ pub(super) fn check(path: &Path, found: [u32; 2], expected: [u32; 2]) -> Result<
     }
     let ([width, height], [w, h]) = (found, expected);
     let what = format!("the colour picture has {width} × {height} pixels, the depth map {w} × {h}");
-    Err(ReadError::broken(path, None, what).advise("register it to the depths: each pixel needs its colour"))
-}
-
-fn start(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let io = |e| ReadError::io(path, "reading the colour picture", e);
-    let mut start = Vec::new();
-    File::open(path).map_err(io)?.take(START).read_to_end(&mut start).map_err(io)?;
-    Ok(start)
+    Err(ReadError::broken(path, 0, what).advise("register it to the depths: each pixel needs its colour"))
 }
 
 fn read_png(path: &Path, expected: [u32; 2]) -> Result<Colours, ReadError> {
-    let mut reader = open_png(path, Transformations::EXPAND)?;
+    let (mut reader, place) = open_png(path, Transformations::EXPAND)?;
     let (width, height) = reader.info().size();
     check(path, [width, height], expected)?;
     let (colour, bits) = reader.output_color_type();
@@ -105,42 +94,42 @@ fn read_png(path: &Path, expected: [u32; 2]) -> Result<Colours, ReadError> {
     let is_wide = bits == BitDepth::Sixteen;
     let size = channels * width as usize * height as usize * if is_wide { 2 } else { 1 };
     let mut bytes = vec![0; reader.output_buffer_size().unwrap_or(size).max(size)];
-    reader.next_frame(&mut bytes).map_err(|e| refuse(path, e))?;
-    reader.finish().map_err(|e| refuse(path, e))?;
+    reader.next_frame(&mut bytes).map_err(|e| refuse(path, &place, e))?;
+    reader.finish().map_err(|e| refuse(path, &place, e))?;
     Ok(Colours { bytes, channels, is_wide })
 }
 
 fn read_jpeg(path: &Path, start: &[u8], expected: [u32; 2]) -> Result<Colours, ReadError> {
-    let (mut decoder, size) = jpeg(path, start)?;
+    let (mut decoder, size, place) = jpeg(path, start)?;
     check(path, size, expected)?;
-    let bytes = decoder.decode().map_err(|e| refuse_jpeg(path, &e))?;
+    let bytes = decoder.decode().map_err(|e| refuse_jpeg(path, &place, &e))?;
     let channels = decoder.output_colorspace().map_or(3, |space| space.num_components());
     Ok(Colours { bytes, channels, is_wide: false })
 }
 
-/// A JPEG file with its header read, and its size.
-fn jpeg(path: &Path, start: &[u8]) -> Result<(JpegDecoder<BufReader<File>>, [u32; 2]), ReadError> {
+/// A JPEG file with its header read, its size, and how far it is read.
+fn jpeg(path: &Path, start: &[u8]) -> Result<(JpegDecoder<Tracked>, [u32; 2], Place), ReadError> {
     if !is_jpeg(start) {
         let what = "the colour picture is neither PNG nor JPEG";
-        return Err(ReadError::broken(path, None, what).advise("convert it to one of these"));
+        return Err(ReadError::broken(path, 0, what).advise("convert it to one of these"));
     }
-    let open = || File::open(path).map(BufReader::new).map_err(|e| ReadError::io(path, "opening the picture", e));
+    let (file, place) = Tracked::open(path)?;
     // what is cut short or corrupt is an error, not grey
     let options = DecoderOptions::new_safe().set_strict_mode(true);
-    let mut decoder = JpegDecoder::new_with_options(open()?, options);
-    decoder.decode_headers().map_err(|e| refuse_jpeg(path, &e))?;
+    let mut decoder = JpegDecoder::new_with_options(file, options);
+    decoder.decode_headers().map_err(|e| refuse_jpeg(path, &place, &e))?;
     let size = decoder.dimensions().and_then(|(w, h)| Some([u32::try_from(w).ok()?, u32::try_from(h).ok()?]));
     let size = size.unwrap_or_default();
     check_size(path, size)?;
     if decoder.input_colorspace() == Some(ColorSpace::Luma) {
         decoder.set_options(options.jpeg_set_out_colorspace(ColorSpace::Luma));
     }
-    Ok((decoder, size))
+    Ok((decoder, size, place))
 }
 
-fn refuse_jpeg(path: &Path, error: &DecodeErrors) -> ReadError {
+fn refuse_jpeg(path: &Path, place: &Place, error: &DecodeErrors) -> ReadError {
     // its text repeats the name of the variant and breaks lines
     let why = format!("{error:?}").split_whitespace().collect::<Vec<_>>().join(" ");
     let what = format!("the colour picture cannot be decoded: {why}");
-    ReadError::broken(path, None, what).advise(Advice::Damaged)
+    ReadError::broken(path, place.get(), what).advise(Advice::Damaged)
 }

@@ -7,9 +7,8 @@ use super::colour::{self, Colours};
 use super::filter;
 use super::grid::Grid;
 use super::normals::normal;
-use super::picture::{DepthPicture, Header, Rule, check_size, not_depth};
-use super::{filter_bytes, first_bytes};
-use crate::{Advice, Affine, DepthFilter, ReadError};
+use super::picture::{DepthPicture, Header, Rule, SIZE_AT, check_size, first_bytes, not_depth};
+use crate::{Advice, Affine, DepthFilter, DepthOptions, ReadError};
 
 /// A frame of a scan.
 #[derive(Debug)]
@@ -24,8 +23,16 @@ pub(super) struct Frame {
     pub(super) pose: Affine,
     /// Of its picture, or what that should be.
     pub(super) size: [u32; 2],
-    /// What is wrong without a look into the pictures, and in which file.
-    pub(super) fault: Option<(PathBuf, String)>,
+    /// What is wrong without a look into the pictures.
+    pub(super) fault: Option<Flaw>,
+}
+
+/// What is wrong with a frame: in which file, at which byte.
+#[derive(Debug, Clone)]
+pub(super) struct Flaw {
+    pub(super) path: PathBuf,
+    pub(super) at: u64,
+    pub(super) what: String,
 }
 
 /// What was found out about a frame without its depths.
@@ -55,10 +62,15 @@ impl Frame {
         Ok(Seen { size, bytes, points })
     }
 
+    /// Which of its pixels are depths.
+    pub(super) fn rule(&self, options: &DepthOptions) -> Rule {
+        Rule { units_per_metre: self.camera.units_per_metre, range: options.range.clone() }
+    }
+
     /// What is wrong without a look into the pictures.
     fn check(&self) -> Result<(), ReadError> {
-        if let Some((path, what)) = &self.fault {
-            return Err(ReadError::broken(path, None, what.clone()).advise(Advice::SkipUnreadable));
+        if let Some(Flaw { path, at, what }) = &self.fault {
+            return Err(ReadError::broken(path, *at, what.clone()).advise(Advice::SkipUnreadable));
         }
         for path in [Some(&self.depth), self.colour.as_ref()].into_iter().flatten() {
             if !path.is_file() {
@@ -72,18 +84,18 @@ impl Frame {
     fn header(&self) -> Result<[u32; 2], ReadError> {
         let header = header_of(&self.depth)?;
         check_size(&self.depth, header.size)?;
-        let broken = |what: String| ReadError::broken(&self.depth, None, what).advise(Advice::NameCamera);
+        let broken = |what: String| ReadError::broken(&self.depth, SIZE_AT, what).advise(Advice::NameCamera);
         self.camera.intrinsics.check(header.size).map_err(broken)?;
         Ok(header.size)
     }
 
-    /// Reads the pictures; the depths are filtered. `raw` keeps its memory.
+    /// Reads the pictures; the depths are filtered. `memory` is for what a decoder gives, and is kept.
     pub(super) fn pixels(
         &self,
         rule: &Rule,
         filters: &[DepthFilter],
         with_colours: bool,
-        raw: &mut Vec<u8>,
+        memory: &mut Vec<u8>,
     ) -> Result<Pixels, ReadError> {
         self.check()?;
         let picture = DepthPicture::open(&self.depth, rule)?;
@@ -92,7 +104,7 @@ impl Frame {
             return Err(changed(&self.depth));
         }
         let colours = self.colour.as_ref().filter(|_| with_colours).map(|path| colour::read(path, size)).transpose()?;
-        let mut grid = picture.depths(raw)?;
+        let mut grid = picture.depths(memory)?;
         filter::apply(filters, &mut grid);
         Ok(Pixels { grid, colours })
     }
@@ -115,7 +127,7 @@ impl Frame {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let colours = if self.colour.is_some() { Colours::bytes(pixels) } else { 0 };
         // as stored, and as lengths
-        pixels * 2 + pixels * size_of::<f64>() as u64 + filter_bytes(filters, pixels) + colours
+        pixels * 2 + pixels * size_of::<f64>() as u64 + filter::bytes(filters, pixels) + colours
     }
 }
 
@@ -130,6 +142,6 @@ pub(super) fn header_of(path: &Path) -> Result<Header, ReadError> {
 
 /// A picture that is not what it was when it was opened.
 pub(super) fn changed(path: &Path) -> ReadError {
-    ReadError::broken(path, None, "the picture has changed since it was opened")
+    ReadError::broken(path, 0, "the picture has changed since it was opened")
         .advise("convert it once nothing writes to it")
 }

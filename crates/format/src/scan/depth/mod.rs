@@ -28,17 +28,13 @@ mod open;
 mod picture;
 mod scan;
 mod sequence;
+mod tracked;
 mod trajectory;
 
-use std::fs::File;
-use std::io::Read as _;
 use std::path::Path;
 
-use crate::{DepthFilter, OpenOptions, ReadError, Scan};
+use crate::{DepthOptions, ReadError, Scan};
 use picture::Header;
-
-/// Bytes that show what a picture is.
-const FIRST_BYTES: u64 = 64;
 
 /// True for a PNG picture of 16-bit grey, by the first bytes of its file.
 pub fn is_depth(first_bytes: &[u8]) -> bool {
@@ -56,32 +52,24 @@ pub fn is_described(depth_map: impl AsRef<Path>) -> bool {
     sidecar.is_ok_and(|sidecar| sidecar.is_some_and(|sidecar| sidecar.has_camera()))
 }
 
-/// Opens a depth map, or a folder of them with a trajectory: counts the pixels that have a depth.
+/// Opens a depth map, or a folder of them with a trajectory: counts the pixels that have a depth. `scans`: the frames that are
+/// read, each by name or number ([`crate::scans_named`]); `None`: all.
 ///
 /// # Errors
 /// A camera that is not described, or is one of pictures of another size; a picture that is none of 16-bit grey or is
 /// damaged; colours of another size; no depth at all.
-pub fn open(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+pub fn open(
+    path: impl AsRef<Path>,
+    options: &DepthOptions,
+    scans: Option<&[String]>,
+) -> Result<Box<dyn Scan>, ReadError> {
     let path = path.as_ref();
-    Ok(Box::new(if path.is_dir() { open::sequence(path, options)? } else { open::single(path, options)? }))
+    let open = if path.is_dir() { open::sequence } else { open::single };
+    Ok(Box::new(open(path, options, scans)?))
 }
 
 /// A PNG picture that was to be a depth map, and is none.
 pub(super) fn not_depth(path: &Path, first_bytes: &[u8]) -> Option<ReadError> {
     let header = Header::of(first_bytes).filter(|header| !header.is_depth())?;
     Some(picture::not_depth(path, header))
-}
-
-/// Memory of the filters of that many pixels.
-fn filter_bytes(filters: &[DepthFilter], pixels: u64) -> u64 {
-    let window = filters.iter().map(|filter| u64::from(filter.window())).max().unwrap_or(0);
-    let copy = if filters.is_empty() { 0 } else { pixels };
-    (copy + window * window) * size_of::<f64>() as u64
-}
-
-fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let io = |e| ReadError::io(path, "reading the picture", e);
-    let mut first = Vec::new();
-    File::open(path).map_err(io)?.take(FIRST_BYTES).read_to_end(&mut first).map_err(io)?;
-    Ok(first)
 }

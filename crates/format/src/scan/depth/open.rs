@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::camera::{Camera, Sidecar};
-use super::frame::{Frame, header_of};
+use super::frame::{Flaw, Frame, header_of};
 use super::picture::Rule;
 use super::scan::DepthScan;
 use super::sequence::{Sequence, name_of, pose_file};
@@ -12,16 +12,17 @@ use super::trajectory::{self, MAX_SECONDS, Trajectory, nearest};
 use crate::scan::chosen::chosen;
 use crate::scan::quantities::NORMALS;
 use crate::{
-    Advice, Affine, Attribute, AttributeType, DepthOptions, OpenOptions, Piece, ReadError, ScanInfo, ScanPart, ScanWarning,
+    Advice, Affine, Attribute, AttributeType, DepthOptions, Piece, ReadError, Resolution, ScanInfo, ScanPart,
+    ScanWarning,
 };
 
 /// A single depth map.
-pub(super) fn single(path: &Path, options: &OpenOptions) -> Result<DepthScan, ReadError> {
+pub(super) fn single(path: &Path, options: &DepthOptions, scans: Option<&[String]>) -> Result<DepthScan, ReadError> {
     // what is no depth map says so before anything about its camera
     let header = header_of(path)?;
     let sidecar = Sidecar::read(&sidecar_of(path))?;
     let files: Vec<&Sidecar> = sidecar.iter().collect();
-    let camera = Camera::of(path, &options.depth, &files)?;
+    let camera = Camera::of(path, options, &files)?;
     let of_file = sidecar.as_ref().map(Sidecar::pose).transpose()?.flatten();
     let frame = Frame {
         name: name_of(path),
@@ -29,16 +30,20 @@ pub(super) fn single(path: &Path, options: &OpenOptions) -> Result<DepthScan, Re
         depth: path.to_path_buf(),
         colour: sidecar.as_ref().and_then(Sidecar::colour),
         camera,
-        pose: options.depth.pose.or(of_file).unwrap_or(Affine::IDENTITY),
+        pose: options.pose.or(of_file).unwrap_or(Affine::IDENTITY),
         size: header.size,
         fault: None,
     };
-    assemble(path, vec![frame], options, "depth map".to_owned(), false)
+    assemble(path, vec![frame], (options, scans), "depth map".to_owned(), false)
 }
 
 /// A folder of depth maps with a trajectory.
-pub(super) fn sequence(folder: &Path, options: &OpenOptions) -> Result<DepthScan, ReadError> {
-    if options.depth.pose.is_some() {
+pub(super) fn sequence(
+    folder: &Path,
+    options: &DepthOptions,
+    scans: Option<&[String]>,
+) -> Result<DepthScan, ReadError> {
+    if options.pose.is_some() {
         let what = "a folder of depth maps has its poses in its trajectory";
         return Err(ReadError::unsupported(folder, what).advise("leave the pose out, or move the points"));
     }
@@ -50,9 +55,9 @@ pub(super) fn sequence(folder: &Path, options: &OpenOptions) -> Result<DepthScan
         let what = format!("there are {} poses, and {count} depth maps in the folder", poses.len());
         return Err(ReadError::broken(path, None, what).advise("which belong together cannot be told; complete it"));
     }
-    let frames = (0..count).map(|index| frame(&sequence, index, &options.depth)).collect::<Result<Vec<_>, _>>()?;
+    let frames = (0..count).map(|index| frame(&sequence, index, options)).collect::<Result<Vec<_>, _>>()?;
     let title = format!("{count} depth maps with a trajectory");
-    assemble(folder, frames, options, title, true)
+    assemble(folder, frames, (options, scans), title, true)
 }
 
 /// A frame of a sequence; what is wrong with it alone stays in it.
@@ -61,43 +66,53 @@ fn frame(sequence: &Sequence, index: usize, options: &DepthOptions) -> Result<Fr
     let own = Sidecar::read(&sidecar_of(&listed.depth))?;
     let files: Vec<&Sidecar> = own.iter().chain(&sequence.camera).collect();
     let camera = Camera::of(&sequence.folder, options, &files)?;
-    let mut fault = None;
-    let pose = match &sequence.trajectory {
-        Trajectory::Counted { poses, .. } => poses.get(index).copied(),
-        Trajectory::Timed { path, poses } => match listed.time.map(|time| nearest(poses, time)) {
-            Some(Some((pose, seconds))) if seconds <= MAX_SECONDS => Some(*pose),
-            found => {
-                fault = Some((listed.depth.clone(), without_pose(path, found.map(|found| found.map(|(_, s)| s)))));
-                None
-            }
-        },
-        Trajectory::Each => match pose_file(&sequence.folder, listed).map(|path| trajectory::of_file(&path)) {
-            Some(Ok(pose)) => Some(pose),
-            Some(Err(error)) if error.is_io() => return Err(error),
-            Some(Err(error)) => {
-                fault = Some((error.path().to_path_buf(), error.what()));
-                None
-            }
-            None => {
-                fault = Some((listed.depth.clone(), format!("no pose: there is no {}.pose.txt", listed.name)));
-                None
-            }
-        },
+    let (pose, fault) = match pose_of(sequence, index)? {
+        Ok(pose) => (pose, None),
+        Err(flaw) => (Affine::IDENTITY, Some(flaw)),
     };
     let size = header_of(&listed.depth).map_or_else(|_| camera.intrinsics.size.unwrap_or([1, 1]), |header| header.size);
-    let pose = pose.unwrap_or(Affine::IDENTITY);
     let (name, depth, colour) = (listed.name.clone(), listed.depth.clone(), listed.colour.clone());
     Ok(Frame { name, index, depth, colour, camera, pose, size, fault })
 }
 
-/// `nearest`: seconds to the nearest pose, if there is one; `None` if the frame has no time.
-fn without_pose(trajectory: &Path, nearest: Option<Option<f64>>) -> String {
-    let file = trajectory.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    match nearest {
-        None => format!("no pose: its name is no timestamp, by which {file} has poses"),
-        Some(None) => format!("no pose: {file} has none"),
-        Some(Some(seconds)) => {
-            format!("no pose: the nearest in {file} is {seconds:.3} s away, more than {MAX_SECONDS} s")
+/// The pose of a frame, or why it has none.
+fn pose_of(sequence: &Sequence, index: usize) -> Result<Result<Affine, Flaw>, ReadError> {
+    let listed = &sequence.frames[index];
+    let name = &listed.name;
+    let flaw = |path: &Path, at, what| Ok(Err(Flaw { path: path.to_path_buf(), at, what }));
+    match &sequence.trajectory {
+        Trajectory::Counted { path, poses } => match poses.get(index) {
+            Some(pose) => Ok(Ok(*pose)),
+            None => flaw(path, 0, format!("no pose for {name}")),
+        },
+        Trajectory::Timed { path, poses } => {
+            let Some(time) = listed.time else {
+                return flaw(
+                    path,
+                    0,
+                    format!("no pose for {name}: poses have times, and the name of the picture is none"),
+                );
+            };
+            match nearest(poses, time) {
+                None => flaw(path, 0, format!("no pose for {name}: there are none in it")),
+                Some(((_, pose), seconds)) if seconds <= MAX_SECONDS => Ok(Ok(*pose)),
+                Some(((at, _), seconds)) => flaw(
+                    path,
+                    *at,
+                    format!("no pose for {name}: the nearest is {seconds:.3} s away, more than {MAX_SECONDS} s"),
+                ),
+            }
+        }
+        Trajectory::Each => {
+            let path = pose_file(&sequence.folder, listed);
+            if !path.is_file() {
+                return flaw(&path, 0, format!("no pose for {name}: there is no such file"));
+            }
+            match trajectory::of_file(&path) {
+                Ok(pose) => Ok(Ok(pose)),
+                Err(error) if error.is_io() => Err(error),
+                Err(error) => flaw(&path, 0, error.what()),
+            }
         }
     }
 }
@@ -110,14 +125,13 @@ pub(super) fn sidecar_of(depth: &Path) -> PathBuf {
 fn assemble(
     path: &Path,
     mut frames: Vec<Frame>,
-    options: &OpenOptions,
+    (options, scans): (&DepthOptions, Option<&[String]>),
     title: String,
     is_sequence: bool,
 ) -> Result<DepthScan, ReadError> {
-    let depth = &options.depth;
     let all = frames.len();
     let names: Vec<&str> = frames.iter().map(|frame| frame.name.as_str()).collect();
-    let mut is_chosen = chosen(options.scans.as_deref(), &names).into_iter();
+    let mut is_chosen = chosen(scans, &names).into_iter();
     frames.retain(|_| is_chosen.next().unwrap_or(false));
     let mut info = ScanInfo::new(path, title, 0);
     if frames.is_empty() && all > 0 {
@@ -125,31 +139,36 @@ fn assemble(
     }
     let mut found = Found::default();
     for (i, frame) in frames.iter_mut().enumerate() {
-        found.add(i, frame, &rule(frame, depth), is_sequence)?;
+        found.add(i, frame, &frame.rule(options), is_sequence)?;
     }
     if let Some(error) = found.first_error.take_if(|_| found.broken == frames.len()) {
         return Err(error);
     }
     if found.points == 0 && !frames.is_empty() {
-        return Err(nothing(path, depth));
+        return Err(nothing(path, options));
     }
     let has_colours = frames.iter().any(|frame| frame.colour.is_some());
     found.warn(&frames, has_colours, &mut info.warnings);
     if all > usize::from(u16::MAX) + 1 {
         info.warnings.push(ScanWarning::SourceIdsShared { scans: all });
     }
-    info.format = describe(&info.format, &frames, depth);
+    info.format = describe(&info.format, &frames, options);
+    info.resolution = [resolution(&frames); 3];
     info.points_declared = found.points;
     info.file_bytes = found.bytes;
     info.parts = found.parts;
     info.rgb_is_16_bit = has_colours;
-    info.attributes = attributes(has_colours, depth.normals, is_sequence);
-    Ok(DepthScan { info, frames, pieces: found.pieces, piece_frames: found.piece_frames, options: depth.clone() })
+    info.attributes = attributes(has_colours, options.normals, is_sequence);
+    Ok(DepthScan { info, frames, pieces: found.pieces, piece_frames: found.piece_frames, options: options.clone() })
 }
 
-/// Which pixels of a frame are depths.
-pub(super) fn rule(frame: &Frame, options: &DepthOptions) -> Rule {
-    Rule { units_per_metre: frame.camera.units_per_metre, range: options.range.clone() }
+/// A part of a unit of depth below which coordinates carry nothing: they are products of whole units, but no camera measures
+/// its pixels' directions as finely as that.
+const UNIT_PARTS: f64 = 10.0;
+
+fn resolution(frames: &[Frame]) -> Resolution {
+    let finest = frames.iter().map(|frame| frame.camera.units_per_metre).fold(0.0, f64::max);
+    if finest > 0.0 { Resolution::Step(1.0 / (finest * UNIT_PARTS)) } else { Resolution::Double }
 }
 
 /// What the frames hold.
@@ -222,7 +241,7 @@ fn nothing(path: &Path, options: &DepthOptions) -> ReadError {
         None => "no pixel has a depth: all are 0".to_owned(),
         Some(range) => format!("no pixel has a depth of {} to {} m", range.start(), range.end()),
     };
-    ReadError::broken(path, None, what).advise(Advice::WrongFile)
+    ReadError::broken(path, 0, what).advise(Advice::WrongFile)
 }
 
 fn attributes(has_colours: bool, has_normals: bool, is_sequence: bool) -> Arc<[Attribute]> {

@@ -1,7 +1,6 @@
 //! An open depth map, or a folder of them: pieces are frames.
 
 use super::frame::{Frame, Pixels, changed};
-use super::open::rule;
 use crate::scan::decode::{batch_bytes, batch_points, fitting_batch, point_bytes, resize};
 use crate::scan::quantities::NORMALS;
 use crate::{
@@ -49,8 +48,8 @@ impl Scan for DepthScan {
             return Err(ReadError::unsupported(&self.info.path, fault));
         };
         let with_colours = self.column("rgb").is_some_and(|column| wanted.is_wanted(column));
-        let rule = rule(frame, &self.options);
-        let pixels = frame.pixels(&rule, &self.options.filters, with_colours, &mut scratch.raw)?;
+        let rule = frame.rule(&self.options);
+        let pixels = frame.pixels(&rule, &self.options.filters, with_colours, &mut scratch.decoded)?;
         let batch = fitting_batch(&mut scratch.batch, &self.info.attributes, false);
         let places = self.places(wanted);
         let mut first = piece.first_point;

@@ -15,8 +15,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::camera::Sidecar;
-use super::first_bytes;
-use super::picture::Header;
+use super::picture::{Header, first_bytes};
 use super::trajectory::{MAX_SECONDS, Trajectory, lines, nearest, text};
 use crate::{Advice, ReadError};
 
@@ -122,16 +121,19 @@ impl Sequence {
     }
 }
 
-/// The file with the pose of that frame, where each has one.
-pub(super) fn pose_file(folder: &Path, frame: &Listed) -> Option<PathBuf> {
+/// The file with the pose of that frame, where each has one; if there is none, where it should be.
+pub(super) fn pose_file(folder: &Path, frame: &Listed) -> PathBuf {
     let mut places = POSE_FOLDERS.iter().map(|name| folder.join(name).join(format!("{}.txt", frame.name)));
     let beside = frame.depth.with_file_name(format!("{}{POSE_ENDING}", frame.name));
-    Some(beside).filter(|path| path.is_file()).or_else(|| places.find(|path| path.is_file()))
+    if beside.is_file() { beside } else { places.find(|path| path.is_file()).unwrap_or(beside) }
 }
 
 fn listed(folder: &Path) -> Result<Vec<Listed>, ReadError> {
     let frames = list_of(folder, &folder.join(DEPTH_LIST))?;
-    Ok(frames.into_iter().map(|(time, depth)| Listed { name: name_of(&depth), time: Some(time), depth, colour: None }).collect())
+    Ok(frames
+        .into_iter()
+        .map(|(time, depth)| Listed { name: name_of(&depth), time: Some(time), depth, colour: None })
+        .collect())
 }
 
 /// Times and files.
@@ -139,7 +141,9 @@ fn list_of(folder: &Path, list: &Path) -> Result<Vec<(f64, PathBuf)>, ReadError>
     let text = text(list)?;
     let entry = |line: super::trajectory::Line<'_>| {
         let found = line.text.split_once(char::is_whitespace);
-        let entry = found.and_then(|(time, file)| Some((time.parse().ok().filter(|time: &f64| time.is_finite())?, folder.join(file.trim()))));
+        let entry = found.and_then(|(time, file)| {
+            Some((time.parse().ok().filter(|time: &f64| time.is_finite())?, folder.join(file.trim())))
+        });
         entry.ok_or_else(|| {
             ReadError::broken(list, line.at, "expected a timestamp and a file name").advise(Advice::ExportAgain)
         })

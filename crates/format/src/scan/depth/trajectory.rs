@@ -22,8 +22,8 @@ const UNIT: std::ops::RangeInclusive<f64> = 0.99..=1.01;
 /// Where frames get their poses from.
 #[derive(Debug)]
 pub(super) enum Trajectory {
-    /// By time, in seconds, in order: lines `timestamp tx ty tz qx qy qz qw` (TUM RGB-D).
-    Timed { path: PathBuf, poses: Vec<(f64, Affine)> },
+    /// By time, in seconds, in order, each with the byte of its line: lines `timestamp tx ty tz qx qy qz qw` (TUM RGB-D).
+    Timed { path: PathBuf, poses: Vec<(f64, (u64, Affine))> },
     /// By number: three numbers and a matrix for each frame (Redwood, Open3D).
     Counted { path: PathBuf, poses: Vec<Affine> },
     /// A file with a matrix for each frame.
@@ -42,7 +42,9 @@ pub(super) fn text(path: &Path) -> Result<String, ReadError> {
     let mut bytes = Vec::new();
     File::open(path).map_err(io)?.take(MAX_BYTES).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 == MAX_BYTES {
-        return Err(ReadError::unsupported(path, format!("longer than {MAX_BYTES} bytes")).advise("divide the sequence"));
+        return Err(
+            ReadError::unsupported(path, format!("longer than {MAX_BYTES} bytes")).advise("divide the sequence")
+        );
     }
     String::from_utf8(bytes).map_err(|e| {
         let at = e.utf8_error().valid_up_to() as u64;
@@ -74,11 +76,13 @@ impl Trajectory {
         let mut poses = Vec::new();
         for line in lines(&text) {
             let broken = |what: String| ReadError::broken(path, line.at, what).advise(Advice::ExportAgain);
-            let numbers: Option<[f64; 8]> = numbers(line.text).and_then(|n| n.try_into().ok()).filter(|n: &[f64; 8]| n[0].is_finite());
-            let [time, x, y, z, quaternion @ ..] = numbers
-                .ok_or_else(|| broken("expected the 8 numbers timestamp tx ty tz qx qy qz qw".to_owned()))?;
+            let numbers: Option<[f64; 8]> =
+                numbers(line.text).and_then(|n| n.try_into().ok()).filter(|n: &[f64; 8]| n[0].is_finite());
+            let [time, x, y, z, quaternion @ ..] =
+                numbers.ok_or_else(|| broken("expected the 8 numbers timestamp tx ty tz qx qy qz qw".to_owned()))?;
             let matrix = matrix(quaternion, [x, y, z]).map_err(broken)?;
-            poses.push((time, pose(&matrix).map_err(|what| broken(format!("no pose: {what}")))?));
+            let pose = pose(&matrix).map_err(|what| broken(format!("no pose: {what}")))?;
+            poses.push((time, (line.at, pose)));
         }
         poses.sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok(Self::Timed { path: path.to_path_buf(), poses })
@@ -105,7 +109,7 @@ impl Trajectory {
 /// The pose in a file of 16 numbers.
 pub(super) fn of_file(path: &Path) -> Result<Affine, ReadError> {
     let text = text(path)?;
-    let broken = |what: String| ReadError::broken(path, None, what).advise(Advice::SkipUnreadable);
+    let broken = |what: String| ReadError::broken(path, 0, what).advise(Advice::SkipUnreadable);
     let matrix = numbers(&text).and_then(|n| <[f64; 16]>::try_from(n).ok());
     let matrix = matrix.ok_or_else(|| broken("not the 16 numbers of a pose".to_owned()))?;
     pose(&matrix).map_err(|what| broken(format!("no pose: {what}")))
@@ -177,10 +181,10 @@ mod tests {
         let path = dir.path().join("poses");
         std::fs::write(&path, "# made\n2.5 1 2 3 0 0 0 1\n1.5 4 5 6 0 0 0 1.0001\n").unwrap();
         let Trajectory::Timed { poses, .. } = Trajectory::timed(&path).unwrap() else { panic!() };
-        assert_eq!(poses.iter().map(|(t, map)| (*t, map.translation())).collect::<Vec<_>>(), [
-            (1.5, [4.0, 5.0, 6.0]),
-            (2.5, [1.0, 2.0, 3.0])
-        ]);
+        assert_eq!(
+            poses.iter().map(|(t, (at, map))| (*t, *at, map.translation())).collect::<Vec<_>>(),
+            [(1.5, 25, [4.0, 5.0, 6.0]), (2.5, 7, [1.0, 2.0, 3.0])]
+        );
         std::fs::write(&path, "1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0\n").unwrap();
         assert_eq!(Trajectory::timed(&path).unwrap_err().offset(), Some(16));
         let matrix = "1 0 0 9\n0 1 0 8\n0 0 1 7\n0 0 0 1\n";

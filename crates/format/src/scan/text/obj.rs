@@ -9,8 +9,29 @@ use crate::{Advice, ReadError, Scan};
 
 /// First words of lines, but for `v`.
 const KEYWORDS: [&[u8]; 23] = [
-    b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"mg", b"mtllib", b"usemtl", b"usemap", b"maplib", b"lod",
-    b"bevel", b"c_interp", b"d_interp", b"cstype", b"deg", b"curv", b"surf", b"end",
+    b"vt",
+    b"vn",
+    b"vp",
+    b"f",
+    b"l",
+    b"p",
+    b"o",
+    b"g",
+    b"s",
+    b"mg",
+    b"mtllib",
+    b"usemtl",
+    b"usemap",
+    b"maplib",
+    b"lod",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"cstype",
+    b"deg",
+    b"curv",
+    b"surf",
+    b"end",
 ];
 
 /// The least that says that a text is OBJ: nothing but its keywords, and a vertex, a normal or a texture coordinate among
@@ -89,7 +110,9 @@ mod tests {
 
     #[test]
     fn keywords_and_numbers_make_an_obj() {
-        for obj in ["v 1 2 3\n", "# made\nmtllib a.mtl\no a\n\tv 1 2 3\nvn 0 0 1\nf 1//1 1//1 1//1\n", "vt 0.5 1\nvn 0 0 1\n"] {
+        for obj in
+            ["v 1 2 3\n", "# made\nmtllib a.mtl\no a\n\tv 1 2 3\nvn 0 0 1\nf 1//1 1//1 1//1\n", "vt 0.5 1\nvn 0 0 1\n"]
+        {
             assert!(is_obj(obj.as_bytes()), "{obj}");
         }
         for other in ["v for victory\n", "v 1 2 3\nand more\n", "1 2 3\n", "o\n", "f 1 2 3\n", "v 1 2 3\0\n", ""] {
