@@ -98,9 +98,9 @@ impl Frame {
         memory: &mut Vec<u8>,
     ) -> Result<Pixels, ReadError> {
         self.check()?;
+        let size = self.header()?;
         let picture = DepthPicture::open(&self.depth, rule)?;
-        let size = picture.size();
-        if size != self.size {
+        if [size, picture.size()] != [self.size; 2] {
             return Err(changed(&self.depth));
         }
         let colours = self.colour.as_ref().filter(|_| with_colours).map(|path| colour::read(path, size)).transpose()?;
