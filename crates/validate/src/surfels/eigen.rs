@@ -69,12 +69,7 @@ mod tests {
             [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ];
         let element = |i: usize, j: usize| (0..3).map(|k| r[i][k] * values[k] * r[j][k]).sum::<f64>();
-        let mut m = [[0.0; 3]; 3];
-        for i in 0..3 {
-            for j in 0..=i {
-                (m[i][j], m[j][i]) = (element(i, j), element(i, j));
-            }
-        }
+        let m = [0, 1, 2].map(|i: usize| [0, 1, 2].map(|j| element(i.max(j), i.min(j))));
         (m, [r[0][0], r[1][0], r[2][0]])
     }
 

@@ -9,9 +9,9 @@
 //! over. Differences and their products are summed up as integers, so that no order matters.
 //!
 //! # Tolerances
-//! * Lengths of normals: 10⁻³, of those in 16 bits 0.02. Curvatures: 10⁻⁴, and 10⁻³ of them. Radii: 10⁻⁵ of them.
+//! * Lengths of normals: 10⁻³, of those in 16 bits 0.02. Sides: 10⁻⁶ of the length, of those in 16 bits 0.03. Curvatures: 10⁻⁴, and 10⁻³ of them. Radii: 10⁻⁵ of them.
 //! * Angles: 0.1°, and what a covariance that is off by 10⁻⁶ of its largest eigenvalue λ₂ makes of it: 10⁻⁶ · λ₂ / (λ₁ − λ₀).
-//!   Normals in 16 bits may be off by 0.4° more, and by what two bytes are off.
+//!   Normals in 16 bits may be off by 0.4° more, and by the 1.6° that two bytes are off at most.
 //! * Not judged: normals and curvatures where the last point of a neighbourhood and the first one beyond are equally far, to
 //!   10⁻⁶, and of different places; normals where λ₀ and λ₁ are equal to 10⁻³, or where more than 0.5° would be allowed.
 //!

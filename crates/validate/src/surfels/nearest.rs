@@ -156,7 +156,7 @@ impl Within {
 #[derive(Debug, Clone)]
 pub(super) enum Neighbourhood {
     Nearest(Nearest),
-    Within(Within),
+    Within(Box<Within>),
 }
 
 impl Neighbourhood {

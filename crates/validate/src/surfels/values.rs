@@ -16,8 +16,8 @@ use crate::place::Place;
 /// By how much the length of a normal may differ from 1: of floats, of 16 bits.
 const LENGTH: [f64; 2] = [1e-3, 0.02];
 
-/// By how much a normal may point to the wrong side, for its rounding: of floats, of 16 bits.
-const SIDE: [f64; 2] = [1e-6, 0.02];
+/// By how much a normal may point to the wrong side, for its rounding: of floats, of 16 bits, which turn it by up to 1.6°.
+const SIDE: [f64; 2] = [1e-6, 0.03];
 
 /// The largest variation of a surface is 1/3, and single precision rounds it.
 const MOST_CURVATURE: f64 = 1.0 / 3.0 + 1e-6;
