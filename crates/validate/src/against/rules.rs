@@ -8,7 +8,6 @@ use serde_json::Value;
 
 use super::block::Block;
 use super::follows::Follows;
-use crate::surfels::Derived;
 
 /// Meaning of 16-bit colours of the sources.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,8 +156,7 @@ impl Rules {
     }
 
     /// Compares none of these attributes, which the conversion has computed, with the sources.
-    pub(crate) fn set_apart(&mut self, derived: Option<&Derived>) {
-        let derived = derived.map(Derived::names).unwrap_or_default();
+    pub(crate) fn set_apart(&mut self, derived: Vec<&'static str>) {
         let is_derived = |name: &str| derived.contains(&name);
         for (attribute, conversion) in self.attributes.iter().zip(&mut self.conversions) {
             if is_derived(&attribute.name) {

@@ -92,7 +92,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
     let report = report::find(path, &findings)?;
     let derived = Derived::of(report.as_ref(), &findings);
     let mut rules = records::rules(&header, &description);
-    rules.set_apart(derived.as_ref());
+    rules.set_apart(Derived::names_of(derived.as_ref()));
     let mut against = match options.against.as_slice() {
         [] => None,
         paths => Some(Against::open(paths, &options.open, rules.clone())?),

@@ -72,7 +72,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let report = report::find(folder, &findings)?;
     let derived = Derived::of(report.as_ref(), &findings);
     let mut rules = records::rules(&tree);
-    rules.set_apart(derived.as_ref());
+    rules.set_apart(Derived::names_of(derived.as_ref()));
     let against = match options.against.as_slice() {
         [] => None,
         paths => Some(Against::open(paths, &options.open, rules.clone())?),

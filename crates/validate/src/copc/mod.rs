@@ -197,7 +197,7 @@ fn rules(dataset: &Dataset, own: &Value, derived: Option<&Derived>) -> Rules {
             *conversion = Conversion::FineAngle;
         }
     }
-    rules.set_apart(derived);
+    rules.set_apart(Derived::names_of(derived));
     rules
 }
 

@@ -160,7 +160,7 @@ fn rules(metadata: &Metadata, derived: Option<&Derived>) -> Rules {
     let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
     let mut rules = Rules::new(attributes, metadata.lattice, own);
     rules.has_no_wide_integers = true;
-    rules.set_apart(derived);
+    rules.set_apart(Derived::names_of(derived));
     rules
 }
 

@@ -100,8 +100,12 @@ impl Derived {
         })
     }
 
-    /// Names of the attributes that were computed, whether a dataset has them or not.
-    pub(crate) fn names(&self) -> Vec<&'static str> {
+    /// Names of the attributes that were computed, whether the dataset has them or not.
+    pub(crate) fn names_of(derived: Option<&Self>) -> Vec<&'static str> {
+        derived.map(Self::names).unwrap_or_default()
+    }
+
+    fn names(&self) -> Vec<&'static str> {
         let normals = NORMALS.into_iter().chain([CURVATURE]).filter(|_| self.normals);
         normals.chain([RADIUS].into_iter().filter(|_| self.radius)).collect()
     }
