@@ -4,13 +4,14 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::columns::Columns;
 use super::derived::Extent;
 use super::expected::{Expected, Normal, Plane, angle};
 use super::nearest::{Nearest, Neighbourhood, Within};
 use super::sample::Query;
+use crate::against::Rules;
 use crate::against::block::Block;
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
@@ -37,7 +38,8 @@ pub(super) struct Again {
 
 /// What is compared.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Compared {
+pub(super) struct Compared<'a> {
+    pub(super) rules: &'a Rules,
     pub(super) columns: Columns,
     pub(super) normals: bool,
     pub(super) radii: bool,
@@ -87,7 +89,7 @@ impl Again {
     }
 
     /// Compares, once all points were taken in.
-    pub(super) fn compare(&self, compared: &Compared, findings: &Findings) -> SurfelSummary {
+    pub(super) fn compare(&self, compared: &Compared<'_>, findings: &Findings) -> SurfelSummary {
         let mut summary = SurfelSummary::default();
         for (query, around) in self.queries.iter().zip(&self.around) {
             let found = around.lock().map_or_else(|e| e.into_inner().finish(), |around| around.finish());
@@ -111,7 +113,7 @@ impl Expected {
 struct Judge<'a> {
     query: &'a Query,
     expected: Expected,
-    compared: &'a Compared,
+    compared: &'a Compared<'a>,
     findings: &'a Findings,
 }
 
@@ -131,7 +133,9 @@ impl Judge<'_> {
         }
     }
 
-    fn push(&self, subject: String, expected: serde_json::Value, found: serde_json::Value) {
+    fn push(&self, what: &str, expected: Value, found: Value) {
+        let [x, y, z] = self.compared.rules.world(self.query.position);
+        let subject = format!("{what} at {x} {y} {z}");
         let finding = Finding::new(Check::Surfels, subject, expected, found);
         self.findings.push(finding.at(self.query.place).points(1));
     }
@@ -144,8 +148,8 @@ impl Judge<'_> {
             // 16 bits have no code for it
             Normal::None if self.compared.is_octahedral => {}
             Normal::None if is_zero => summary.normals += 1,
-            Normal::None => self.push("normal".into(), json!([0, 0, 0]), json!(found)),
-            Normal::Line(right, _) if is_zero => self.push("normal, to either side".into(), json!(right), json!(found)),
+            Normal::None => self.push("normal", json!([0, 0, 0]), json!(found)),
+            Normal::Line(right, _) if is_zero => self.push("normal", json!(right), json!(found)),
             Normal::Line(right, allowed) => {
                 let allowed = allowed + if self.compared.is_octahedral { OCTAHEDRAL } else { 0.0 };
                 let angle = angle(right, found);
@@ -153,8 +157,8 @@ impl Judge<'_> {
                 summary.largest_angle = summary.largest_angle.max(angle);
                 // NaN is no angle
                 if angle.is_nan() || angle > allowed {
-                    let subject = format!("normal, to either side, which is {angle:.3} degrees off");
-                    self.push(subject, json!(right), json!(found));
+                    let what = format!("normal, {angle:.3} degrees off,");
+                    self.push(&what, json!(right), json!(found));
                 }
             }
         }
@@ -165,7 +169,7 @@ impl Judge<'_> {
         let off = (found - expected).abs();
         summary.largest_curvature = summary.largest_curvature.max(off);
         if off.is_nan() || off > CURVATURE[0] + CURVATURE[1] * expected {
-            self.push("curvature".into(), json!(expected), json!(found));
+            self.push("curvature", json!(expected), json!(found));
         }
     }
 
@@ -177,7 +181,7 @@ impl Judge<'_> {
         summary.largest_radius = summary.largest_radius.max(relative);
         if !found.is_finite() || off > RADIUS * most {
             let expected = if least == most { json!(most) } else { json!([least, most]) };
-            self.push("radius".into(), expected, json!(found));
+            self.push("radius", expected, json!(found));
         }
     }
 }

@@ -129,7 +129,7 @@ impl Task<'_> {
         Ok(Some(summary))
     }
 
-    fn note_what_was_kept(&self, compared: &Compared, findings: &Findings) {
+    fn note_what_was_kept(&self, compared: &Compared<'_>, findings: &Findings) {
         let normals = (self.derived.normals && !compared.normals).then_some("normals");
         let radii = (self.derived.radius && !compared.radii).then_some("radii");
         let kept: Vec<&str> = normals.into_iter().chain(radii).collect();
@@ -160,9 +160,10 @@ impl Task<'_> {
     }
 
     /// What of a sample can be compared, or why nothing can.
-    fn compared(&self, columns: Columns) -> Result<Compared, String> {
+    fn compared(&self, columns: Columns) -> Result<Compared<'_>, String> {
         let Some(against) = self.against else { return Err("no sources were given".into()) };
         let compared = Compared {
+            rules: self.rules,
             columns,
             normals: self.derived.kept_normals == 0,
             // radii of the scans are kept
