@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pointmill_validate::{Accuracy, DatasetKind, FirstView, LeafQuality, LevelQuality, Outcome};
+use pointmill_validate::{Accuracy, DatasetKind, FirstView, LeafQuality, LevelQuality, Outcome, SurfelSummary};
 
 use super::quantities::{at_most, count, plural, three_digits};
 use crate::printable::printable;
@@ -41,11 +41,28 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
             let _ = writeln!(out, "  not compared, because the dataset does not have them: {}", printable(&names));
         }
     }
+    out.push_str(&outcome.surfels.as_ref().map(surfels).unwrap_or_default());
     out.push_str(&accuracy(&outcome.accuracy));
     out.push_str(&outcome.first_view.as_ref().map(first_view).unwrap_or_default());
     out.push_str(&quality(&outcome.quality, verbose));
     out.push_str(&outcome.leaves.as_ref().map(leaves).unwrap_or_default());
     out + &problems(outcome)
+}
+
+/// How far attributes that the conversion has computed are from those that were computed again.
+fn surfels(surfels: &SurfelSummary) -> String {
+    let SurfelSummary { points, ambiguous, normals, largest_angle, largest_curvature, largest_radius } = surfels;
+    let [angle, curvature, radius] = [largest_angle, largest_curvature, largest_radius].map(|v| at_most(*v));
+    format!(
+        "  {} computed again: {} off by {angle} degrees at most, curvature by {curvature}, radius by {radius} of it; \
+         {} more than one plane fits\n",
+        plural(*points, "point"),
+        plural(*normals, "normal"),
+        match ambiguous {
+            1 => "at 1 of them".to_owned(),
+            n => format!("at {} of them", count(*n)),
+        },
+    )
 }
 
 /// Errors of decoded positions, as far as they were measured.

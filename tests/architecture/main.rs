@@ -92,6 +92,7 @@ const LAYERS: [(&str, Layers<'static>); 9] = [
             &["report"],
             &["options", "accuracy", "outcome"],
             &["against"],
+            &["surfels"],
             &["octree"],
             &["copc", "potree1", "potree2", "bintree", "batches"],
         ],
