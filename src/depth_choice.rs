@@ -25,13 +25,16 @@ pub(crate) fn check(files: &[PathBuf], options: &OpenOptions) -> Result<(), Fail
             "{option}: no input is a depth map, to which alone it applies; leave it out"
         )));
     }
-    if let Some(folder) = depths.into_iter().find(|path| path.is_dir()).filter(|_| options.depth.pose.is_some()) {
-        let folder = folder.display();
-        return Err(Failure::Usage(format!(
+    let folder = depths.iter().find(|path| path.is_dir()).map(|folder| folder.display());
+    match (&options.depth, &folder) {
+        (DepthOptions { pose: Some(_), .. }, Some(folder)) => Err(Failure::Usage(format!(
             "--pose: {folder} has its poses in its trajectory; --transform moves its points"
-        )));
+        ))),
+        (DepthOptions { colours: Some(_), .. }, _) if depths.len() > 1 || folder.is_some() => Err(Failure::Usage(
+            "--depth-colours: a picture has the colours of one depth map; name that one alone".into(),
+        )),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// The first option that was given.
@@ -40,6 +43,7 @@ fn first(depth: &DepthOptions) -> &'static str {
         DepthOptions { intrinsics: Some(_), .. } => "--intrinsics",
         DepthOptions { units_per_metre: Some(_), .. } => "--depth-scale",
         DepthOptions { pose: Some(_), .. } => "--pose",
+        DepthOptions { colours: Some(_), .. } => "--depth-colours",
         DepthOptions { range: Some(_), .. } => "--depth-range",
         DepthOptions { normals: true, .. } => "--depth-normals",
         _ => "--depth-filter",

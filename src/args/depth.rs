@@ -1,6 +1,7 @@
 //! Options of depth maps: their camera, and what becomes of their depths.
 
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use pointmill_format::{DepthFilter, DepthOptions, Intrinsics};
@@ -28,6 +29,10 @@ pub(crate) struct DepthArgs {
     /// --transform [default: from JSON files, else none]
     #[arg(long, value_name = "MATRIX|FILE", allow_hyphen_values = true, help_heading = "Reading depth maps")]
     pub(crate) pose: Option<String>,
+    /// Colours of a single depth map: a PNG or JPEG picture of the same size, registered to it [default: from its JSON file, else
+    /// none]
+    #[arg(long, value_name = "FILE", help_heading = "Reading depth maps")]
+    pub(crate) depth_colours: Option<PathBuf>,
     /// Keeps only depths of this range, in metres: NEAR..FAR
     #[arg(long, value_name = "NEAR..FAR", value_parser = parse_depth_range, help_heading = "Reading depth maps")]
     pub(crate) depth_range: Option<RangeInclusive<f64>>,
@@ -46,11 +51,12 @@ pub(crate) struct Filters(Vec<DepthFilter>);
 
 impl DepthArgs {
     /// Each option, and whether it was given.
-    pub(super) fn given(&self) -> [(&'static str, bool); 6] {
+    pub(super) fn given(&self) -> [(&'static str, bool); 7] {
         [
             ("--intrinsics", self.intrinsics.is_some()),
             ("--depth-scale", self.depth_scale.is_some()),
             ("--pose", self.pose.is_some()),
+            ("--depth-colours", self.depth_colours.is_some()),
             ("--depth-range", self.depth_range.is_some()),
             ("--depth-filter", self.depth_filter.is_some()),
             ("--depth-normals", self.depth_normals),
@@ -63,6 +69,7 @@ impl DepthArgs {
         options.intrinsics = self.intrinsics;
         options.units_per_metre = self.depth_scale;
         options.pose = self.pose.as_ref().map(|pose| matrix("--pose", pose)).transpose()?;
+        options.colours.clone_from(&self.depth_colours);
         options.range.clone_from(&self.depth_range);
         options.filters = self.depth_filter.clone().map(|Filters(filters)| filters).unwrap_or_default();
         options.normals = self.depth_normals;

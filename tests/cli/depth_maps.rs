@@ -121,6 +121,12 @@ fn options_that_no_input_can_follow_are_usage_errors() {
     let pose = ["--pose", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"];
     dir.run([&with(&["convert", "tum", "-o", "out"])[..], &pose].concat())
         .failed_with(2, &["--pose: tum has its poses in its trajectory; --transform moves its points"]);
+    let colours = ["--depth-colours", "single_colour.png"];
+    for inputs in [&["tum"][..], &["single.png", "a.png"]] {
+        dir.write("a.png", &fixture_bytes("depth/single.png"));
+        dir.run([&with(&["convert", "-o", "out"])[..], inputs, &colours].concat())
+            .failed_with(2, &["--depth-colours: a picture has the colours of one depth map"]);
+    }
     dir.run(["validate", "out", "--depth-normals"]).failed_with(2, &["--depth-normals requires --against"]);
     for (option, value) in [
         ("--intrinsics", "1,2,3"),

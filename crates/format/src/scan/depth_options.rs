@@ -1,6 +1,7 @@
 //! What depth maps do not say of themselves, and what becomes of their depths.
 
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 use crate::Affine;
 
@@ -26,6 +27,9 @@ pub struct DepthOptions {
     /// From the axes of the camera (x right, y down, z forward) to the world, in place of what stands beside a single depth
     /// map. Where a trajectory has the poses, this is refused.
     pub pose: Option<Affine>,
+    /// The colour picture of a single depth map, registered to it, in place of what stands beside it. Refused for a folder with
+    /// a trajectory.
+    pub colours: Option<PathBuf>,
     /// Depths outside of this range, in metres, are no measurements; tested before the filters.
     pub range: Option<RangeInclusive<f64>>,
     /// Filters of the depths, in this order.

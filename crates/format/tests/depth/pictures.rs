@@ -38,6 +38,11 @@ fn png_colours_of_every_kind_become_16_bits() {
     assert_eq!(colours(dir.path(), "c.png"), expected);
     write_png(&at, SIZE, ColorType::Grayscale, BitDepth::Eight, &[1, 2, 3, 4, 5, 6]);
     assert_eq!(colours(dir.path(), "c.png"), [1, 2, 4, 6].map(|v| [v * 257; 3]));
+    let path = write_depth(dir.path(), "b", SIZE, &DEPTHS, "");
+    let mut options = DepthOptions::default();
+    options.colours = Some(at.clone());
+    let named = cloud(&path, options);
+    assert_eq!(named.column("rgb").values::<u16>().unwrap()[..4], [257, 257, 257, 514], "named in options");
     let wide: Vec<u8> = (0..24u16).flat_map(|i| (i * 1000).to_be_bytes()).collect();
     write_png(&at, SIZE, ColorType::Rgba, BitDepth::Sixteen, &wide);
     let expected = [0, 4, 12, 20].map(|first| [first, first + 1, first + 2].map(|v| v * 1000));

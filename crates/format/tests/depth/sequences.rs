@@ -134,13 +134,46 @@ fn what_is_wrong_with_all_frames_is_said_when_the_folder_is_opened() {
     assert!(refused(dir.path(), options).contains("the intrinsics are those of 640 × 480"));
     let mut posed = tum_options();
     posed.pose = Some(pointmill_format::Affine::IDENTITY);
-    assert!(refused(dir.path(), posed).contains("has its poses in its trajectory"));
+    assert!(refused(dir.path(), posed).contains("has its own poses and colours"));
     fs::write(dir.path().join("groundtruth.txt"), "1 2 3\n").unwrap();
     assert!(
         refused(dir.path(), tum_options()).contains("expected the 8 numbers timestamp tx ty tz qx qy qz qw (byte 0)")
     );
     fs::write(dir.path().join("groundtruth.txt"), "# none\n").unwrap();
     assert!(refused(dir.path(), tum_options()).contains("no pose for 1305031102.160407: there are none in it"));
+}
+
+#[test]
+fn a_frame_of_a_hostile_size_promises_no_more_than_its_camera() {
+    let dir = copy_of("tum");
+    let path = dir.path().join("depth/1305031102.194330.png");
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[16..24].fill(0xff);
+    fs::write(&path, bytes).unwrap();
+    let mut options = tum_options();
+    for (size, points) in [(Some([32, 24]), 768), (None, 1)] {
+        options.intrinsics = options.intrinsics.map(|camera| pointmill_format::Intrinsics { size, ..camera });
+        let scan = open(dir.path(), options.clone()).unwrap();
+        assert_eq!(scan.info().parts[1].points, points);
+        assert!(scan.decode_bytes(&pointmill_format::Wanted::all(scan.info())) < 4 << 20);
+    }
+    options.intrinsics =
+        options.intrinsics.map(|camera| pointmill_format::Intrinsics { size: Some([u32::MAX; 2]), ..camera });
+    assert!(refused(dir.path(), options).contains("the intrinsics are those of 4294967295 × 4294967295"));
+    fs::remove_file(&path).unwrap();
+    let scan = open(dir.path(), tum_options()).unwrap();
+    assert_eq!(scan.info().parts[1].points, 32 * 24, "as many as its camera has pixels");
+}
+
+#[test]
+fn options_that_make_no_sense_are_refused_by_the_library_too() {
+    let path = pointmill_testkit::files::fixture("depth/single.png");
+    let mut options = DepthOptions::default();
+    options.filters = vec![pointmill_format::DepthFilter::Median { window: 4 }];
+    assert!(refused(&path, options.clone()).contains("no odd window of 3 to 31 pixels"));
+    options.filters.clear();
+    options.units_per_metre = Some(0.0);
+    assert!(refused(&path, options).contains("it counts units in a metre, 10 to 1000000"));
 }
 
 #[test]

@@ -126,7 +126,8 @@ impl Camera {
         }
         let missing = |what: &str| ReadError::broken(path, None, what).advise(Advice::NameCamera);
         let intrinsics = intrinsics.ok_or_else(|| missing("nothing says the intrinsics of the camera"))?;
-        let units_per_metre = scale.ok_or_else(|| missing("nothing says the scale of the depths"))?;
+        let scale = scale.ok_or_else(|| missing("nothing says the scale of the depths"))?;
+        let units_per_metre = check_scale(scale).map_err(|what| missing(&what))?;
         if !intrinsics.is_sound() {
             return Err(missing("the focal lengths of the camera are no lengths above 0, or a number is not finite"));
         }
@@ -135,9 +136,9 @@ impl Camera {
 }
 
 /// `Err` says why that scale is none.
-fn check_scale(units_per_metre: f64) -> Result<(), String> {
+fn check_scale(units_per_metre: f64) -> Result<f64, String> {
     if UNITS_PER_METRE.contains(&units_per_metre) {
-        return Ok(());
+        return Ok(units_per_metre);
     }
     let (least, most) = (UNITS_PER_METRE.start(), UNITS_PER_METRE.end());
     Err(format!("depth_scale is {units_per_metre}; it counts units in a metre, {least} to {most}"))

@@ -18,6 +18,7 @@
 //! RealSense, "Projection in RealSense SDK 2.0"; Open3D, "Redwood .log"; B. Glocker et al., "7-Scenes", 2013; A. Dai et
 //! al., "ScanNet", 2017; C. Tomasi, R. Manduchi, "Bilateral Filtering for Gray and Color Images", 1998.
 
+mod assemble;
 mod camera;
 mod colour;
 mod filter;
