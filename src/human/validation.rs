@@ -51,17 +51,13 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
 
 /// How far attributes that the conversion has computed are from those that were computed again.
 fn surfels(surfels: &SurfelSummary) -> String {
-    let SurfelSummary { points, ambiguous, normals, largest_angle, largest_curvature, largest_radius } = surfels;
+    let SurfelSummary { largest_angle, largest_curvature, largest_radius, .. } = surfels;
     let [angle, curvature, radius] = [largest_angle, largest_curvature, largest_radius].map(|v| at_most(*v));
     format!(
-        "  {} computed again: {} off by {angle} degrees at most, curvature by {curvature}, radius by {radius} of it; \
-         {} more than one plane fits\n",
-        plural(*points, "point"),
-        plural(*normals, "normal"),
-        match ambiguous {
-            1 => "at 1 of them".to_owned(),
-            n => format!("at {} of them", count(*n)),
-        },
+        "  {} computed again, {} of them with more than one plane that fits: normals off by at most {angle} degrees, \
+         curvatures by {curvature}, radii by {radius} of them\n",
+        plural(surfels.points, "point"),
+        count(surfels.ambiguous),
     )
 }
 

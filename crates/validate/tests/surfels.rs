@@ -7,8 +7,8 @@ use std::sync::OnceLock;
 use pointmill_format::potree2::Encoding;
 use pointmill_validate::{Check, Options, Outcome, Severity, validate};
 use serde_json::{Value, json};
-use support::surfels::{Surfel, assert_faults, assert_right, report, settings, turned};
-use support::{Cloud, FLAT, Files, Point, Sampler, las, surfel_scene};
+use support::surfels::{Surfel, assert_faults, assert_right, report, right_within, settings, turned};
+use support::{Cloud, FLAT, Files, Point, SCALE, Sampler, las, surfel_scene};
 
 fn good() -> Cloud {
     static GOOD: OnceLock<Cloud> = OnceLock::new();
@@ -273,8 +273,17 @@ fn a_neighbourhood_by_distance_has_other_radii() {
     let mut within = settings();
     within["neighbours"] = Value::Null;
     within["neighbour_radius"] = json!(2.0);
-    let report = report("potree2", &within, [FLAT; 2], &json!([]));
-    let outcome = checked(&good().encode(Encoding::Default), &report, true);
+    let reported = |settings: &Value, zeros: [u64; 2]| report("potree2", settings, zeros, &json!([]));
+    let outcome = checked(&good().encode(Encoding::Default), &reported(&within, [FLAT; 2]), true);
     assert!(!outcome.check(Check::Surfels).unwrap().ok, "made by the 16 nearest");
     assert!(outcome.surfels.unwrap().points == 1000);
+    let mut cloud = good();
+    let steps: Vec<[i64; 3]> = cloud.points().map(|p| p.position.map(i64::from)).collect();
+    let right = right_within(&steps, [SCALE; 3], 2.0);
+    cloud.nodes.values_mut().flatten().zip(&right).for_each(|(p, surfel)| p.surfel = Some(*surfel));
+    let zeros = |is_zero: fn(&Surfel) -> bool| right.iter().filter(|s| is_zero(s)).count() as u64;
+    let zeros = [zeros(|s| s[..3] == [0.0; 3]), zeros(|s| s[4] == 0.0)];
+    assert!(zeros[1] > FLAT && zeros[0] > zeros[1], "some are alone, some have one neighbour: {zeros:?}");
+    let outcome = checked(&cloud.encode(Encoding::Default), &reported(&within, zeros), true);
+    assert_right(&outcome, 0.001);
 }
