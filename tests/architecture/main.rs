@@ -25,7 +25,7 @@ const LAYERS: [(&str, Layers<'static>); 9] = [
             &["flags", "printable"],
             &["exit", "datasets"],
             &["args", "allocator", "crs_choice", "interrupt", "profiles"],
-            &["human", "scan_choice", "text_choice"],
+            &["depth_choice", "human", "scan_choice", "text_choice"],
             &["inputs"],
             &["commands"],
         ],
