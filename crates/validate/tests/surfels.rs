@@ -110,7 +110,7 @@ fn lengths_of_normals_that_scans_had_are_warned_of() {
     let warnings: Vec<_> = outcome.problems.iter().filter(|p| p.check == Check::Normals).collect();
     assert!(matches!(warnings[..], [w] if w.severity == Severity::Warning), "{warnings:?}");
     let summary = outcome.surfels.unwrap();
-    assert!(summary.normals == 0 && summary.largest_curvature < 1e-6, "{summary:?}");
+    assert!(summary.normals == 0 && summary.largest_curvature.unwrap() < 1e-6, "{summary:?}");
     // the same report of normals that were not kept
     let replaced = kept.replace("\"keep\"", "\"replace\"");
     assert_faults(&checked(&files, &replaced, false), &[(Check::Normals, 1)]);
@@ -254,13 +254,17 @@ fn normals_curvatures_and_radii_that_are_not_those_of_the_points_around() {
     };
     let outcome = compared(&|s| turned(s, 1.0));
     assert!(found(&outcome) * 10 > judged * 9, "{} of {judged}", found(&outcome));
-    assert!((outcome.surfels.unwrap().largest_angle - 1.0).abs() < 0.01, "{:?}", outcome.surfels);
+    assert!((outcome.surfels.unwrap().largest_angle.unwrap() - 1.0).abs() < 0.01, "{:?}", outcome.surfels);
     assert!(outcome.problems.iter().any(|p| p.check == Check::Surfels && p.subject.contains("degrees off")));
     assert_faults(&compared(&|s| turned(s, 0.05)), &[]);
     let outcome = compared(&|[x, y, z, c, r]| [x, y, z, c, r * 1.01]);
-    assert!(found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_radius - 0.01).abs() < 1e-4);
+    assert!(
+        found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_radius.unwrap() - 0.01).abs() < 1e-4
+    );
     let outcome = compared(&|[x, y, z, c, r]| [x, y, z, c + 0.001, r]);
-    assert!(found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_curvature - 0.001).abs() < 1e-5);
+    assert!(
+        found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_curvature.unwrap() - 0.001).abs() < 1e-5
+    );
     // another number of neighbours than the report says
     let mut other = settings();
     other["neighbours"] = json!(15);

@@ -175,7 +175,7 @@ impl Judge<'_> {
                 let allowed = allowed + if self.compared.is_octahedral { OCTAHEDRAL } else { 0.0 };
                 let angle = angle(right, found);
                 summary.normals += 1;
-                summary.largest_angle = summary.largest_angle.max(angle);
+                widen(&mut summary.largest_angle, angle);
                 // NaN is no angle
                 if angle.is_nan() || angle > allowed {
                     let what = format!("normal, {angle:.3} degrees off,");
@@ -188,7 +188,7 @@ impl Judge<'_> {
     fn curvature(&self, expected: f64, summary: &mut SurfelSummary) {
         let found = self.query.surfel().curvature;
         let off = (found - expected).abs();
-        summary.largest_curvature = summary.largest_curvature.max(off);
+        widen(&mut summary.largest_curvature, off);
         if off.is_nan() || off > CURVATURE[0] + CURVATURE[1] * expected {
             self.push("curvature", json!(expected), json!(found));
         }
@@ -199,12 +199,17 @@ impl Judge<'_> {
         let [least, most] = self.expected.radius;
         let off = (least - found).max(found - most).max(0.0);
         let relative = if off > 0.0 { off / most.max(f64::MIN_POSITIVE) } else { 0.0 };
-        summary.largest_radius = summary.largest_radius.max(relative);
+        widen(&mut summary.largest_radius, relative);
         if !found.is_finite() || off > RADIUS * most {
             let expected = if least == most { json!(most) } else { json!([least, most]) };
             self.push("radius", expected, json!(found));
         }
     }
+}
+
+/// NaN, which is a fault of its own, widens nothing.
+fn widen(largest: &mut Option<f64>, found: f64) {
+    *largest = Some(largest.unwrap_or(0.0).max(found));
 }
 
 fn difference(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {

@@ -137,6 +137,6 @@ pub fn assert_right(outcome: &Outcome, most_degrees: f64) {
     }
     let summary = outcome.surfels.unwrap();
     assert!(summary.points >= 500 && summary.ambiguous < summary.points / 4, "{summary:?}");
-    assert!(summary.largest_angle <= most_degrees && summary.normals > summary.points / 2, "{summary:?}");
-    assert!(summary.largest_curvature < 1e-6 && summary.largest_radius < 1e-6, "{summary:?}");
+    assert!(summary.largest_angle.unwrap() <= most_degrees && summary.normals > summary.points / 2, "{summary:?}");
+    assert!(summary.largest_curvature.unwrap() < 1e-6 && summary.largest_radius.unwrap() < 1e-6, "{summary:?}");
 }
