@@ -51,18 +51,16 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
 
 /// How far attributes that the conversion has computed are from those that were computed again.
 fn surfels(surfels: &SurfelSummary) -> String {
-    let SurfelSummary { points, ambiguous, normals, largest_angle, largest_curvature, largest_radius } = surfels;
-    let [angle, curvature, radius] = [largest_angle, largest_curvature, largest_radius].map(|v| at_most(*v));
-    format!(
-        "  {} computed again: {} off by {angle} degrees at most, curvature by {curvature}, radius by {radius} of it; \
-         {} more than one plane fits\n",
-        plural(*points, "point"),
-        plural(*normals, "normal"),
-        match ambiguous {
-            1 => "at 1 of them".to_owned(),
-            n => format!("at {} of them", count(*n)),
-        },
-    )
+    let largest = [
+        ("normals", surfels.largest_angle, " degrees"),
+        ("curvatures", surfels.largest_curvature, ""),
+        ("radii", surfels.largest_radius, " of them"),
+    ];
+    let largest = largest.into_iter().filter_map(|(what, off, unit)| Some((what, at_most(off?), unit)));
+    let largest: Vec<String> = largest.map(|(what, off, unit)| format!("{what} off by {off}{unit}")).collect();
+    let (points, ambiguous) = (plural(surfels.points, "point"), count(surfels.ambiguous));
+    let found = if largest.is_empty() { "nothing to compare".into() } else { largest.join(", ") + " at most" };
+    format!("  {points} computed again, {ambiguous} of them with more than one plane that fits: {found}\n")
 }
 
 /// Errors of decoded positions, as far as they were measured.

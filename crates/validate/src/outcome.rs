@@ -95,12 +95,12 @@ pub struct SurfelSummary {
     pub ambiguous: u64,
     /// Normals that were compared.
     pub normals: u64,
-    /// The largest angle between one and the right one, as lines, degrees.
-    pub largest_angle: f64,
+    /// The largest angle between one and the right one, as lines, degrees; here and below `None`: none was compared.
+    pub largest_angle: Option<f64>,
     /// The largest difference of curvatures.
-    pub largest_curvature: f64,
+    pub largest_curvature: Option<f64>,
     /// The largest difference of radii, relative to the right ones.
-    pub largest_radius: f64,
+    pub largest_radius: Option<f64>,
 }
 
 /// Quality of one level of the octree. Distances are relative to the spacing of the level.

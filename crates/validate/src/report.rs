@@ -24,27 +24,23 @@ const MAX_BYTES: u64 = 1 << 30;
 struct Report {
     /// Not there in reports of other programs.
     outputs: Option<Vec<Reported>>,
+    /// What was asked of the conversion, under either name.
     #[serde(default)]
-    settings: Settings,
+    settings: Value,
     #[serde(default)]
-    options: Settings,
-    derived: Option<Value>,
-}
-
-/// What was asked of the conversion.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Settings {
-    derive: Option<Value>,
+    options: Value,
+    #[serde(default)]
+    derived: Value,
 }
 
 impl Report {
     /// What it states of datasets; `None` if it is that of another program.
     fn outputs(self) -> Option<Vec<Reported>> {
         let mut outputs = self.outputs?;
-        if let Some(settings) = self.settings.derive.or(self.options.derive) {
-            let derived = Derive { settings, counts: self.derived.unwrap_or_default() };
-            outputs.iter_mut().for_each(|output| output.derive = Some(derived.clone()));
+        let mut settings = [&self.settings, &self.options].map(|asked| &asked["derive"]).into_iter();
+        if let Some(settings) = settings.find(|settings| !settings.is_null()) {
+            let derive = Derive { settings: settings.clone(), counts: self.derived };
+            outputs.iter_mut().for_each(|output| output.derive = Some(derive.clone()));
         }
         Some(outputs)
     }
@@ -307,6 +303,22 @@ mod tests {
         assert_eq!(found(batches, (7, 1), DatasetKind::Batches), (vec![], true));
         assert_eq!(found(batches, (7, 2), DatasetKind::Batches).0, ["batches in the report"]);
         assert_eq!(found(r#"{"pages": 3}"#, (7, 1), DatasetKind::Batches), (vec![], false), "of another program");
+        assert_eq!(found(r#"{"options": [3], "derived": ""}"#, (7, 1), DatasetKind::Batches), (vec![], false));
+    }
+
+    #[test]
+    fn what_was_computed_is_found_under_either_name_and_beside_every_output() {
+        let of = |asked: &str| {
+            let text = format!(
+                r#"{{"outputs": [{{"format": "copc", "folder": "", "attributes_dropped": [{{"name": "a", "why": "b"}}]}}],
+                    "{asked}": {{"derive": {{"radius": true}}}}, "derived": {{"without_radius": 3}}}}"#
+            );
+            let report: Report = serde_json::from_str(&text).unwrap();
+            let outputs = report.outputs().unwrap();
+            outputs[0].derive.as_ref().map(|d| (d.settings["radius"] == true, d.counts["without_radius"].as_u64()))
+        };
+        assert_eq!(["settings", "options"].map(of), [Some((true, Some(3))); 2]);
+        assert_eq!(of("others"), None);
     }
 
     #[test]

@@ -7,8 +7,8 @@ use std::sync::OnceLock;
 use pointmill_format::potree2::Encoding;
 use pointmill_validate::{Check, Options, Outcome, Severity, validate};
 use serde_json::{Value, json};
-use support::surfels::{Surfel, assert_faults, assert_right, report, settings, turned};
-use support::{Cloud, FLAT, Files, Point, Sampler, las, surfel_scene};
+use support::surfels::{Surfel, assert_faults, assert_right, report, right_within, settings, turned};
+use support::{Cloud, FLAT, Files, Point, SCALE, Sampler, las, surfel_scene};
 
 fn good() -> Cloud {
     static GOOD: OnceLock<Cloud> = OnceLock::new();
@@ -110,7 +110,7 @@ fn lengths_of_normals_that_scans_had_are_warned_of() {
     let warnings: Vec<_> = outcome.problems.iter().filter(|p| p.check == Check::Normals).collect();
     assert!(matches!(warnings[..], [w] if w.severity == Severity::Warning), "{warnings:?}");
     let summary = outcome.surfels.unwrap();
-    assert!(summary.normals == 0 && summary.largest_curvature < 1e-6, "{summary:?}");
+    assert!(summary.normals == 0 && summary.largest_curvature.unwrap() < 1e-6, "{summary:?}");
     // the same report of normals that were not kept
     let replaced = kept.replace("\"keep\"", "\"replace\"");
     assert_faults(&checked(&files, &replaced, false), &[(Check::Normals, 1)]);
@@ -254,13 +254,17 @@ fn normals_curvatures_and_radii_that_are_not_those_of_the_points_around() {
     };
     let outcome = compared(&|s| turned(s, 1.0));
     assert!(found(&outcome) * 10 > judged * 9, "{} of {judged}", found(&outcome));
-    assert!((outcome.surfels.unwrap().largest_angle - 1.0).abs() < 0.01, "{:?}", outcome.surfels);
+    assert!((outcome.surfels.unwrap().largest_angle.unwrap() - 1.0).abs() < 0.01, "{:?}", outcome.surfels);
     assert!(outcome.problems.iter().any(|p| p.check == Check::Surfels && p.subject.contains("degrees off")));
     assert_faults(&compared(&|s| turned(s, 0.05)), &[]);
     let outcome = compared(&|[x, y, z, c, r]| [x, y, z, c, r * 1.01]);
-    assert!(found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_radius - 0.01).abs() < 1e-4);
+    assert!(
+        found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_radius.unwrap() - 0.01).abs() < 1e-4
+    );
     let outcome = compared(&|[x, y, z, c, r]| [x, y, z, c + 0.001, r]);
-    assert!(found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_curvature - 0.001).abs() < 1e-5);
+    assert!(
+        found(&outcome) * 10 > judged * 9 && (outcome.surfels.unwrap().largest_curvature.unwrap() - 0.001).abs() < 1e-5
+    );
     // another number of neighbours than the report says
     let mut other = settings();
     other["neighbours"] = json!(15);
@@ -273,8 +277,17 @@ fn a_neighbourhood_by_distance_has_other_radii() {
     let mut within = settings();
     within["neighbours"] = Value::Null;
     within["neighbour_radius"] = json!(2.0);
-    let report = report("potree2", &within, [FLAT; 2], &json!([]));
-    let outcome = checked(&good().encode(Encoding::Default), &report, true);
+    let reported = |settings: &Value, zeros: [u64; 2]| report("potree2", settings, zeros, &json!([]));
+    let outcome = checked(&good().encode(Encoding::Default), &reported(&within, [FLAT; 2]), true);
     assert!(!outcome.check(Check::Surfels).unwrap().ok, "made by the 16 nearest");
     assert!(outcome.surfels.unwrap().points == 1000);
+    let mut cloud = good();
+    let steps: Vec<[i64; 3]> = cloud.points().map(|p| p.position.map(i64::from)).collect();
+    let right = right_within(&steps, [SCALE; 3], 2.0);
+    cloud.nodes.values_mut().flatten().zip(&right).for_each(|(p, surfel)| p.surfel = Some(*surfel));
+    let zeros = |is_zero: fn(&Surfel) -> bool| right.iter().filter(|s| is_zero(s)).count() as u64;
+    let zeros = [zeros(|s| s[..3] == [0.0; 3]), zeros(|s| s[4] == 0.0)];
+    assert!(zeros[1] > FLAT && zeros[0] > zeros[1], "some are alone, some have one neighbour: {zeros:?}");
+    let outcome = checked(&cloud.encode(Encoding::Default), &reported(&within, zeros), true);
+    assert_right(&outcome, 0.001);
 }

@@ -24,6 +24,9 @@ const OCTAHEDRAL: f64 = 0.4 + 1.6;
 /// What curvatures may be off: absolute, and relative.
 const CURVATURE: [f64; 2] = [1e-4, 1e-3];
 
+/// Neighbours of all queries together, about, where a distance says which they are: a minute or so.
+const MOST_NEIGHBOURS: f64 = 4e9;
+
 /// What radii may be off, relative.
 const RADIUS: f64 = 1e-5;
 
@@ -47,9 +50,27 @@ pub(super) struct Compared<'a> {
 }
 
 impl Again {
-    /// `scouts`: positions of some points, each once. That the neighbours of a query are no farther than those among them
-    /// spares most distances.
-    pub(super) fn new(queries: Vec<Query>, scouts: &[[i64; 3]], extent: Extent, scale: [f64; 3]) -> Self {
+    /// `scouts`: positions of some of the `points` of the dataset, each once. That the neighbours of a query are no farther than
+    /// those among them spares most distances; of neighbourhoods that have very many of them, fewer are looked at.
+    pub(super) fn new(
+        mut queries: Vec<Query>,
+        (scouts, points): (&[[i64; 3]], u64),
+        extent: Extent,
+        scale: [f64; 3],
+    ) -> Self {
+        if let Extent::Within(radius) = extent {
+            let is_near = |scout: &&[i64; 3], query: &Query| {
+                squared(difference(**scout, query.position), scale) <= radius * radius
+            };
+            let points_each = points as f64 / scouts.len().max(1) as f64;
+            let mut work = 0.0;
+            let mut fits = |query: &Query| {
+                work += points_each * scouts.iter().filter(|scout| is_near(scout, query)).count() as f64;
+                work <= MOST_NEIGHBOURS
+            };
+            let most = queries.iter().position(|query| !fits(query)).unwrap_or(queries.len());
+            queries.truncate(most.max(1));
+        }
         let around = |query: &Query| match extent {
             Extent::Within(radius) => Neighbourhood::Within(Box::new(Within::new(radius))),
             Extent::Nearest(count) => {
@@ -154,7 +175,7 @@ impl Judge<'_> {
                 let allowed = allowed + if self.compared.is_octahedral { OCTAHEDRAL } else { 0.0 };
                 let angle = angle(right, found);
                 summary.normals += 1;
-                summary.largest_angle = summary.largest_angle.max(angle);
+                widen(&mut summary.largest_angle, angle);
                 // NaN is no angle
                 if angle.is_nan() || angle > allowed {
                     let what = format!("normal, {angle:.3} degrees off,");
@@ -167,7 +188,7 @@ impl Judge<'_> {
     fn curvature(&self, expected: f64, summary: &mut SurfelSummary) {
         let found = self.query.surfel().curvature;
         let off = (found - expected).abs();
-        summary.largest_curvature = summary.largest_curvature.max(off);
+        widen(&mut summary.largest_curvature, off);
         if off.is_nan() || off > CURVATURE[0] + CURVATURE[1] * expected {
             self.push("curvature", json!(expected), json!(found));
         }
@@ -178,12 +199,17 @@ impl Judge<'_> {
         let [least, most] = self.expected.radius;
         let off = (least - found).max(found - most).max(0.0);
         let relative = if off > 0.0 { off / most.max(f64::MIN_POSITIVE) } else { 0.0 };
-        summary.largest_radius = summary.largest_radius.max(relative);
+        widen(&mut summary.largest_radius, relative);
         if !found.is_finite() || off > RADIUS * most {
             let expected = if least == most { json!(most) } else { json!([least, most]) };
             self.push("radius", expected, json!(found));
         }
     }
+}
+
+/// NaN, which is a fault of its own, widens nothing.
+fn widen(largest: &mut Option<f64>, found: f64) {
+    *largest = Some(largest.unwrap_or(0.0).max(found));
 }
 
 fn difference(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
@@ -234,12 +260,14 @@ mod tests {
             let surfel = super::super::columns::Surfel { normal: [0.0, 0.0, 1.0], curvature: 0.0, radius: 0.0 };
             Query::new(position, surfel, crate::place::Place::Batch(0))
         };
-        let again = Again::new(vec![at([0; 3]), at([1000, 0, 0])], &[], Extent::Within(5.0), [0.5; 3]);
+        let again = Again::new(vec![at([0; 3]), at([1000, 0, 0])], (&[], 0), Extent::Within(5.0), [0.5; 3]);
         let mut block = Block::default();
         for p in [[3, 4, 8], [4, 3, 3], [20, 1, 1]] {
             block.positions.iter_mut().zip(p).for_each(|(values, v)| values.push(v));
         }
         again.look(&block);
+        let many = Again::new(vec![at([0; 3]); 9], (&[[1, 1, 1], [90, 0, 0]], 1 << 31), Extent::Within(5.0), [0.5; 3]);
+        assert_eq!(many.queries.len(), 3, "a half of all points around each");
         let points = again.around.into_iter().map(|around| around.into_inner().unwrap().finish().points);
         assert_eq!(points.collect::<Vec<_>>(), [[2, 2], [0, 0]]);
     }

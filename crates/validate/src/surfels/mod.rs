@@ -17,7 +17,7 @@
 //!
 //! # Memory
 //! For each point of the sample its neighbourhood, at most 96 bytes a neighbour (of large neighbourhoods fewer points are looked
-//! at: a quarter of what is left), 8 MiB to choose the sample, and for each thread a block of records.
+//! at: a quarter of what is left; nor are there more than 4 · 10⁹ neighbours in all where a distance is given), 8 MiB to choose the sample, and for each thread a block of records.
 
 mod again;
 mod columns;
@@ -118,7 +118,7 @@ impl Task<'_> {
             (None, Ok(_)) => return Ok(None),
         };
         let (queries, scouts) = sample.finish();
-        let again = Again::new(queries, &scouts, self.derived.extent, self.rules.lattice.scale);
+        let again = Again::new(queries, (&scouts, self.points), self.derived.extent, self.rules.lattice.scale);
         drop(scouts);
         self.pass(context, |block, _| {
             again.look(block);

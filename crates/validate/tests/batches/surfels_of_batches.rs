@@ -25,6 +25,24 @@ fn checked(cloud: &Cloud, change: impl Fn(Surfel) -> Surfel) -> Outcome {
 }
 
 #[test]
+fn radii_that_scans_may_have_had_are_not_judged() {
+    let cloud = cloud();
+    let mut text = String::from("x,y,z,red,green,blue,intensity,classification,radius\n");
+    for p in &cloud.points {
+        let ([x, y, z], [r, g, b]) = (cloud.world(p), p.rgb);
+        text += &format!("{x},{y},{z},{r},{g},{b},{},{},7\n", p.intensity, p.class);
+    }
+    let mut parts = cloud.parts();
+    parts.surfels.iter_mut().for_each(|s| s[4] = 7.0);
+    let report = report("batches", &settings(), [0, 0], &json!([]));
+    let outcome = check_reported(&parts.bytes().0, &[("scan.csv", text.into_bytes())], Some(&report));
+    let surfels = outcome.check(Check::Surfels).unwrap();
+    assert!(surfels.ok && surfels.skipped.as_ref().is_some_and(|why| why.contains("without radii")), "{surfels}");
+    assert!(outcome.check(Check::Radii).unwrap().ok && outcome.surfels.unwrap().normals > 700);
+    assert!(outcome.against.unwrap().attributes_not_in_dataset.is_empty());
+}
+
+#[test]
 fn right_attributes_are_found_right_and_others_are_not() {
     let cloud = cloud();
     assert_right(&checked(&cloud, |s| s), 0.001);
