@@ -110,6 +110,9 @@ pub(crate) fn read_error_line(error: &ReadError) -> String {
             "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
         }
         Some(ReadAdvice::MoreMemory) => "pass a larger --memory".to_owned(),
+        Some(ReadAdvice::NameCamera) => {
+            "describe the camera in a JSON file beside it, or with --intrinsics and --depth-scale".to_owned()
+        }
         Some(ReadAdvice::NameCrs) => "name its coordinate reference system with --crs".to_owned(),
         Some(ReadAdvice::OtherCrs) => {
             "choose a system for --reproject on the same datum and with the same heights, or reproject the scan elsewhere"

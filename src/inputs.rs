@@ -20,7 +20,7 @@ use pointmill_format::OpenOptions;
 
 use crate::args::InputArgs;
 use crate::exit::Failure;
-use crate::{scan_choice, text_choice};
+use crate::{depth_choice, scan_choice, text_choice};
 use search::Search;
 
 pub(crate) use found::Inputs;
@@ -54,6 +54,7 @@ impl InputArgs {
         let found = expand(typed, &options, Some(output))?;
         scan_choice::check(&found.files, &options)?;
         text_choice::check(&found.files, &options)?;
+        depth_choice::check(&found.files, &options)?;
         Ok(found)
     }
 }

@@ -13,6 +13,7 @@ mod args;
 mod commands;
 mod crs_choice;
 mod datasets;
+mod depth_choice;
 mod exit;
 mod flags;
 mod human;

@@ -18,7 +18,8 @@ pub(crate) fn check(files: &[PathBuf], options: &OpenOptions) -> Result<(), Fail
     let mut everything = options.clone();
     everything.scans = None;
     for file in files {
-        if !matches!(ScanKind::of_file(file), Ok(Some(ScanKind::E57 | ScanKind::Text(TextKind::Ptx)))) {
+        if !matches!(ScanKind::of_file(file), Ok(Some(ScanKind::E57 | ScanKind::Text(TextKind::Ptx) | ScanKind::Depth)))
+        {
             continue;
         }
         match open_scan(file, &everything) {
@@ -47,7 +48,7 @@ fn described(number: usize, name: &str) -> String {
 
 fn there_are(known: &[String]) -> String {
     match known.len() {
-        0 => "no input has scans within it; E57 and PTX files do".to_owned(),
+        0 => "no input has scans within it; E57 and PTX files do, and folders of depth maps".to_owned(),
         n if n > MAX_NAMED => {
             let named = known[..MAX_NAMED].join(", ");
             format!("no input has a scan of that name or number; there are {named} and {} more", n - MAX_NAMED)

@@ -20,7 +20,7 @@ fn main() -> io::Result<()> {
         ("images", "e57", &["e57"]),
         ("ply", "rows", &["ply"]),
         ("pcd", "rows", &["pcd"]),
-        ("text", "rows", &["xyz", "txt", "asc", "csv", "pts", "ptx", "off"]),
+        ("text", "rows", &["xyz", "txt", "asc", "csv", "pts", "ptx", "off", "obj"]),
     ] {
         let corpus = fuzz.join("corpus").join(target);
         fs::create_dir_all(&corpus)?;
@@ -36,6 +36,12 @@ fn main() -> io::Result<()> {
             let bytes = if target == "text" { [b"0".as_slice(), &bytes].concat() } else { bytes };
             fs::write(corpus.join(name), bytes)?;
         }
+    }
+    let corpus = fuzz.join("corpus/depth");
+    fs::create_dir_all(&corpus)?;
+    for (which, name) in ["single.png", "single.json", "single_colour.png"].into_iter().enumerate() {
+        let bytes = fs::read(fixtures.join("depth").join(name))?;
+        fs::write(corpus.join(name), [vec![which as u8], bytes].concat())?;
     }
     let corpus = fuzz.join("corpus/potree2");
     fs::create_dir_all(&corpus)?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 use pointmill_format::{Decimal, OpenOptions};
 
+use super::depth::DepthArgs;
 use super::placing::PlacingArgs;
 use super::values::parse_separator;
 use crate::exit::Failure;
@@ -12,7 +13,7 @@ use crate::exit::Failure;
 /// The scans to convert.
 #[derive(Debug, Default, ClapArgs)]
 pub(crate) struct InputArgs {
-    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF) and datasets: files, folders (searched recursively) or globs
+    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF, OBJ, depth maps) and datasets: files, folders (searched recursively) or globs
     #[arg(value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// Reads more inputs from the file LIST, one per line (- for standard input); skips empty lines and lines that
@@ -43,7 +44,7 @@ pub(crate) struct ReadingArgs {
     /// Decimal mark of text scans; auto looks at a sample of the rows, and fails where it cannot tell
     #[arg(long, value_enum, default_value = "auto", value_name = "MARK", help_heading = "Reading scans")]
     pub(crate) decimal: DecimalArg,
-    /// Reads only this scan within the files (E57, PTX): its exact name, or its number in the file, from 1; repeat it for
+    /// Reads only this scan within the files (E57, PTX, folders of depth maps): its exact name, or its number in the file, from 1; repeat it for
     /// more scans. Other kinds of files are read whole [default: all scans]
     #[arg(
         long = "scan",
@@ -55,6 +56,8 @@ pub(crate) struct ReadingArgs {
     /// Keeps rowIndex and columnIndex of E57 scans as attributes
     #[arg(long, help_heading = "Reading scans")]
     pub(crate) row_column: bool,
+    #[command(flatten)]
+    pub(crate) depth: DepthArgs,
     #[command(flatten)]
     pub(crate) placing: PlacingArgs,
 }
@@ -83,7 +86,8 @@ impl ReadingArgs {
             ("--transform", placing.transform.is_some()),
             ("--reproject", placing.reproject.is_some()),
         ];
-        given.iter().find(|(_, is_given)| *is_given).map(|(option, _)| *option)
+        let given = given.into_iter().chain(self.depth.given());
+        given.filter(|(_, is_given)| *is_given).map(|(option, _)| option).next()
     }
 
     /// The options for the readers; invalid columns are reported before any file is opened.
@@ -95,6 +99,7 @@ impl ReadingArgs {
         let mut options = OpenOptions::default().keep_row_column(self.row_column);
         (options.columns, options.separator) = (self.columns.clone(), self.separator);
         options.decimal = self.decimal.into();
+        options.depth = self.depth.options()?;
         options.scans = (!self.scans.is_empty()).then(|| self.scans.clone());
         if let Some(placing) = self.placing.placing()? {
             options = options.maps(placing);

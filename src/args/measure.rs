@@ -18,7 +18,7 @@ pub(crate) const BUDGET: u64 = 1_000_000;
 
 #[derive(Debug, ClapArgs)]
 pub(crate) struct MeasureArgs {
-    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF) and datasets: files, folders (searched recursively) or globs; of
+    /// Scans (LAS, LAZ, E57, PLY, PCD, XYZ, CSV, PTS, PTX, OFF, OBJ) and datasets: files, folders (searched recursively) or globs; of
     /// scans that need options to be read, make LAS with `export` first
     #[arg(value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,

@@ -2,6 +2,7 @@
 
 mod common;
 mod convert;
+mod depth;
 mod derive;
 mod examples;
 mod export;

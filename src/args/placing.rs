@@ -80,7 +80,7 @@ impl PlacingArgs {
             placing = placing.with_y_up();
         }
         if let Some(transform) = &self.transform {
-            placing = placing.with_transform(matrix(transform)?);
+            placing = placing.with_transform(matrix("--transform", transform)?);
         }
         if let Some(target) = &self.reproject {
             placing = placing.with_target(target).map_err(|e| refused("--reproject", &e))?;
@@ -127,13 +127,13 @@ fn refused(option: &str, error: &CrsError) -> Failure {
     if matches!(error, CrsError::NotACrs(_)) { Failure::Usage(line) } else { Failure::Unsupported(line) }
 }
 
-/// A matrix, as numbers or as a file of numbers.
-fn matrix(text: &str) -> Result<Affine, Failure> {
-    let refuse = |what: String| Failure::Usage(format!("--transform: {what}"));
+/// A matrix, the value of `option`: numbers, or a file of numbers.
+pub(super) fn matrix(option: &str, text: &str) -> Result<Affine, Failure> {
+    let refuse = |what: String| Failure::Usage(format!("{option}: {what}"));
     let typed = numbers(text);
     let found = match typed {
         Some(numbers) => numbers,
-        None => numbers_of_file(Path::new(text))?,
+        None => numbers_of_file(option, Path::new(text))?,
     };
     let Ok(rows) = <[f64; NUMBERS]>::try_from(found.as_slice()) else {
         return Err(refuse(format!("{} numbers; a 4 × 4 matrix has {NUMBERS}", found.len())));
@@ -150,8 +150,8 @@ fn matrix(text: &str) -> Result<Affine, Failure> {
     Ok(map)
 }
 
-fn numbers_of_file(path: &Path) -> Result<Vec<f64>, Failure> {
-    let refuse = |what: &str| Failure::Usage(format!("--transform: {}: {what}", path.display()));
+fn numbers_of_file(option: &str, path: &Path) -> Result<Vec<f64>, Failure> {
+    let refuse = |what: &str| Failure::Usage(format!("{option}: {}: {what}", path.display()));
     if !path.is_file() {
         return Err(refuse("neither 16 numbers nor a file"));
     }
@@ -174,7 +174,7 @@ mod tests {
     use super::*;
 
     fn refused(text: &str) -> String {
-        match matrix(text) {
+        match matrix("--transform", text) {
             Err(Failure::Usage(line)) => line,
             other => panic!("{text}: {:?}", other.is_ok()),
         }
@@ -188,7 +188,7 @@ mod tests {
             "1,0,0,11.5, 0,-1,0,0, 0,0,1,1, 0,0,0,1",
             "1 0 0 11.5\r\n0 -1 0 0\r\n0 0 1 1e0\r\n0.000 0.0 0 1.0000\r\n",
         ] {
-            assert_eq!(matrix(text).unwrap().apply([1.0, 2.0, 3.0]), expected, "{text}");
+            assert_eq!(matrix("--transform", text).unwrap().apply([1.0, 2.0, 3.0]), expected, "{text}");
         }
     }
 

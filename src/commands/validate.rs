@@ -14,7 +14,7 @@ use crate::human::quantities::plural;
 use crate::human::validation;
 use crate::inputs;
 use crate::printable::printable;
-use crate::{scan_choice, text_choice};
+use crate::{depth_choice, scan_choice, text_choice};
 
 /// A folder with the outputs of one conversion to several formats is validated one after the other, and held against its
 /// report; all are reported, and the first failure gives the exit code.
@@ -130,6 +130,7 @@ fn one(dataset: &Path, args: &ValidateArgs) -> Result<(Outcome, Result<(), Failu
         let found = inputs::expand(&args.against, &options.open, Some(dataset))?;
         scan_choice::check(&found.files, &options.open)?;
         text_choice::check(&found.files, &options.open)?;
+        depth_choice::check(&found.files, &options.open)?;
         if !args.talk.quiet {
             found.all_notes().chain(found.unread_notes()).for_each(|note| print_line(&note));
         }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pointmill_validate::{Accuracy, DatasetKind, FirstView, LeafQuality, LevelQuality, Outcome};
+use pointmill_validate::{Accuracy, DatasetKind, FirstView, LeafQuality, LevelQuality, Outcome, SurfelSummary};
 
 use super::quantities::{at_most, count, plural, three_digits};
 use crate::printable::printable;
@@ -41,11 +41,26 @@ pub(crate) fn outcome(dataset: &Path, outcome: &Outcome, verbose: bool) -> Strin
             let _ = writeln!(out, "  not compared, because the dataset does not have them: {}", printable(&names));
         }
     }
+    out.push_str(&outcome.surfels.as_ref().map(surfels).unwrap_or_default());
     out.push_str(&accuracy(&outcome.accuracy));
     out.push_str(&outcome.first_view.as_ref().map(first_view).unwrap_or_default());
     out.push_str(&quality(&outcome.quality, verbose));
     out.push_str(&outcome.leaves.as_ref().map(leaves).unwrap_or_default());
     out + &problems(outcome)
+}
+
+/// How far attributes that the conversion has computed are from those that were computed again.
+fn surfels(surfels: &SurfelSummary) -> String {
+    let largest = [
+        ("normals", surfels.largest_angle, " degrees"),
+        ("curvatures", surfels.largest_curvature, ""),
+        ("radii", surfels.largest_radius, " of them"),
+    ];
+    let largest = largest.into_iter().filter_map(|(what, off, unit)| Some((what, at_most(off?), unit)));
+    let largest: Vec<String> = largest.map(|(what, off, unit)| format!("{what} off by {off}{unit}")).collect();
+    let (points, ambiguous) = (plural(surfels.points, "point"), count(surfels.ambiguous));
+    let found = if largest.is_empty() { "nothing to compare".into() } else { largest.join(", ") + " at most" };
+    format!("  {points} computed again, {ambiguous} of them with more than one plane that fits: {found}\n")
 }
 
 /// Errors of decoded positions, as far as they were measured.

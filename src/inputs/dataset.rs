@@ -1,10 +1,11 @@
-//! Datasets among the inputs.
+//! Datasets among the inputs, and folders of depth maps: folders that are one input.
 
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use pointmill_format::{DatasetKind, Located, locate};
+use pointmill_format::scan::depth::is_sequence;
+use pointmill_format::{DatasetKind, Located, ScanKind, locate};
 
 use super::kind::{Kind, kind_in_folder};
 use crate::datasets;
@@ -27,9 +28,12 @@ pub(super) enum Met {
     Several(Vec<&'static str>),
 }
 
-/// The dataset that a path names: its folder, or its file; `None` for anything else. A folder with a dataset that is one file
+/// The dataset that a path names: its folder, or its file; or the folder of depth maps with a trajectory. `None` for anything else. A folder with a dataset that is one file
 /// is a folder like others.
 pub(super) fn named(path: &Path) -> Option<PathBuf> {
+    if is_sequence(path) {
+        return Some(path.to_path_buf());
+    }
     let Located { kind, path: found, .. } = detected(path)?;
     (!kind.is_single_file() || !path.is_dir()).then_some(found)
 }
@@ -41,7 +45,7 @@ pub(super) fn met(folder: &Path, output: Option<&Path>) -> Met {
     match () {
         () if is_unfinished(folder) => Met::NoInput,
         () if (is_dataset || inside.len() > 1) && is_in(folder, output) => Met::NoInput,
-        () if is_dataset => Met::Dataset(folder.to_path_buf()),
+        () if is_dataset || is_sequence(folder) => Met::Dataset(folder.to_path_buf()),
         () if inside.len() > 1 => Met::Several(inside.iter().map(|one| one.kind.name()).collect()),
         () => Met::Folder,
     }
@@ -68,11 +72,16 @@ pub(super) fn is_in(path: &Path, output: Option<&Path>) -> bool {
 
 /// Scans in the folder of a dataset that are none of its files.
 pub(super) fn scans_beside(dataset: &Path) -> Vec<PathBuf> {
-    let Some(kind) = DatasetKind::detect(dataset).filter(|_| dataset.is_dir()) else { return Vec::new() };
+    let kind = DatasetKind::detect(dataset).filter(|_| dataset.is_dir());
+    if kind.is_none() && !is_sequence(dataset) {
+        return Vec::new();
+    }
+    let owns = |name: &str| kind.is_some_and(|kind| kind.owns(name));
+    let is_frame = |path: &Path| kind.is_none() && matches!(ScanKind::of_file(path), Ok(Some(ScanKind::Depth)));
     let entries = fs::read_dir(dataset).into_iter().flatten().flatten();
-    let others = entries.filter(|entry| !entry.file_name().to_str().is_some_and(|name| kind.owns(name)));
-    let scans =
-        others.map(|entry| entry.path()).filter(|path| kind_in_folder(path).is_ok_and(|kind| kind == Kind::Scan));
+    let others = entries.filter(|entry| !entry.file_name().to_str().is_some_and(owns));
+    let scans = others.map(|entry| entry.path()).filter(|path| !is_frame(path));
+    let scans = scans.filter(|path| kind_in_folder(path).is_ok_and(|kind| kind == Kind::Scan));
     let mut scans: Vec<PathBuf> = scans.collect();
     scans.sort();
     scans

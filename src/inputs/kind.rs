@@ -5,6 +5,7 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::path::Path;
 
+use pointmill_format::scan::depth::is_described;
 use pointmill_format::scan::text::{TextKind, is_other_text};
 use pointmill_format::{ErrorKind, OtherKind, ScanKind};
 
@@ -27,10 +28,11 @@ pub(super) fn kind(path: &Path) -> io::Result<Kind> {
 }
 
 /// [`kind`] of a file that a folder brought along. Lines of numbers are many things (matrices, tracks, logs): they count
-/// as a scan if the ending says so too.
+/// as a scan if the ending says so too. So does a picture of 16-bit grey if a file beside it describes its camera.
 pub(super) fn kind_in_folder(path: &Path) -> io::Result<Kind> {
     match content(path)? {
         Some(ScanKind::Text(TextKind::Xyz | TextKind::Pts)) if !ends_with(path, &TEXT_ENDINGS) => Ok(Kind::NoScan),
+        Some(ScanKind::Depth) if !is_described(path) => Ok(Kind::NoScan),
         _ => kind(path),
     }
 }

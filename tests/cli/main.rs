@@ -10,6 +10,7 @@ mod bad_output;
 mod batches;
 mod copc;
 mod cut_short;
+mod depth_maps;
 mod export;
 mod export_datasets;
 mod export_text;

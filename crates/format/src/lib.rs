@@ -1,6 +1,6 @@
 //! Point-cloud files, for renderers and for preprocessors: scans become columns, datasets become nodes, and back.
 //!
-//! A scan (LAS, LAZ, E57, PLY, PCD, text) is a list of attributes and a run of points. [`open_scan`] detects the kind from
+//! A scan (LAS, LAZ, E57, PLY, PCD, text, depth maps) is a list of attributes and a run of points. [`open_scan`] detects the kind from
 //! the content and reads the header; batches of points follow, a typed column per attribute:
 //!
 //! ```
@@ -31,8 +31,8 @@
 //!
 //! Programs that use all cores decode the pieces of a scan on their own threads ([`Scan::decode`]).
 //!
-//! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `e57` (E57), `las` (LAS 1.0–1.5, LAZ,
-//!   COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF); `scans` is all of them. `scan::las::write` writes
+//! * [`scan`]: scans, decoded in parallel pieces, each kind with a cargo feature: `depth` (depth maps), `e57` (E57), `las`
+//!   (LAS 1.0–1.5, LAZ, COPC), `ply` (PLY), `pcd` (PCD), `text` (XYZ/CSV, PTS, PTX, OFF, OBJ); `scans` is all of them. `scan::las::write` writes
 //!   LAS (feature `las`) and LAZ (feature `laz`).
 //! * [`potree1`]: Potree 1.4 to 1.8 octrees (`cloud.js`), read lazily from a folder or (feature `zip`) an uncompressed
 //!   archive, and what a writer of them needs.
@@ -86,10 +86,10 @@ pub use open_octree::open_octree;
 pub use open_scan::open_scan;
 pub use points::{Attribute, AttributeType, Changes, Column, Element, NodePoints, PointBatch, Positions};
 pub use scan::{
-    Batches, Blob, Counted, Crs, DatasetNote, Decimal, ImageEncoding, ImageGeometry, ImageKind, ImagePose,
-    MAX_BATCH_BYTES, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, PointMap, Resolution, Scan, ScanImage, ScanInfo,
-    ScanKind, ScanMap, ScanMaps, ScanPart, ScanWarning, Scratch, Sink, Unit, UnknownAttribute, Wanted, scans_named,
-    supported_scans,
+    Batches, Blob, Counted, Crs, DatasetNote, Decimal, DepthFilter, DepthOptions, ImageEncoding, ImageGeometry,
+    ImageKind, ImagePose, Intrinsics, MAX_BATCH_BYTES, MAX_BATCH_POINTS, OpenOptions, OtherKind, Piece, PointMap,
+    Resolution, Scan, ScanImage, ScanInfo, ScanKind, ScanMap, ScanMaps, ScanPart, ScanWarning, Scratch, Sink, Unit,
+    UnknownAttribute, Wanted, scans_named, supported_scans,
 };
 pub use write_error::WriteError;
 

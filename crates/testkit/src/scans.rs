@@ -29,7 +29,7 @@ impl ScanFixture {
 
     /// True if the file declares how many points it has, so that a cut one can be recognised.
     pub fn is_counted(&self) -> bool {
-        self.kind != "XYZ"
+        !matches!(self.kind, "XYZ" | "OBJ")
     }
 
     /// True for files of some kilobytes; the others are real scans, too large to be read thousands of times.
@@ -68,6 +68,7 @@ fn kind(path: &Path) -> &'static str {
         "pts" => "PTS",
         "ptx" => "PTX",
         "off" => "OFF",
+        "obj" => "OBJ",
         "xyz" | "txt" | "csv" | "asc" => "XYZ",
         _ => panic!("{}: of what kind is it?", path.display()),
     }

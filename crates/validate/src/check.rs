@@ -64,13 +64,21 @@ pub enum Check {
     GpsTime,
     ColourDepth,
     Report,
+    Normals,
+    Curvature,
+    Radii,
+    Surfels,
 }
 
 impl Check {
     /// Checks of all formats together; [`Self::index`] is below it.
-    pub(crate) const COUNT: usize = Self::Report as usize + 1;
+    pub(crate) const COUNT: usize = Self::Surfels as usize + 1;
 
-    /// The checks of datasets of that kind, in the order of reports.
+    /// The checks of attributes that the conversion has computed (`docs/surfels.md`): of datasets of all kinds, behind those
+    /// of [`Self::of`], where the report of the conversion says that there are such attributes.
+    pub const DERIVED: &[Self] = &[Self::Normals, Self::Curvature, Self::Radii, Self::Surfels];
+
+    /// The checks of every dataset of that kind, in the order of reports.
     pub const fn of(kind: DatasetKind) -> &'static [Self] {
         match kind {
             DatasetKind::Potree2 => Self::POTREE2,
@@ -256,6 +264,10 @@ impl Check {
             Self::GpsTime => "gps-time",
             Self::ColourDepth => "colour-depth",
             Self::Report => "report",
+            Self::Normals => "normals",
+            Self::Curvature => "curvature",
+            Self::Radii => "radii",
+            Self::Surfels => "surfels",
         }
     }
 
@@ -326,6 +338,12 @@ impl Check {
             Self::GpsTime => "the GPS times of the info record bound those of the points and are attained",
             Self::ColourDepth => "colours have 16 bits",
             Self::Report => "the report of the conversion names this dataset, with its points and nodes",
+            Self::Normals => {
+                "normals have length 1, or 0 where the report counts them, and point up or to a place if asked to"
+            }
+            Self::Curvature => "curvatures are from 0 to 1/3",
+            Self::Radii => "radii are finite and 0 or more; the report counts those of 0",
+            Self::Surfels => "normals, curvatures and radii of a sample are those of the points around",
             Self::Errors => "largest and rms errors are attained, none is above half a cell",
         }
     }
@@ -346,10 +364,12 @@ mod tests {
     #[test]
     fn no_format_has_two_checks_of_one_name_and_every_check_serves_a_format() {
         for &format in DatasetKind::ALL {
-            let names: BTreeSet<_> = Check::of(format).iter().map(|c| c.name()).collect();
-            assert_eq!(names.len(), Check::of(format).len(), "{format}");
+            let all = || Check::of(format).iter().chain(Check::DERIVED);
+            let names: BTreeSet<_> = all().map(|c| c.name()).collect();
+            assert_eq!(names.len(), all().count(), "{format}");
         }
-        let used: BTreeSet<_> = DatasetKind::ALL.iter().flat_map(|f| Check::of(*f)).map(|c| c.index()).collect();
+        let all = DatasetKind::ALL.iter().flat_map(|f| Check::of(*f)).chain(Check::DERIVED);
+        let used: BTreeSet<_> = all.map(|c| c.index()).collect();
         assert!(used.into_iter().eq(0..Check::COUNT));
     }
 }

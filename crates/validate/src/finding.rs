@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use serde::Serialize;
 use serde_json::Value;
@@ -114,6 +114,47 @@ fn plain(value: &Value) -> Cow<'_, str> {
     }
 }
 
+/// Counts faults of one kind at one place, and remembers the first.
+#[derive(Debug, Default)]
+pub(crate) struct Faults {
+    count: u64,
+    first: Option<(Value, Value)>,
+}
+
+impl Faults {
+    /// Takes in a fault: what was expected, and what was found.
+    pub(crate) fn add(&mut self, expected: impl Into<Value>, found: impl Into<Value>) {
+        self.count += 1;
+        self.first.get_or_insert_with(|| (expected.into(), found.into()));
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// What to report, if there were any.
+    pub(crate) fn finding(
+        self,
+        check: Check,
+        subject: impl Into<Cow<'static, str>>,
+        place: impl Into<Place>,
+    ) -> Option<Finding> {
+        let (expected, found) = self.first?;
+        Some(Finding::new(check, subject, expected, found).at(place).points(self.count))
+    }
+
+    /// Pushes one finding, if there were any.
+    pub(crate) fn report(
+        self,
+        check: Check,
+        subject: impl Into<Cow<'static, str>>,
+        place: impl Into<Place>,
+        findings: &Findings,
+    ) {
+        self.finding(check, subject, place).into_iter().for_each(|finding| findings.push(finding));
+    }
+}
+
 /// The account of one check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CheckResult {
@@ -167,6 +208,8 @@ pub(crate) struct Findings {
     /// By [`Check::index`]; those of other formats stay empty.
     slots: Vec<Mutex<Slot>>,
     checked: Vec<AtomicU64>,
+    /// The dataset has attributes that a conversion has computed: their checks are reported, too.
+    is_derived: AtomicBool,
 }
 
 impl Findings {
@@ -177,12 +220,18 @@ impl Findings {
             cap,
             slots: std::iter::repeat_with(Mutex::default).take(Check::COUNT).collect(),
             checked: std::iter::repeat_with(AtomicU64::default).take(Check::COUNT).collect(),
+            is_derived: AtomicBool::new(false),
         }
     }
 
     /// The format whose checks these are.
     pub(crate) fn format(&self) -> DatasetKind {
         self.format
+    }
+
+    /// Adds [`Check::DERIVED`] to the checks that are reported.
+    pub(crate) fn include_derived(&self) {
+        self.is_derived.store(true, Ordering::Relaxed);
     }
 
     fn slot(&self, check: Check) -> std::sync::MutexGuard<'_, Slot> {
@@ -247,7 +296,8 @@ impl Findings {
     pub(crate) fn finish(self) -> (Vec<CheckResult>, Vec<Finding>) {
         let mut results = Vec::new();
         let mut problems = Vec::new();
-        for check in Check::of(self.format) {
+        let derived = if self.is_derived.load(Ordering::Relaxed) { Check::DERIVED } else { &[] };
+        for check in Check::of(self.format).iter().chain(derived) {
             let mut slot = std::mem::take(&mut *self.slot(*check));
             shorten(&mut slot.kept, self.cap);
             results.push(CheckResult {

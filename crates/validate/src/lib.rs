@@ -39,6 +39,7 @@ mod place;
 mod potree1;
 mod potree2;
 mod report;
+mod surfels;
 
 use std::path::Path;
 
@@ -48,7 +49,7 @@ pub use accuracy::{Accuracy, Integers, Merged, PositionErrors};
 pub use check::Check;
 pub use finding::{CheckResult, Finding, Severity};
 pub use options::{Options, Progress, ProgressFn};
-pub use outcome::{AgainstSummary, FirstView, LeafQuality, LevelQuality, Outcome};
+pub use outcome::{AgainstSummary, FirstView, LeafQuality, LevelQuality, Outcome, SurfelSummary};
 pub use place::{BinaryNode, Place};
 pub use pointmill_format::{DatasetKind, Located, locate};
 pub use report::{Several, several};

@@ -38,7 +38,8 @@ impl Default for Options {
 /// How far a validation is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// `points` (of the dataset), `sources` (decoding the scans), `differences` (looking for what differs).
+    /// `points` (of the dataset), `sources` (decoding the scans), `differences` (looking for what differs),
+    /// `surfels` (of the dataset, to compute normals and radii again).
     pub phase: &'static str,
     /// Points done in this phase. Calls from several threads may overtake each other.
     pub done: u64,

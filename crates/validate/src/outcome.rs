@@ -20,7 +20,8 @@ pub struct Outcome {
     pub points: u64,
     /// Nodes that were reached from the root; batches.
     pub nodes: u64,
-    /// One entry for each of [`Check::of`], in that order.
+    /// One entry for each of [`Check::of`], in that order, then of [`Check::DERIVED`] where the conversion has computed
+    /// attributes.
     pub checks: Vec<CheckResult>,
     /// Findings, by check, at most [`crate::Options::max_problems`] each; errors before warnings, coarse or early places
     /// before others.
@@ -33,6 +34,9 @@ pub struct Outcome {
     pub leaves: Option<LeafQuality>,
     /// The comparison with the sources, if there was one.
     pub against: Option<AgainstSummary>,
+    /// Of attributes that the conversion has computed, if a sample of them was computed again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surfels: Option<SurfelSummary>,
     /// How far decoded positions are from those of the sources, as far as it could be measured.
     pub accuracy: Accuracy,
 }
@@ -54,6 +58,7 @@ impl Outcome {
             first_view: None,
             leaves: None,
             against: None,
+            surfels: None,
             accuracy: Accuracy::default(),
         }
     }
@@ -79,6 +84,23 @@ pub struct AgainstSummary {
     pub sum_found: String,
     /// Attributes of the sources that the dataset does not have, so they were not compared.
     pub attributes_not_in_dataset: Vec<String>,
+}
+
+/// How normals, curvatures and radii of a sample of points differ from those that were computed again.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct SurfelSummary {
+    /// Points of the sample.
+    pub points: u64,
+    /// Those whose neighbourhood or normal is one of several that fit: normal and curvature were not judged.
+    pub ambiguous: u64,
+    /// Normals that were compared.
+    pub normals: u64,
+    /// The largest angle between one and the right one, as lines, degrees; here and below `None`: none was compared.
+    pub largest_angle: Option<f64>,
+    /// The largest difference of curvatures.
+    pub largest_curvature: Option<f64>,
+    /// The largest difference of radii, relative to the right ones.
+    pub largest_radius: Option<f64>,
 }
 
 /// Quality of one level of the octree. Distances are relative to the spacing of the level.

@@ -24,6 +24,44 @@ const MAX_BYTES: u64 = 1 << 30;
 struct Report {
     /// Not there in reports of other programs.
     outputs: Option<Vec<Reported>>,
+    /// What was asked of the conversion, under either name.
+    #[serde(default)]
+    settings: Value,
+    #[serde(default)]
+    options: Value,
+    #[serde(default)]
+    derived: Value,
+}
+
+impl Report {
+    /// What it states of datasets; `None` if it is that of another program.
+    fn outputs(self) -> Option<Vec<Reported>> {
+        let mut outputs = self.outputs?;
+        let mut settings = [&self.settings, &self.options].map(|asked| &asked["derive"]).into_iter();
+        if let Some(settings) = settings.find(|settings| !settings.is_null()) {
+            let derive = Derive { settings: settings.clone(), counts: self.derived };
+            outputs.iter_mut().for_each(|output| output.derive = Some(derive.clone()));
+        }
+        Some(outputs)
+    }
+}
+
+/// What the report states of attributes that the conversion has computed, of all datasets that it made.
+#[derive(Debug, Clone)]
+pub(crate) struct Derive {
+    /// How they were computed.
+    pub(crate) settings: Value,
+    /// How many points are without one, null if that is not stated.
+    pub(crate) counts: Value,
+}
+
+/// An attribute that is not in a dataset.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Dropped {
+    pub(crate) name: String,
+    /// What all points agree on, by element, if that is why.
+    pub(crate) constant: Option<Vec<f64>>,
 }
 
 /// What the report states of a dataset.
@@ -33,7 +71,13 @@ pub(crate) struct Reported {
     format: String,
     folder: String,
     points: Option<u64>,
+    /// Equal records of which the dataset has one.
+    pub(crate) duplicates_dropped: u64,
+    pub(crate) attributes_dropped: Vec<Dropped>,
     pub(crate) accuracy: Option<Value>,
+    /// `None`: nothing was computed.
+    #[serde(skip)]
+    pub(crate) derive: Option<Derive>,
     tree: Tree,
     details: Details,
 }
@@ -72,23 +116,18 @@ fn read(folder: &Path) -> Result<Read, ReadError> {
         Err(error) => return Err(ReadError::io(&path, "opening", error)),
     };
     match serde_json::from_reader::<_, Report>(file) {
-        Ok(Report { outputs: Some(outputs) }) => Ok(Read::Outputs(outputs)),
-        Ok(Report { outputs: None }) => Ok(Read::Foreign),
+        Ok(report) => Ok(report.outputs().map_or(Read::Foreign, Read::Outputs)),
         Err(error) if error.is_io() => Err(ReadError::io(&path, "reading", error.into())),
         Err(error) => Ok(Read::Broken(error.to_string())),
     }
 }
 
-/// The statement on the dataset at `path`, from the report beside it or in the folder above. What does not fit together is
-/// a finding; `points` and `nodes` (batches) are those of the dataset.
+/// The statement on the dataset at `path`, from the report beside it or in the folder above. A report that cannot be that
+/// of the dataset is a finding.
 ///
 /// # Errors
 /// The operating system cannot read the report.
-pub(crate) fn check(
-    path: &Path,
-    (points, nodes): (u64, u64),
-    findings: &Findings,
-) -> Result<Option<Reported>, ReadError> {
+pub(crate) fn find(path: &Path, findings: &Findings) -> Result<Option<Reported>, ReadError> {
     let kind = findings.format();
     let folder = if path.is_dir() { path } else { parent(path) };
     let beside = read(folder)?;
@@ -114,9 +153,8 @@ pub(crate) fn check(
         None => above(folder, kind)?,
         stated => stated,
     };
-    match &stated {
-        Some(stated) => compare(stated, kind, points, nodes, findings),
-        None => findings.skip(Check::Report, "there is no report of the conversion beside the dataset"),
+    if stated.is_none() {
+        findings.skip(Check::Report, "there is no report of the conversion beside the dataset");
     }
     Ok(stated)
 }
@@ -136,7 +174,10 @@ fn parent(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-fn compare(stated: &Reported, kind: DatasetKind, points: u64, nodes: u64, findings: &Findings) {
+/// Holds what is stated against the dataset, which has so many points and nodes (batches).
+pub(crate) fn check(stated: Option<&Reported>, (points, nodes): (u64, u64), findings: &Findings) {
+    let Some(stated) = stated else { return };
+    let kind = findings.format();
     let stated_nodes = if kind == DatasetKind::Batches { stated.details.batches } else { stated.tree.nodes };
     let what = if kind == DatasetKind::Batches { "batches in the report" } else { "nodes in the report" };
     for (subject, found, stated) in [("points in the report", points, stated.points), (what, nodes, stated_nodes)] {
@@ -242,7 +283,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(REPORT_FILE), report).unwrap();
         let findings = Findings::new(kind, 20);
-        let stated = check(folder.path(), counts, &findings).unwrap();
+        let stated = find(folder.path(), &findings).unwrap();
+        check(stated.as_ref(), counts, &findings);
         (findings.finish().1.iter().map(|f| f.subject.to_string()).collect(), stated.is_some())
     }
 
@@ -261,6 +303,22 @@ mod tests {
         assert_eq!(found(batches, (7, 1), DatasetKind::Batches), (vec![], true));
         assert_eq!(found(batches, (7, 2), DatasetKind::Batches).0, ["batches in the report"]);
         assert_eq!(found(r#"{"pages": 3}"#, (7, 1), DatasetKind::Batches), (vec![], false), "of another program");
+        assert_eq!(found(r#"{"options": [3], "derived": ""}"#, (7, 1), DatasetKind::Batches), (vec![], false));
+    }
+
+    #[test]
+    fn what_was_computed_is_found_under_either_name_and_beside_every_output() {
+        let of = |asked: &str| {
+            let text = format!(
+                r#"{{"outputs": [{{"format": "copc", "folder": "", "attributes_dropped": [{{"name": "a", "why": "b"}}]}}],
+                    "{asked}": {{"derive": {{"radius": true}}}}, "derived": {{"without_radius": 3}}}}"#
+            );
+            let report: Report = serde_json::from_str(&text).unwrap();
+            let outputs = report.outputs().unwrap();
+            outputs[0].derive.as_ref().map(|d| (d.settings["radius"] == true, d.counts["without_radius"].as_u64()))
+        };
+        assert_eq!(["settings", "options"].map(of), [Some((true, Some(3))); 2]);
+        assert_eq!(of("others"), None);
     }
 
     #[test]

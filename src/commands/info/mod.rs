@@ -20,7 +20,7 @@ use crate::args::InfoArgs;
 use crate::datasets;
 use crate::exit::{Failure, emit, print_line, to_json};
 use crate::inputs;
-use crate::{scan_choice, text_choice};
+use crate::{depth_choice, scan_choice, text_choice};
 
 /// Describes a dataset; each kind has a file here. COPC is a scan, too, and described as one.
 fn describe_dataset(dataset: &Located, options: &OpenOptions, deep: bool) -> Result<Description, Failure> {
@@ -94,14 +94,18 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
 
 /// Checks that the scans that were chosen are in one of all inputs.
 fn check_choice(paths: &[PathBuf], options: &OpenOptions) -> Result<(), Failure> {
-    if options.scans.is_none() && !text_choice::is_given(options) {
+    if options.scans.is_none() && !text_choice::is_given(options) && !depth_choice::is_given(options) {
         return Ok(());
     }
     // what cannot be found is reported in its turn
     let expanded = paths.iter().filter_map(|path| inputs::expand(std::slice::from_ref(path), options, None).ok());
     let files: Vec<PathBuf> = expanded.flat_map(|found| found.files).collect();
     scan_choice::check(&files, options)?;
-    if files.is_empty() { Ok(()) } else { text_choice::check(&files, options) }
+    if files.is_empty() {
+        return Ok(());
+    }
+    text_choice::check(&files, options)?;
+    depth_choice::check(&files, options)
 }
 
 /// The output so far: of very many scans nothing is kept.

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::lanes::{LANES, at_most};
 use super::space::{Space, outside, squared};
+use crate::runtime::{Compare, LANES};
 
 /// Children of a node.
 const WIDTH: usize = LANES;
@@ -151,7 +151,7 @@ pub(super) struct Near<'a> {
 impl Near<'_> {
     /// The next run whose box is at most as far away as the square of a distance, which may become less from one to the next.
     #[inline(always)]
-    pub(super) fn next(&mut self, bound: f32) -> Option<u32> {
+    pub(super) fn next(&mut self, lanes: impl Compare, bound: f32) -> Option<u32> {
         while let Some(Waiting { distance, level, index }) = self.stack.pop() {
             if distance > bound {
                 continue;
@@ -165,7 +165,7 @@ impl Near<'_> {
             };
             let distances = node.distances(self.q, self.space);
             let base = self.stack.len();
-            let mut hits = at_most(&distances, bound);
+            let mut hits = lanes.at_most(&distances, bound);
             hits &= (1 << node.children) - 1;
             while hits != 0 {
                 let i = hits.trailing_zeros() as usize % WIDTH;
@@ -204,6 +204,7 @@ mod tests {
     use pointmill_testkit::Random;
 
     use super::*;
+    use crate::runtime::Portable;
 
     #[test]
     fn every_run_that_can_be_near_enough_is_found_and_known_ones_are_not() {
@@ -226,7 +227,7 @@ mod tests {
                 let mut found = Vec::new();
                 let mut stack = Vec::new();
                 let mut near = boxes.near(q, &space, &known, &mut stack);
-                while let Some(run) = near.next(bound) {
+                while let Some(run) = near.next(Portable, bound) {
                     found.push(run);
                 }
                 found.retain(|run| !known.contains(run)); // a node may have some of both

@@ -5,6 +5,7 @@ use super::space::Space;
 use super::sums::Sums;
 use super::surface::Surface;
 use crate::plan::Neighbourhood;
+use crate::runtime::Compare;
 
 /// More than all roundings of a sum of two distances together.
 const ROUNDED_UP: f32 = 1.0 + 1e-5;
@@ -19,7 +20,7 @@ pub(super) trait Collect {
     /// The square of the distance up to which points matter.
     fn bound(&self) -> f32;
     /// Takes a point whose distance is at most the bound.
-    fn offer(&mut self, squared: f32, place: [i32; 3]);
+    fn offer(&mut self, lanes: impl Compare, squared: f32, place: [i32; 3]);
     /// The surface through them.
     fn surface(&self, space: &Space) -> Surface;
 }
@@ -71,8 +72,8 @@ impl Collect for SoMany {
     }
 
     #[inline(always)]
-    fn offer(&mut self, squared: f32, place: [i32; 3]) {
-        self.nearest.offer(squared, place);
+    fn offer(&mut self, lanes: impl Compare, squared: f32, place: [i32; 3]) {
+        self.nearest.offer(lanes, squared, place);
     }
 
     #[inline]
@@ -117,7 +118,7 @@ impl Collect for AllWithin {
     }
 
     #[inline(always)]
-    fn offer(&mut self, _: f32, place: [i32; 3]) {
+    fn offer(&mut self, _: impl Compare, _: f32, place: [i32; 3]) {
         self.sums.add([0, 1, 2].map(|a| i64::from(place[a]) - i64::from(self.q[a])));
     }
 

@@ -4,12 +4,11 @@ use std::ops::Range;
 
 use super::boxes::{Box3, Boxes, Waiting};
 use super::collect::Collect;
-use super::lanes::{LANES, at_most};
 use super::runs::{Lookup, Runs};
 use super::space::{Space, between, squared};
 use super::surface::Surface;
 use crate::error::ConvertError;
-use crate::runtime::Workers;
+use crate::runtime::{Compare, LANES, Portable, Workers};
 
 /// Points of a leaf of the hierarchy over a unit: two vectors of single precision.
 const LEAF_POINTS: usize = 16;
@@ -43,12 +42,13 @@ impl Finder {
 
     /// Finds the surface through each point of the unit. `others`: nothing, if the unit is the cloud.
     #[inline(always)]
-    pub(super) fn find<C: Collect>(
+    pub(super) fn find(
         &mut self,
+        lanes: impl Compare,
         space: &Space,
         others: Option<Others<'_>>,
         workers: &Workers<'_>,
-        collect: &mut C,
+        collect: &mut impl Collect,
     ) -> Result<(), ConvertError> {
         let points = self.columns[0].len();
         let leaf = |i: usize| i * LEAF_POINTS..((i + 1) * LEAF_POINTS).min(points);
@@ -75,13 +75,13 @@ impl Finder {
             // its own leaf first: then the bound is near to what it will be
             let own = i / LEAF_POINTS;
             let known = own as u32..own as u32 + 1;
-            scan(of(leaf(own)), q, space, collect);
+            scan(lanes, of(leaf(own)), q, space, collect);
             let mut near = self.leaves.near(q, space, &known, &mut self.stack);
-            while let Some(run) = near.next(collect.bound()) {
-                scan(of(leaf(run as usize)), q, space, collect);
+            while let Some(run) = near.next(lanes, collect.bound()) {
+                scan(lanes, of(leaf(run as usize)), q, space, collect);
             }
             if let Some(others) = others {
-                beyond(q, space, others, &mut self.stack, &mut self.lookup, collect)?;
+                beyond(lanes, q, space, others, &mut self.stack, &mut self.lookup, collect)?;
             }
             let surface = collect.surface(space);
             before = Some((q, surface));
@@ -91,32 +91,33 @@ impl Finder {
     }
 
     /// Offers the points of other units to a neighbourhood of which this one has offered its own.
-    pub(super) fn look_beyond<C: Collect>(
+    pub(super) fn look_beyond(
         &mut self,
         q: [i32; 3],
         space: &Space,
         others: Others<'_>,
-        collect: &mut C,
+        collect: &mut impl Collect,
     ) -> Result<(), ConvertError> {
-        beyond(q, space, others, &mut self.stack, &mut self.lookup, collect)
+        beyond(Portable, q, space, others, &mut self.stack, &mut self.lookup, collect)
     }
 }
 
 /// Offers the points of other units.
 #[inline(always)]
-fn beyond<C: Collect>(
+fn beyond(
+    lanes: impl Compare,
     q: [i32; 3],
     space: &Space,
     Others { runs, unit }: Others<'_>,
     stack: &mut Vec<Waiting>,
     lookup: &mut Lookup,
-    collect: &mut C,
+    collect: &mut impl Collect,
 ) -> Result<(), ConvertError> {
     let own = runs.of(unit);
     let mut near = runs.boxes.near(q, space, &own, stack);
-    while let Some(run) = near.next(collect.bound()) {
+    while let Some(run) = near.next(lanes, collect.bound()) {
         if !own.contains(&run) {
-            scan(lookup.columns(runs, run)?, q, space, collect);
+            scan(lanes, lookup.columns(runs, run)?, q, space, collect);
         }
     }
     Ok(())
@@ -124,7 +125,7 @@ fn beyond<C: Collect>(
 
 /// Offers some points.
 #[inline(always)]
-fn scan<C: Collect>([x, y, z]: [&[i32]; 3], q: [i32; 3], space: &Space, collect: &mut C) {
+fn scan(lanes: impl Compare, [x, y, z]: [&[i32]; 3], q: [i32; 3], space: &Space, collect: &mut impl Collect) {
     let distance = |place: [i32; 3]| squared([0, 1, 2].map(|a| between(place[a], q[a])), space.scale);
     let ((xs, x_rest), (ys, y_rest), (zs, z_rest)) =
         (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), z.as_chunks::<LANES>());
@@ -133,19 +134,19 @@ fn scan<C: Collect>([x, y, z]: [&[i32]; 3], q: [i32; 3], space: &Space, collect:
         for (i, d) in distances.iter_mut().enumerate() {
             *d = distance([x[i], y[i], z[i]]);
         }
-        let mut hits = at_most(&distances, collect.bound());
+        let mut hits = lanes.at_most(&distances, collect.bound());
         while hits != 0 {
             let i = hits.trailing_zeros() as usize % LANES;
             hits &= hits - 1;
             if distances[i] <= collect.bound() {
-                collect.offer(distances[i], [x[i], y[i], z[i]]);
+                collect.offer(lanes, distances[i], [x[i], y[i], z[i]]);
             }
         }
     }
     for ((x, y), z) in x_rest.iter().zip(y_rest).zip(z_rest) {
         let d = distance([*x, *y, *z]);
         if d <= collect.bound() {
-            collect.offer(d, [*x, *y, *z]);
+            collect.offer(lanes, d, [*x, *y, *z]);
         }
     }
 }

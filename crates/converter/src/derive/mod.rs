@@ -15,7 +15,6 @@ mod eigen;
 mod fields;
 mod filling;
 mod finder;
-mod lanes;
 mod nearest;
 mod runs;
 mod space;

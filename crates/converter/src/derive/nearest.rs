@@ -1,6 +1,6 @@
 //! The nearest points of a place: which these are depends on the points alone, not on the order in which they are found.
 
-use super::lanes::{LANES, at_most};
+use crate::runtime::{Compare, LANES};
 
 /// So many points of the least distance. Of points at the same distance those with the smaller coordinates count.
 ///
@@ -51,21 +51,21 @@ impl Nearest {
 
     /// Takes a point within the bound, if it is one of the nearest.
     #[inline(always)]
-    pub(super) fn offer(&mut self, squared: f32, place: [i32; 3]) {
+    pub(super) fn offer(&mut self, lanes: impl Compare, squared: f32, place: [i32; 3]) {
         if self.count < self.most {
             (self.squared[self.count], self.places[self.count]) = (squared, place);
             self.count += 1;
             if self.count == self.most {
-                self.find_farthest();
+                self.find_farthest(lanes);
             }
         } else if squared < self.bound || squared == self.bound && place < self.places[self.farthest] {
             (self.squared[self.farthest], self.places[self.farthest]) = (squared, place);
-            self.find_farthest();
+            self.find_farthest(lanes);
         }
     }
 
     #[inline(always)]
-    fn find_farthest(&mut self) {
+    fn find_farthest(&mut self, lanes: impl Compare) {
         let (vectors, _) = self.squared.as_chunks::<LANES>();
         let mut most = [f32::NEG_INFINITY; LANES];
         for vector in vectors {
@@ -78,7 +78,7 @@ impl Nearest {
         let mut found = None;
         for (i, vector) in vectors.iter().enumerate() {
             // none is greater: those that are not less are equal
-            let mut equal = at_most(&vector.map(|v| -v), -bound);
+            let mut equal = lanes.at_most(&vector.map(|v| -v), -bound);
             while equal != 0 {
                 let at = i * LANES + equal.trailing_zeros() as usize;
                 equal &= equal - 1;
@@ -110,6 +110,7 @@ mod tests {
     use pointmill_testkit::Random;
 
     use super::*;
+    use crate::runtime::Portable;
 
     #[test]
     fn the_nearest_ones_however_they_are_found() {
@@ -124,7 +125,7 @@ mod tests {
                 nearest.begin(f32::INFINITY);
                 for p in &places {
                     if square(p) as f32 <= nearest.bound() {
-                        nearest.offer(square(p) as f32, *p);
+                        nearest.offer(Portable, square(p) as f32, *p);
                     }
                 }
                 let mut found = nearest.places().to_vec();

@@ -1,6 +1,6 @@
 //! What a thread does with a unit: its points in order, the surfaces through them, its records back.
 
-use super::collect::{AllWithin, Collect as _, Collector, SoMany};
+use super::collect::{Collect, Collector};
 use super::fields::{Fields, Written};
 use super::filling::Filling;
 use super::finder::{Finder, Others};
@@ -10,7 +10,9 @@ use super::surface::Surface;
 use super::units::{Placed, Unit};
 use crate::cloud::{Checksum, Cloud, OrderScratch, Point, Segment, Store, order, position};
 use crate::error::ConvertError;
-use crate::runtime::{Runtime, Vectors, Workers, vectorized};
+#[cfg(target_arch = "x86_64")]
+use crate::runtime::Avx2;
+use crate::runtime::{Portable, Runtime, Vectors, Workers};
 
 /// Points of a place that very many share that are taken at a time.
 const PLACE_POINTS: u32 = 65_536;
@@ -110,11 +112,7 @@ impl Worker<'_> {
         }
         self.load(unit, true)?;
         let Task { rt, space, .. } = self.task;
-        let (vectors, finder, workers) = (self.vectors, &mut self.finder, &**rt);
-        match &mut self.collector {
-            Collector::SoMany(collect) => so_many(vectors, finder, space, others, workers, collect)?,
-            Collector::AllWithin(collect) => all_within(vectors, finder, space, others, workers, collect)?,
-        }
+        find(self.vectors, &mut self.finder, space, others, rt, &mut self.collector)?;
         self.put_back(unit)
     }
 
@@ -228,22 +226,40 @@ impl Worker<'_> {
     }
 }
 
-vectorized! {
-    fn so_many(
-        finder: &mut Finder,
-        space: &Space,
-        others: Option<Others<'_>>,
-        workers: &Workers<'_>,
-        collect: &mut SoMany,
-    ) -> Result<(), ConvertError> = Finder::find;
+/// Finds the surfaces with the instructions that the processor has.
+fn find(
+    vectors: Vectors,
+    finder: &mut Finder,
+    space: &Space,
+    others: Option<Others<'_>>,
+    workers: &Workers<'_>,
+    collector: &mut Collector,
+) -> Result<(), ConvertError> {
+    match (vectors, collector) {
+        (Vectors::Portable, Collector::SoMany(collect)) => finder.find(Portable, space, others, workers, collect),
+        (Vectors::Portable, Collector::AllWithin(collect)) => finder.find(Portable, space, others, workers, collect),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has these instructions, or there were no `detected`.
+        (Vectors::Avx2(detected), Collector::SoMany(collect)) => unsafe {
+            find_avx2(finder, Avx2::new(detected), space, others, workers, collect)
+        },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        (Vectors::Avx2(detected), Collector::AllWithin(collect)) => unsafe {
+            find_avx2(finder, Avx2::new(detected), space, others, workers, collect)
+        },
+    }
 }
 
-vectorized! {
-    fn all_within(
-        finder: &mut Finder,
-        space: &Space,
-        others: Option<Others<'_>>,
-        workers: &Workers<'_>,
-        collect: &mut AllWithin,
-    ) -> Result<(), ConvertError> = Finder::find;
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn find_avx2(
+    finder: &mut Finder,
+    lanes: Avx2,
+    space: &Space,
+    others: Option<Others<'_>>,
+    workers: &Workers<'_>,
+    collect: &mut impl Collect,
+) -> Result<(), ConvertError> {
+    finder.find(lanes, space, others, workers, collect)
 }

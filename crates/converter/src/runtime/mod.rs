@@ -4,6 +4,7 @@ mod budget;
 mod clock;
 pub(crate) mod disk;
 mod events;
+mod lanes;
 mod open_files;
 pub(crate) mod os_files;
 pub(crate) mod os_hints;
@@ -16,10 +17,11 @@ pub(crate) use clock::{Clock, PhaseTime};
 pub use disk::{Disk, DiskOperation, Replacing, SystemDisk};
 pub(crate) use disk::{DiskFile, Sequential, TempFiles};
 pub use events::{Events, Phase, Silent};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use lanes::Avx2;
+pub(crate) use lanes::{Compare, LANES, Portable};
 pub(crate) use open_files::most_open_files;
 pub(crate) use pool::{Consumer, Evict, Pool, Reservation};
-#[cfg(target_arch = "x86_64")]
-pub(crate) use vectors::Detected;
 pub(crate) use vectors::{Vectors, vectorized};
 pub(crate) use workers::Workers;
 

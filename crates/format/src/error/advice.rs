@@ -35,6 +35,8 @@ pub enum Advice {
     /// It takes more memory than there is or than it may take ([`crate::OpenOptions::description_bytes`],
     /// [`crate::potree2::Dataset::set_max_node_bytes`]).
     MoreMemory,
+    /// The camera of a depth map can be named ([`crate::OpenOptions::depth`]), in place of what its files say.
+    NameCamera,
     /// The coordinate reference system of the scan can be named, in place of what the file declares.
     NameCrs,
     /// Choose another coordinate reference system to reproject to, on the same datum, or reproject with other means.
@@ -71,6 +73,9 @@ impl fmt::Display for Advice {
                 write!(f, "if it was cut short or damaged, copy it again; supported are {kinds}")
             }
             Self::MoreMemory => f.write_str("let it take more memory"),
+            Self::NameCamera => f.write_str(
+                "describe the camera in a JSON file beside it, or name its intrinsics and the units of depth in a metre",
+            ),
             Self::NameCrs => f.write_str("name its coordinate reference system"),
             Self::OtherCrs => f.write_str(
                 "reproject to a system on the same datum and with the same heights, or reproject it elsewhere",

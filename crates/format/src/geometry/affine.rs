@@ -3,6 +3,8 @@
 use std::fmt;
 
 use super::Aabb;
+#[cfg(feature = "depth")]
+use super::Lattice;
 
 /// An affine map of world coordinates that can be undone: `out[i] = Σ linear[i][j] · in[j] + translation[i]`.
 ///
@@ -113,6 +115,16 @@ impl Affine {
     #[must_use]
     pub fn turn(&self, v: [f64; 3]) -> [f64; 3] {
         self.linear.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+    }
+
+    /// The first row that takes points where no coordinate can be ([`Lattice::is_sound_offset`]).
+    #[cfg(feature = "depth")]
+    pub(crate) fn misplaced_row(&self) -> Option<usize> {
+        let factors = Lattice::FINEST_STEP..=1.0 / Lattice::FINEST_STEP;
+        let largest = |row: &[f64; 3]| row.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
+        let is_sound =
+            |(row, offset): (&[f64; 3], f64)| factors.contains(&largest(row)) && Lattice::is_sound_offset(offset);
+        self.linear.iter().zip(self.translation).position(|row| !is_sound(row))
     }
 
     /// The linear part, by row.

@@ -23,7 +23,7 @@ pub fn scans_named<N: AsRef<str>>(names: &[N], choice: &str) -> Vec<usize> {
 }
 
 /// For each scan of a file whether it is read; without a choice all are.
-#[cfg(any(feature = "e57", feature = "text"))]
+#[cfg(any(feature = "depth", feature = "e57", feature = "text"))]
 pub(super) fn chosen(choices: Option<&[String]>, names: &[&str]) -> Vec<bool> {
     let Some(choices) = choices else { return vec![true; names.len()] };
     let mut is_chosen = vec![false; names.len()];

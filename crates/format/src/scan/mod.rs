@@ -6,6 +6,7 @@ mod chosen;
 mod dataset_note;
 mod decimal;
 mod decode;
+mod depth_options;
 mod image;
 mod info;
 mod mapped;
@@ -13,7 +14,7 @@ mod open;
 mod other_kind;
 #[cfg(feature = "text")]
 mod partial;
-#[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
+#[cfg(any(feature = "depth", feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
 #[cfg_attr(not(all(feature = "e57", feature = "las", feature = "text")), allow(dead_code))]
 mod quantities;
 #[cfg(any(feature = "e57", feature = "las", feature = "pcd", feature = "ply", feature = "text"))]
@@ -26,6 +27,8 @@ mod warning;
 #[cfg_attr(not(all(feature = "pcd", feature = "ply", feature = "text")), allow(dead_code, unused_imports))]
 mod tabular;
 
+#[cfg(feature = "depth")]
+pub mod depth;
 #[cfg(feature = "e57")]
 pub mod e57;
 #[cfg(feature = "las")]
@@ -43,6 +46,7 @@ pub use dataset_note::DatasetNote;
 pub use decimal::Decimal;
 pub use decode::{MAX_BATCH_BYTES, MAX_BATCH_POINTS, Scan, Scratch, Sink};
 pub(crate) use decode::{batch_bytes, batch_points, fitting_batch, point_bytes, resize};
+pub use depth_options::{DepthFilter, DepthOptions, Intrinsics};
 pub use image::{Blob, ImageEncoding, ImageGeometry, ImageKind, ImagePose, ScanImage};
 pub use info::{Crs, Piece, Resolution, ScanInfo, ScanPart};
 pub(crate) use mapped::mapped;

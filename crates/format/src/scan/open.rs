@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::archive::archive;
 use super::mapped::ScanMaps;
 use super::other_kind::OtherKind;
-use crate::{Advice, Decimal, Fault, ReadError, Scan, UnknownName};
+use crate::{Advice, Decimal, DepthOptions, Fault, ReadError, Scan, UnknownName};
 
 /// Maximum bytes from the start of a file to detect its kind; text needs some lines.
 const SNIFF_BYTES: u64 = 4 << 10;
@@ -34,6 +34,9 @@ pub enum ScanKind {
     /// Lines of numbers.
     #[cfg(feature = "text")]
     Text(crate::scan::text::TextKind),
+    /// Depth maps: PNG pictures of 16-bit grey, and folders of them with a trajectory.
+    #[cfg(feature = "depth")]
+    Depth,
 }
 
 /// What a file does not say of itself, for the kinds that need it, and what becomes of its points.
@@ -55,7 +58,7 @@ pub struct OpenOptions {
     pub decimal: Decimal,
     /// E57: keep `rowIndex` and `columnIndex`, the place of a point in the scanner's grid, as attributes.
     pub keep_row_column: bool,
-    /// E57, PTX: the scans within a file that are read, each by name or number ([`crate::scans_named`]); `None`: all.
+    /// E57, PTX, folders of depth maps: the scans within a file that are read, each by name or number ([`crate::scans_named`]); `None`: all.
     /// Files of other kinds have no scans within them and are read whole.
     pub scans: Option<Vec<String>>,
     /// Bytes of memory that the description of a file's scans may take while it is opened (the XML section of E57);
@@ -67,6 +70,8 @@ pub struct OpenOptions {
     /// Octrees: levels whose points are closer to each other than this are not read, but for the root; world units. Leaves
     /// hold whatever points remain, at any distance. What has no levels is refused.
     pub min_spacing: Option<f64>,
+    /// Depth maps: what their files do not say, filters and normals.
+    pub depth: DepthOptions,
     /// What becomes of the points; `None`: they stay where they are.
     pub maps: Option<Arc<dyn ScanMaps>>,
 }
@@ -128,6 +133,13 @@ impl OpenOptions {
         self
     }
 
+    /// Sets [`Self::depth`].
+    #[must_use]
+    pub fn depth(mut self, depth: DepthOptions) -> Self {
+        self.depth = depth;
+        self
+    }
+
     /// True if some levels of an octree are chosen.
     pub(crate) const fn has_levels(&self) -> bool {
         self.max_level.is_some() || self.min_spacing.is_some()
@@ -160,6 +172,10 @@ impl ScanKind {
         Self::Text(crate::scan::text::TextKind::Ptx),
         #[cfg(feature = "text")]
         Self::Text(crate::scan::text::TextKind::Off),
+        #[cfg(feature = "text")]
+        Self::Text(crate::scan::text::TextKind::Obj),
+        #[cfg(feature = "depth")]
+        Self::Depth,
     ];
 
     /// The kind of a file that starts with these bytes (give some kB, or the whole file if it is shorter).
@@ -182,6 +198,10 @@ impl ScanKind {
         if crate::scan::pcd::is_pcd(first_bytes) {
             return Some(Self::Pcd);
         }
+        #[cfg(feature = "depth")]
+        if crate::scan::depth::is_depth(first_bytes) {
+            return Some(Self::Depth);
+        }
         // last: a binary file may hold lines of numbers, too
         #[cfg(feature = "text")]
         if let Some(kind) = crate::scan::text::kind(first_bytes).filter(|_| OtherKind::of(first_bytes).is_none()) {
@@ -190,11 +210,15 @@ impl ScanKind {
         None
     }
 
-    /// The kind of the file at `path`, by its content.
+    /// The kind of the file at `path`, by its content, or of a folder that is one scan (depth maps).
     ///
     /// # Errors
-    /// The operating system cannot read it. A pipe or a folder is of no kind and is not read.
+    /// The operating system cannot read it. A pipe or another folder is of no kind and is not read.
     pub fn of_file(path: impl AsRef<Path>) -> Result<Option<Self>, ReadError> {
+        #[cfg(feature = "depth")]
+        if crate::scan::depth::is_sequence(path.as_ref()) {
+            return Ok(Some(Self::Depth));
+        }
         Ok(Self::of(&first_bytes(path.as_ref())?))
     }
 
@@ -215,7 +239,10 @@ impl ScanKind {
                 crate::scan::text::TextKind::Pts => "PTS",
                 crate::scan::text::TextKind::Ptx => "PTX",
                 crate::scan::text::TextKind::Off => "OFF",
+                crate::scan::text::TextKind::Obj => "OBJ",
             },
+            #[cfg(feature = "depth")]
+            Self::Depth => "depth map",
         }
     }
 }
@@ -247,7 +274,8 @@ pub fn supported_scans() -> String {
         (cfg!(feature = "e57"), "E57"),
         (cfg!(feature = "ply"), "PLY"),
         (cfg!(feature = "pcd"), "PCD"),
-        (cfg!(feature = "text"), "text (XYZ, CSV, PTS, PTX, OFF)"),
+        (cfg!(feature = "text"), "text (XYZ, CSV, PTS, PTX, OFF, OBJ)"),
+        (cfg!(feature = "depth"), "depth maps (PNG)"),
     ];
     let read: Vec<&str> = kinds.into_iter().filter(|(on, _)| *on).map(|(_, name)| name).collect();
     read.join(", ")
@@ -260,6 +288,10 @@ pub fn supported_scans() -> String {
 /// A file that is empty, or of no kind that is read here, and those of the reader of its kind.
 #[allow(unused_variables)] // some kinds have no options, and a build may have no kinds
 pub(crate) fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Scan>, ReadError> {
+    #[cfg(feature = "depth")]
+    if crate::scan::depth::is_sequence(path) {
+        return crate::scan::depth::open(path, &options.depth, options.scans.as_deref());
+    }
     let first = first_bytes(path)?;
     let kind = match ScanKind::of(&first) {
         Some(kind) => kind,
@@ -273,7 +305,7 @@ pub(crate) fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Sc
         None if first.is_empty() && fs::metadata(path).is_ok_and(|m| m.is_file()) => {
             return Err(ReadError::broken(path, 0, Fault::Empty).advise("copy it again, or leave it out"));
         }
-        None => return Err(unknown(path, &first)),
+        None => return Err(unknown(path, &first, options)),
     };
     match kind {
         #[cfg(feature = "las")]
@@ -297,6 +329,8 @@ pub(crate) fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Sc
             let scan = crate::scan::text::open(path, &crate::scan::text::TextOptions { columns, separator, decimal })?;
             Ok(super::partial::choose(scan, choices))
         }
+        #[cfg(feature = "depth")]
+        ScanKind::Depth => crate::scan::depth::open(path, &options.depth, options.scans.as_deref()),
     }
 }
 
@@ -307,13 +341,18 @@ fn is_ending_of_scans(extension: &str) -> bool {
         (cfg!(feature = "e57"), &["e57"]),
         (cfg!(feature = "ply"), &["ply"]),
         (cfg!(feature = "pcd"), &["pcd"]),
-        (cfg!(feature = "text"), &["pts", "ptx", "off", "xyz", "asc", "csv"]),
+        (cfg!(feature = "text"), &["pts", "ptx", "off", "obj", "xyz", "asc", "csv"]),
     ];
     endings.iter().any(|(is_read, names)| *is_read && names.contains(&extension))
 }
 
 /// Why a file of no kind is refused: as no scan at all, or as one of which too little is left.
-fn unknown(path: &Path, first: &[u8]) -> ReadError {
+#[allow(unused_variables)] // only depth maps have such options
+fn unknown(path: &Path, first: &[u8], options: &OpenOptions) -> ReadError {
+    #[cfg(feature = "depth")]
+    if let Some(error) = crate::scan::depth::not_depth(path, first).filter(|_| is_camera_given(path, options)) {
+        return error;
+    }
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     let supported = Advice::Supported(supported_scans());
     if let Some(what) = archive(first) {
@@ -335,6 +374,12 @@ fn unknown(path: &Path, first: &[u8]) -> ReadError {
         }
         None => ReadError::unsupported(path, Fault::UnknownFormat { extension: None }).advise(supported),
     }
+}
+
+/// True if a picture was to be a depth map: a camera was described for it.
+#[cfg(feature = "depth")]
+fn is_camera_given(path: &Path, options: &OpenOptions) -> bool {
+    options.depth.intrinsics.is_some() || crate::scan::depth::is_described(path)
 }
 
 /// True if text begins with digits, as the rows of a scan do.

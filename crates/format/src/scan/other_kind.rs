@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+#[cfg(feature = "depth")]
+use crate::scan::depth::is_depth;
+
 /// What a file is that may be taken for a scan by its rows of numbers or by its extension, and is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -14,14 +17,30 @@ pub enum OtherKind {
     SurferGrid,
     /// Netpbm image.
     Netpbm,
+    /// PNG picture that is no depth map.
+    Png,
+    /// JPEG picture.
+    Jpeg,
     /// Log ASCII Standard: measurements in a borehole, `.las` as lidar.
     WellLog,
+}
+
+/// First bytes of pictures.
+const PICTURES: [(&[u8], OtherKind); 2] = [(b"\x89PNG\r\n\x1a\n", OtherKind::Png), (b"\xff\xd8\xff", OtherKind::Jpeg)];
+
+/// Without their reader they are pictures like others.
+#[cfg(not(feature = "depth"))]
+const fn is_depth(_: &[u8]) -> bool {
+    false
 }
 
 impl OtherKind {
     /// What a file is that starts with these bytes (give some kB); `None`: nothing that is known here.
     #[must_use]
     pub fn of(first_bytes: &[u8]) -> Option<Self> {
+        if let Some((_, picture)) = PICTURES.iter().find(|(start, _)| first_bytes.starts_with(start)) {
+            return (!is_depth(first_bytes)).then_some(*picture);
+        }
         let lines: Vec<Vec<u8>> = first_bytes
             .split(|b| matches!(b, b'\n' | b'\r'))
             .map(|line| line.trim_ascii().to_ascii_lowercase())
@@ -58,6 +77,8 @@ impl fmt::Display for OtherKind {
             Self::GrassGrid => "a GRASS ASCII grid, a raster",
             Self::SurferGrid => "a Surfer grid, a raster",
             Self::Netpbm => "a Netpbm image, a raster",
+            Self::Png => "a PNG picture, and no depth map (16-bit grey)",
+            Self::Jpeg => "a JPEG picture",
             Self::WellLog => "a well log (Log ASCII Standard)",
         })
     }
@@ -77,6 +98,8 @@ mod tests {
             (b"DSAA\n3 2\n0 1\n", Some(OtherKind::SurferGrid)),
             (b"P2\n4 6\n255\n1 2 3 4\n", Some(OtherKind::Netpbm)),
             (b"# made by\n~Version Information\n VERS. 2.0\n", Some(OtherKind::WellLog)),
+            (b"\xff\xd8\xff\xe0 ....JFIF", Some(OtherKind::Jpeg)),
+            (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x02\0\0\0\x02\x08\x02\0\0\0", Some(OtherKind::Png)),
             (b"ncols nrows z\n1 2 3\n", None),
             (b"P21 2 3\n", None),
             (b"1 2 3\n", None),

@@ -155,6 +155,12 @@ pub enum ScanWarning {
     NoneChosen { scans: usize },
     /// E57: the file has no scans.
     NoScans,
+    /// Depth maps: frames that cannot be read or have no pose; what is wrong with the first of them.
+    FramesUnreadable { frames: usize, of: usize, first: String },
+    /// Depth maps: frames in which no pixel has a depth.
+    FramesEmpty { frames: usize, of: usize },
+    /// Depth maps: frames without a colour picture, whose colours are 0.
+    FramesColourless { frames: usize, of: usize },
     /// What a dataset, read as a scan, does not say or have.
     Dataset(DatasetNote),
     /// Anything else, as text.
@@ -262,6 +268,13 @@ impl ScanWarning {
                     .to_owned()
             }
             Self::PlyVersion { version } => format!("the format version {version:?} is read as 1.0"),
+            Self::FramesUnreadable { frames, of, first } => {
+                format!("{frames} of {of} depth maps cannot be read, the first: {first}")
+            }
+            Self::FramesEmpty { frames, of } => format!("{frames} of {of} depth maps have no depth"),
+            Self::FramesColourless { frames, of } => {
+                format!("{frames} of {of} depth maps have no colour picture; their colours are 0")
+            }
             Self::Dataset(note) => note.to_string(),
             Self::Other(text) => text.clone(),
             las_or_e57 => las_or_e57.las_line().unwrap_or_else(|| las_or_e57.e57_line()),

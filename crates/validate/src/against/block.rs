@@ -239,7 +239,20 @@ macro_rules! bits {
 }
 bits!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
-/// The number that `word` stands for.
+/// The number that `word`, the bits of a value of the type, stands for; of 64-bit integers the nearest double.
+pub(crate) fn number(word: u64, ty: AttributeType) -> f64 {
+    match ty {
+        AttributeType::Int8 => f64::from(word as i8),
+        AttributeType::Int16 => f64::from(word as i16),
+        AttributeType::Int32 => f64::from(word as i32),
+        AttributeType::Int64 => word as i64 as f64,
+        AttributeType::UInt8 | AttributeType::UInt16 | AttributeType::UInt32 | AttributeType::UInt64 => word as f64,
+        AttributeType::Float32 => f64::from(f32::from_bits(word as u32)),
+        AttributeType::Float64 => f64::from_bits(word),
+    }
+}
+
+/// The number that `word` stands for, for people.
 pub(crate) fn value(word: u64, ty: AttributeType) -> serde_json::Value {
     if ty.size() < 8 && word & UNFIT != 0 {
         return format!("a value that {ty} does not hold").into();

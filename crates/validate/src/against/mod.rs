@@ -107,8 +107,16 @@ impl Against {
             points_found: found.count,
             sum_expected: format!("{:032x}", expected.hash),
             sum_found: format!("{:032x}", found.hash),
-            attributes_not_in_dataset: self.sources.not_in_dataset(),
+            attributes_not_in_dataset: self.not_in_dataset(),
         })
+    }
+
+    /// Names of columns of the scans that the dataset does not have, sorted.
+    fn not_in_dataset(&self) -> Vec<String> {
+        let is_derived = |name: &String| self.sums.rules.derived.contains(&name.as_str());
+        let mut names = self.sources.not_in_dataset();
+        names.retain(|name| !is_derived(name));
+        names
     }
 
     /// One pass over the sources: sums by file, for every colour and position rule in question.

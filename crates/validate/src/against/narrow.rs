@@ -216,6 +216,7 @@ impl Pass<'_> {
             (0..block.len()).filter(|i| block.keep[*i]).for_each(|i| work(0, block, i, None));
         })?;
         self.context.records.each_block(rules, &|block, place| {
+            rules.mask(block);
             block.start_hashes(&rules.attributes, None);
             (0..block.len()).for_each(|i| work(1, block, i, Some(place)));
         })

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use pointmill_format::{Aabb, Attribute, AxisGrid, Lattice};
 use serde_json::Value;
 
+use super::block::Block;
 use super::follows::Follows;
 
 /// Meaning of 16-bit colours of the sources.
@@ -60,7 +61,7 @@ pub(crate) enum Conversion {
     WholeClass,
     /// An angle in the steps of LAS formats 6 to 10, 0.006 degrees: the nearest to what is meant.
     FineAngle,
-    /// Values of a field that every record has are not those of the sources: they are not compared.
+    /// Values are not those of the sources, but computed, or of a field that every record has: they are not compared.
     NotWritten,
     /// The grey of an integer among values from the first to the second number:
     /// ((v − lo) · 255 + (hi − lo) / 2) / (hi − lo), and 255 if they are the same.
@@ -108,6 +109,8 @@ pub(crate) struct Rules {
     pub(crate) constants: Vec<(String, Vec<f64>)>,
     /// Those that were not written because they follow from others.
     pub(crate) follows: Vec<Follows>,
+    /// Attributes that the conversion has computed; see [`Self::set_apart`].
+    pub(super) derived: Vec<&'static str>,
 }
 
 impl Rules {
@@ -148,7 +151,27 @@ impl Rules {
             foreign: own.is_null(),
             constants: constants(&own["attributesDropped"]),
             follows: Follows::list(&own["attributesOmitted"]),
+            derived: Vec::new(),
         }
+    }
+
+    /// Compares none of these attributes, which the conversion has computed, with the sources.
+    pub(crate) fn set_apart(&mut self, derived: Vec<&'static str>) {
+        let is_derived = |name: &str| derived.contains(&name);
+        for (attribute, conversion) in self.attributes.iter().zip(&mut self.conversions) {
+            if is_derived(&attribute.name) {
+                *conversion = Conversion::NotWritten;
+            }
+        }
+        self.constants.retain(|(name, _)| !is_derived(name));
+        self.follows.retain(|rule| !is_derived(&rule.name));
+        self.derived = derived;
+    }
+
+    /// Makes words of records of the dataset 0 that are not compared, as they are of those of the sources.
+    pub(super) fn mask(&self, block: &mut Block) {
+        let words = block.words.iter_mut().zip(&self.conversions);
+        words.filter(|(_, c)| **c == Conversion::NotWritten).for_each(|(words, _)| words.fill(0));
     }
 
     /// World coordinates of a record of a block.

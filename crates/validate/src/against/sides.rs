@@ -91,6 +91,7 @@ impl Sums {
         let mut block = self.blocks.lock().map_or(None, |mut b| b.pop()).unwrap_or_default();
         let mut sum = Sum::default();
         fill(&mut block, &mut |block| {
+            self.rules.mask(block);
             block.start_hashes(&self.rules.attributes, self.rules.rgb);
             for i in 0..block.len() {
                 let hash = block.hash(i, rgb_of(block, &self.rules, i), block.position(i));
@@ -156,6 +157,11 @@ impl Against {
             sums: Sums { rules, total: Mutex::default(), blocks: Mutex::default() },
             measured: Mutex::default(),
         })
+    }
+
+    /// True if a scan has the attribute `name`, which is one of those that the conversion has computed.
+    pub(crate) fn have_derived(&self, name: &str) -> bool {
+        self.sources.not_in_dataset().iter().any(|n| n == name)
     }
 
     /// Integer positions of all points of the sources that take part, in any order; `None` if that is not `count`.

@@ -42,13 +42,14 @@ use pointmill_format::{DatasetKind, ReadError};
 use serde_json::json;
 
 use crate::accuracy::{self, Known};
-use crate::against::{Against, Context};
+use crate::against::{Against, Context, Rules};
 use crate::check::Check;
 use crate::finding::{Finding, Findings};
 use crate::memory::{self, Budget};
 use crate::options::{Options, ProgressFn};
-use crate::outcome::{AgainstSummary, Outcome};
+use crate::outcome::{AgainstSummary, Outcome, SurfelSummary};
 use crate::report;
+use crate::surfels::{self, Derived};
 use batch_records::Box32;
 use bytes::Bytes;
 use description::{Colour, Description};
@@ -88,9 +89,13 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         false => None,
     };
     let determined = lattice_is_determined(&header, &description, &boxes, &findings);
+    let report = report::find(path, &findings)?;
+    let derived = Derived::of(report.as_ref(), &findings);
+    let mut rules = records::rules(&header, &description);
+    rules.set_apart(Derived::names_of(derived.as_ref()));
     let mut against = match options.against.as_slice() {
         [] => None,
-        paths => Some(Against::open(paths, &options.open, records::rules(&header, &description))?),
+        paths => Some(Against::open(paths, &options.open, rules.clone())?),
     };
     let mut known = None;
     let mut unknown = None;
@@ -130,6 +135,10 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
             None
         }
     };
+    let surfels = match &derived {
+        Some(derived) => derived_attributes(&task, derived, (&rules, against.as_ref()), &walked, &budget)?,
+        None => None,
+    };
     let is_measured = walked.unreadable == 0 && walked.uncertain == 0 && walked.foreign == 0;
     let known = Known {
         points: header.points,
@@ -138,10 +147,11 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
         format: is_measured.then_some(walked.errors.side),
     };
-    let report = report::check(path, (header.points, header.batches), &findings)?;
+    report::check(report.as_ref(), (header.points, header.batches), &findings);
     let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     let mut outcome = finish(findings, Some(&header));
     outcome.against = summary;
+    outcome.surfels = surfels;
     outcome.accuracy = accuracy;
     Ok(outcome)
 }
@@ -266,6 +276,35 @@ fn compare(
         findings.note(Check::Against, format!("counts and attributes, without {}", parts.join(" and ")));
     }
     Ok(Some(summary))
+}
+
+/// Attributes that the conversion has computed.
+fn derived_attributes(
+    task: &Task<'_>,
+    derived: &Derived,
+    (rules, against): (&Rules, Option<&Against>),
+    walked: &Walked,
+    budget: &Budget,
+) -> Result<Option<SurfelSummary>, ReadError> {
+    let mut budget = budget.clone();
+    budget.take(task::window_bytes(task.header, task.columns, task.window))?;
+    let open = walked.uncertain + walked.foreign;
+    let check = surfels::Task {
+        derived,
+        rules,
+        points: task.header.points,
+        unread: (walked.unreadable > 0).then(|| "not all batches could be read".into()),
+        uncertain: (open > 0).then(|| "the planes leave a choice of positions".into()),
+        is_octahedral: false,
+        against,
+        threads: rayon::current_num_threads(),
+    };
+    check.check(&Context {
+        records: &Records { task },
+        findings: task.findings,
+        progress: task.progress,
+        budget: &budget,
+    })
 }
 
 /// The account of a validation that ended early: only `done` was looked at.

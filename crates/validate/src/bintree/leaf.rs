@@ -4,14 +4,13 @@ use std::ops::Range;
 
 use pointmill_format::bintree::{CORE_BYTES, Header, RecordLayout};
 use pointmill_format::{Aabb, AttributeType, Lattice};
-use serde_json::Value;
 
 use super::precision;
 use super::summary::Summary;
 use super::tree::{AXES, compare_boxes};
 use crate::accuracy::Deviation;
 use crate::check::Check;
-use crate::finding::{Finding, Findings};
+use crate::finding::{Faults, Finding, Findings};
 use crate::place::Place;
 
 /// The points of a leaf, taken apart; reused from leaf to leaf.
@@ -47,26 +46,6 @@ pub(super) struct Leaf<'a> {
     pub(super) center: [f64; 3],
     pub(super) header: &'a Header,
     pub(super) findings: &'a Findings,
-}
-
-/// Counts faults of one kind and remembers the first.
-#[derive(Default)]
-struct Faults {
-    count: u64,
-    first: Option<(Value, Value)>,
-}
-
-impl Faults {
-    fn add(&mut self, expected: impl Into<Value>, found: impl Into<Value>) {
-        self.count += 1;
-        self.first.get_or_insert_with(|| (expected.into(), found.into()));
-    }
-
-    fn report(self, check: Check, subject: impl Into<std::borrow::Cow<'static, str>>, leaf: &Leaf<'_>) {
-        if let Some((expected, found)) = self.first {
-            leaf.findings.push(Finding::new(check, subject, expected, found).at(leaf.place).points(self.count));
-        }
-    }
 }
 
 impl Points {
@@ -149,9 +128,9 @@ impl Leaf<'_> {
             }
         }
         self.findings.checked(Check::Values, points.len() as u64);
-        classes.report(Check::Values, "classification", self);
-        alphas.report(Check::Values, "alpha of rgba", self);
-        colours.report(Check::Values, "rgba beside rgb", self);
+        classes.report(Check::Values, "classification", self.place, self.findings);
+        alphas.report(Check::Values, "alpha of rgba", self.place, self.findings);
+        colours.report(Check::Values, "rgba beside rgb", self.place, self.findings);
     }
 
     /// Bytes that belong to no column are zero.
@@ -164,7 +143,7 @@ impl Leaf<'_> {
                 faults.add(0, format!("{} at byte {at} of the record", record[at]));
             }
         }
-        faults.report(Check::Padding, "padding", self);
+        faults.report(Check::Padding, "padding", self.place, self.findings);
     }
 
     /// Every decoded position is next to a lattice point, and its offset the best one there is. `None` if the lattice is
@@ -183,9 +162,9 @@ impl Leaf<'_> {
             for d in points.offsets[axis].iter().filter(|d| !d.is_finite()) {
                 not_finite.add("a finite number", d.to_string());
             }
-            if not_finite.count > 0 || bound >= scale / 2.0 {
+            if !not_finite.is_empty() || bound >= scale / 2.0 {
                 exactness.certain = false;
-                not_finite.report(Check::Positions, format!("offset of {name}"), self);
+                not_finite.report(Check::Positions, format!("offset of {name}"), self.place, self.findings);
                 continue;
             }
             let (mut far, mut inexact) = (Faults::default(), Faults::default());
@@ -201,8 +180,8 @@ impl Leaf<'_> {
                 }
             }
             exactness.bound = exactness.bound.max(bound);
-            far.report(Check::Positions, name, self);
-            inexact.report(Check::Positions, format!("offset of {name}"), self);
+            far.report(Check::Positions, name, self.place, self.findings);
+            inexact.report(Check::Positions, format!("offset of {name}"), self.place, self.findings);
         }
         if exactness.certain {
             for i in 0..points.len() {
@@ -248,8 +227,8 @@ impl Leaf<'_> {
                 }
             }
         }
-        places.report(Check::LeafOrder, "Morton order", self);
-        ties.report(Check::LeafOrder, "bytes of points of one place", self);
+        places.report(Check::LeafOrder, "Morton order", self.place, self.findings);
+        ties.report(Check::LeafOrder, "bytes of points of one place", self.place, self.findings);
     }
 }
 

@@ -39,6 +39,7 @@ use crate::memory::{Budget, on_threads};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::{AgainstSummary, Outcome};
 use crate::report;
+use crate::surfels::{self, Derived};
 use lenient::Lenient;
 use records::Records;
 use routes::Routes;
@@ -68,9 +69,13 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     tree.check_capacity(&findings);
     tree.check_unions(&findings);
     let readable = files::check(folder, &tree, &findings)?;
+    let report = report::find(folder, &findings)?;
+    let derived = Derived::of(report.as_ref(), &findings);
+    let mut rules = records::rules(&tree);
+    rules.set_apart(Derived::names_of(derived.as_ref()));
     let against = match options.against.as_slice() {
         [] => None,
-        paths => Some(Against::open(paths, &options.open, records::rules(&tree))?),
+        paths => Some(Against::open(paths, &options.open, rules.clone())?),
     };
     let sums = against.as_ref().map(|a| &a.sums);
     let scan = Scan { tree: &tree, readable: &readable, lattice_known, sums, findings: &findings, progress };
@@ -85,8 +90,25 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let records = Records { tree: &tree, readable: &readable };
     let context = Context { records: &records, findings: &findings, progress, budget: &budget };
     let summary = compare(against.as_ref(), &tree, &unknown, &context)?;
-
     let header = dataset.header();
+    // integers of the lattice, whatever is compared with the sources
+    rules.stored = None;
+    let surfels = match &derived {
+        Some(derived) => surfels::Task {
+            derived,
+            rules: &rules,
+            points: header.points,
+            unread: (unknown.unread > 0 || findings.found(Check::LeafFiles) > 0)
+                .then(|| "not all leaves could be read".into()),
+            uncertain: unknown.integers(),
+            is_octahedral: false,
+            against: against.as_ref(),
+            threads,
+        }
+        .check(&context)?,
+        None => None,
+    };
+
     let measured = against.as_ref().and_then(Against::measured);
     let is_certain = unknown.integers().is_none() && unknown.unread == 0;
     let certain = is_certain.then_some(Side { deviation, lost: 0, merged: Some(0) });
@@ -97,7 +119,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         lattice: measured.map(|m| m.lattice),
         format: certain.or(measured.and_then(|m| m.format)),
     };
-    let report = report::check(folder, (header.points, dataset.nodes().len() as u64), &findings)?;
+    report::check(report.as_ref(), (header.points, dataset.nodes().len() as u64), &findings);
     let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     Ok(Outcome {
         encoding: Some(header.layout.name()),
@@ -105,6 +127,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         nodes: dataset.nodes().len() as u64,
         leaves: Some(quality),
         against: summary,
+        surfels,
         accuracy,
         ..Outcome::new(findings)
     })

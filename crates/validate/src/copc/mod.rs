@@ -46,6 +46,7 @@ use crate::octree::tree::{NODE_BYTES, Tree};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::{AgainstSummary, Outcome};
 use crate::report;
+use crate::surfels::{self, Derived};
 use feed::Records;
 use front::Front;
 use nodes::Nodes;
@@ -75,7 +76,13 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
     };
     let Some(info) = info else { return Ok(unusable(findings, None)) };
     let own = front.own();
-    let against = open_sources(&dataset, options, &own)?;
+    let report = report::find(path, &findings)?;
+    let derived = Derived::of(report.as_ref(), &findings);
+    let rules = rules(&dataset, &own, derived.as_ref());
+    let against = match options.against.as_slice() {
+        [] => None,
+        paths => Some(Against::open(paths, &options.open, rules.clone())?),
+    };
 
     let mut tree = Pages::new(path, &front, &budget, &findings).walk(&info)?;
     budget.take(tree.nodes.len() as u64 * NODE_BYTES)?;
@@ -123,9 +130,24 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
     let judged = Judged { front: &front, info: &info, geometry: &stored, attributes, is_complete, findings: &findings };
     judged.hold(&seen);
     let records = Records { dataset: &dataset, tree: &tree };
-    let summary = compare(against.as_ref(), &records, &findings, (progress, &budget))?;
+    let context = Context { records: &records, findings: &findings, progress, budget: &budget };
+    let summary = compare(against.as_ref(), &context)?;
 
     let points = tree.nodes.iter().map(|n| u64::from(n.record.points)).sum();
+    let surfels = match &derived {
+        Some(derived) => surfels::Task {
+            derived,
+            rules: &rules,
+            points,
+            unread: (!is_complete).then(|| "not all nodes could be read".into()),
+            uncertain: None,
+            is_octahedral: false,
+            against: against.as_ref(),
+            threads: walked.threads,
+        }
+        .check(&context)?,
+        None => None,
+    };
     let known = Known {
         points,
         projection: dataset.crs().wkt.as_deref().unwrap_or_default(),
@@ -133,7 +155,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
         format: is_complete.then_some(Side { deviation, lost: 0, merged: Some(0) }),
     };
-    let report = report::check(path, (points, tree.nodes.len() as u64), &findings)?;
+    report::check(report.as_ref(), (points, tree.nodes.len() as u64), &findings);
     let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     Ok(Outcome {
         encoding: Some("laz"),
@@ -142,6 +164,7 @@ pub(crate) fn run(path: &Path, options: &Options, progress: &ProgressFn<'_>) -> 
         quality,
         first_view: first_view::measure(&tree, front.points_start(), cube_over_extent(&front, &info)),
         against: summary,
+        surfels,
         accuracy,
         ..Outcome::new(findings)
     })
@@ -160,10 +183,8 @@ fn unusable(findings: Findings, error: Option<&ReadError>) -> Outcome {
     Outcome::new(findings)
 }
 
-fn open_sources(dataset: &Dataset, options: &Options, own: &Value) -> Result<Option<Against>, ReadError> {
-    if options.against.is_empty() {
-        return Ok(None);
-    }
+/// What records of the file have, and what is compared with the sources.
+fn rules(dataset: &Dataset, own: &Value, derived: Option<&Derived>) -> Rules {
     let mut rules = Rules::new(dataset.info().attributes.clone(), dataset.lattice(), own);
     // every record has all fields of its point format, whatever the sources have
     let written = own["attributes"].as_array();
@@ -176,20 +197,16 @@ fn open_sources(dataset: &Dataset, options: &Options, own: &Value) -> Result<Opt
             *conversion = Conversion::FineAngle;
         }
     }
-    Against::open(&options.against, &options.open, rules).map(Some)
+    rules.set_apart(Derived::names_of(derived));
+    rules
 }
 
-fn compare(
-    against: Option<&Against>,
-    records: &Records<'_>,
-    findings: &Findings,
-    (progress, budget): (&ProgressFn<'_>, &Budget),
-) -> Result<Option<AgainstSummary>, ReadError> {
+fn compare(against: Option<&Against>, context: &Context<'_>) -> Result<Option<AgainstSummary>, ReadError> {
     let Some(against) = against else {
-        findings.skip(Check::Against, "no sources were given");
+        context.findings.skip(Check::Against, "no sources were given");
         return Ok(None);
     };
-    against.compare(&Context { records, findings, progress, budget }).map(Some)
+    against.compare(context).map(Some)
 }
 
 /// The points of all nodes against the header.

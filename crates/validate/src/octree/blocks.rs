@@ -3,7 +3,6 @@
 use pointmill_format::NodePoints;
 
 use crate::against::block::{BLOCK_POINTS, Block, append_words};
-use crate::against::rules::Conversion;
 use crate::against::{Rules, Sink};
 
 /// Hands over a node's records in blocks.
@@ -16,8 +15,7 @@ pub(crate) fn fill_blocks(points: &NodePoints, rules: &Rules, block: &mut Block,
             to.extend(from[start..start + n].iter().map(|v| i64::from(*v)));
         }
         for (i, attribute) in rules.attributes.iter().enumerate() {
-            let is_written = rules.conversions.get(i) != Some(&Conversion::NotWritten);
-            let column = points.columns().get(i).filter(|_| is_written).map(|c| (c, attribute.elements));
+            let column = points.columns().get(i).map(|c| (c, attribute.elements));
             append_words(column, start, n, attribute, &mut block.words[i]);
         }
         sink(block);

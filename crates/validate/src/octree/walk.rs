@@ -60,6 +60,8 @@ pub(crate) struct Walked {
     pub(crate) tallies: Vec<Tally>,
     /// Nodes whose points could not be read.
     pub(crate) unreadable: u64,
+    /// Threads that had room to read nodes.
+    pub(crate) threads: usize,
 }
 
 /// Visits every node.
@@ -95,7 +97,11 @@ pub(crate) fn walk(task: &Task<'_>) -> Result<Walked, ReadError> {
         Sampling::Unknown => walk.pairs,
     };
     task.findings.absorb(Check::Spacing, &kept);
-    Ok(Walked { tallies: walk.tallies, unreadable: walk.unreadable.into_inner() })
+    Ok(Walked {
+        tallies: walk.tallies,
+        unreadable: walk.unreadable.into_inner(),
+        threads: rayon::current_num_threads(),
+    })
 }
 
 struct Walk<'a> {

@@ -42,11 +42,12 @@ use crate::octree::tree::{NODE_BYTES, Tree};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::Outcome;
 use crate::report;
+use crate::surfels::{self, Derived};
 use expect::Names;
 use files::Files;
 use index::Index;
 use nodes::Nodes;
-use records::Records;
+use records::{Normals, Records};
 use steps::Steps;
 use store::Store;
 
@@ -72,7 +73,10 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let own = dataset.metadata().extra.get("pointmill").cloned().unwrap_or(Value::Null);
     let steps = steps_of(dataset.metadata(), &own);
     let geometry = steps.geometry(dataset.metadata().spacing);
-    let (rules, columns) = records::rules(&dataset, &dataset.info().attributes, &steps, &own);
+    let report = report::find(folder, &findings)?;
+    let derived = Derived::of(report.as_ref(), &findings);
+    let (mut rules, columns) = records::rules(&dataset, &steps, &own, Normals::IfExact);
+    rules.set_apart(Derived::names_of(derived.as_ref()));
     let against = match options.against.as_slice() {
         [] => None,
         paths => Some(Against::open(paths, &options.open, rules)?),
@@ -112,10 +116,10 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     if metadata.files != NodeFiles::Bin {
         findings.skip(Check::Coordinates, "LAS files have coordinates of their own");
     }
+    let (dataset, tree, steps) = (&dataset, &tree, &steps);
     let summary = match &against {
         Some(against) => {
-            let (dataset, tree, steps, columns) = (&dataset, &tree, &steps, &columns);
-            let records = &Records { dataset, tree, steps, columns };
+            let records = &Records { dataset, tree, steps, columns: &columns };
             let summary = against.compare(&Context { records, findings: &findings, progress, budget: &budget })?;
             if !steps.is_stated() {
                 let why = "positions are not compared: cloud.js does not state the lattice of the run";
@@ -130,6 +134,24 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     };
 
     let points = tree.nodes.iter().map(|n| u64::from(n.record.points)).sum();
+    let surfels = match &derived {
+        Some(derived) => {
+            let (rules, columns) = records::rules(dataset, steps, &own, Normals::Always);
+            let task = surfels::Task {
+                derived,
+                rules: &rules,
+                points,
+                unread: (!is_complete).then(|| "not all nodes could be read".into()),
+                uncertain: (!steps.is_stated()).then(|| "cloud.js does not state the lattice of the run".into()),
+                is_octahedral: metadata.files == NodeFiles::Bin && !records::has_floats(dataset),
+                against: against.as_ref(),
+                threads: walked.threads,
+            };
+            let records = &Records { dataset, tree, steps, columns: &columns };
+            task.check(&Context { records, findings: &findings, progress, budget: &budget })?
+        }
+        None => None,
+    };
     let known = Known {
         points,
         projection: &metadata.projection,
@@ -137,15 +159,16 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         lattice: against.as_ref().filter(|_| steps.is_stated()).and_then(Against::measured).map(|m| m.lattice),
         format: (is_complete && steps.is_stated()).then_some(Side { deviation, lost: 0, merged: Some(0) }),
     };
-    let report = report::check(folder, (points, tree.nodes.len() as u64), &findings)?;
+    report::check(report.as_ref(), (points, tree.nodes.len() as u64), &findings);
     let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     Ok(Outcome {
         encoding: Some(encoding(metadata)),
         points: metadata.points.unwrap_or(points),
         nodes: tree.nodes.len() as u64,
         quality,
-        first_view: first_view::measure(&tree, bytes.len() as u64, cube_over_extent(metadata)),
+        first_view: first_view::measure(tree, bytes.len() as u64, cube_over_extent(metadata)),
         against: summary,
+        surfels,
         accuracy,
         ..Outcome::new(findings)
     })

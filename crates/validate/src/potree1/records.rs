@@ -1,5 +1,6 @@
 //! Records of nodes as the comparison with the sources wants them.
 
+use pointmill_format::octree::Octree as _;
 use pointmill_format::potree1::{Dataset, NodeFiles};
 use pointmill_format::{Attribute, AttributeType, NodeKey, NodePoints, ReadError};
 use rayon::prelude::*;
@@ -27,10 +28,19 @@ enum Feed {
 #[derive(Debug, Clone)]
 pub(crate) struct Columns(Vec<Feed>);
 
+/// Which normals records have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Normals {
+    /// Those that are exactly what they were made of.
+    IfExact,
+    Always,
+}
+
 /// What is compared: all that a record holds exactly. Normals of two bytes are not what they were made of; colours that
 /// were made of intensities are compared with these, if they are whole numbers, and white is with nothing.
-pub(crate) fn rules(dataset: &Dataset, attributes: &[Attribute], steps: &Steps, own: &Value) -> (Rules, Columns) {
-    let is_exact = |name: &str| !name.starts_with("Normal") || has_floats(dataset);
+pub(crate) fn rules(dataset: &Dataset, steps: &Steps, own: &Value, normals: Normals) -> (Rules, Columns) {
+    let attributes = &dataset.info().attributes;
+    let is_exact = |name: &str| !name.starts_with("Normal") || normals == Normals::Always || has_floats(dataset);
     let (mut compared, mut conversions, mut feeds) = (Vec::new(), Vec::new(), Vec::new());
     for (column, attribute) in attributes.iter().enumerate().filter(|(_, a)| is_exact(&a.name)) {
         let (attribute, conversion, feed) = match (attribute.name.as_str(), Colours::of(own)) {
@@ -78,7 +88,7 @@ fn scaled(mut attribute: Attribute, own: &Value) -> Attribute {
 }
 
 /// Normals are stored as three floats.
-fn has_floats(dataset: &Dataset) -> bool {
+pub(crate) fn has_floats(dataset: &Dataset) -> bool {
     dataset.metadata().attributes.iter().any(|a| a.ty == AttributeType::Float32 && a.elements == 3)
 }
 

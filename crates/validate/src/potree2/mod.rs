@@ -41,6 +41,7 @@ use crate::octree::tree::{NODE_BYTES, Tree, TreeNode};
 use crate::options::{Options, ProgressFn};
 use crate::outcome::Outcome;
 use crate::report;
+use crate::surfels::{self, Derived};
 use nodes::Nodes;
 use records::Records;
 
@@ -70,16 +71,12 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     checks::metadata::check(&read_json(folder)?.unwrap_or_default(), &findings);
     let metadata = dataset.metadata();
     let geometry = geometry(metadata);
+    let report = report::find(folder, &findings)?;
+    let derived = Derived::of(report.as_ref(), &findings);
+    let rules = rules(metadata, derived.as_ref());
     let against = match options.against.as_slice() {
         [] => None,
-        paths => {
-            let attributes = metadata.attributes.iter().map(|a| a.attribute.clone());
-            let attributes = attributes.filter(|a| a.name != "position").collect();
-            let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
-            let mut rules = Rules::new(attributes, metadata.lattice, own);
-            rules.has_no_wide_integers = true;
-            Some(Against::open(paths, &options.open, rules)?)
-        }
+        paths => Some(Against::open(paths, &options.open, rules.clone())?),
     };
 
     let mut tree = tree::walk(&source, metadata.first_chunk_size, &budget, &findings)?;
@@ -112,17 +109,27 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
     let (seen, deviation) = nodes.finish();
     checks::ranges::check(metadata, &geometry, &seen, walked.unreadable == 0, &findings);
     note_what_was_skipped(metadata, options, &findings);
+    let records = Records { dataset: &dataset, tree: &tree };
+    let context = Context { records: &records, findings: &findings, progress, budget: &budget };
     let summary = match &against {
-        Some(against) => Some(against.compare(&Context {
-            records: &Records { dataset: &dataset, tree: &tree },
-            findings: &findings,
-            progress,
-            budget: &budget,
-        })?),
+        Some(against) => Some(against.compare(&context)?),
         None => None,
     };
-
     let is_measured = walked.unreadable == 0 && tree.nodes.iter().all(|n| n.readable);
+    let surfels = match &derived {
+        Some(derived) => surfels::Task {
+            derived,
+            rules: &rules,
+            points: metadata.points,
+            unread: (!is_measured).then(|| "not all nodes could be read".into()),
+            uncertain: None,
+            is_octahedral: false,
+            against: against.as_ref(),
+            threads: walked.threads,
+        }
+        .check(&context)?,
+        None => None,
+    };
     let position = metadata.attributes.iter().find(|a| a.attribute.name == "position");
     let known = Known {
         points: metadata.points,
@@ -131,7 +138,7 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         lattice: against.as_ref().and_then(Against::measured).map(|m| m.lattice),
         format: is_measured.then_some(Side { deviation, lost: 0, merged: Some(0) }),
     };
-    let report = report::check(folder, (metadata.points, tree.nodes.len() as u64), &findings)?;
+    report::check(report.as_ref(), (metadata.points, tree.nodes.len() as u64), &findings);
     let accuracy = accuracy::judge(report.as_ref(), &known, &findings);
     Ok(Outcome {
         encoding: Some(metadata.encoding.name()),
@@ -140,9 +147,21 @@ pub(crate) fn run(folder: &Path, options: &Options, progress: &ProgressFn<'_>) -
         quality,
         first_view: first_view::measure(&tree, metadata_bytes, cube_over_extent(metadata)),
         against: summary,
+        surfels,
         accuracy,
         ..Outcome::new(findings)
     })
+}
+
+/// What records of the dataset have, and what is compared with the sources.
+fn rules(metadata: &Metadata, derived: Option<&Derived>) -> Rules {
+    let attributes = metadata.attributes.iter().map(|a| a.attribute.clone());
+    let attributes = attributes.filter(|a| a.name != "position").collect();
+    let own = metadata.extra.get("pointmill").unwrap_or(&Value::Null);
+    let mut rules = Rules::new(attributes, metadata.lattice, own);
+    rules.has_no_wide_integers = true;
+    rules.set_apart(Derived::names_of(derived));
+    rules
 }
 
 /// Payloads that claim far more than they hold are found out before memory is shared out by what they claim.

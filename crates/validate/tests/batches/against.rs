@@ -5,7 +5,7 @@ use pointmill_validate::{Check, Outcome};
 use super::cloud::{Cloud, assert_only, broken, check_with, terrain};
 
 /// The points as a PLY file.
-fn ply(cloud: &Cloud, with_colour: bool) -> Vec<u8> {
+pub(crate) fn ply(cloud: &Cloud, with_colour: bool) -> Vec<u8> {
     let colour = ["red", "green", "blue"].map(|c| format!("property uchar {c}\n")).concat();
     let mut out = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\

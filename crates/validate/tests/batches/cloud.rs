@@ -8,6 +8,8 @@ use pointmill_testkit::Random;
 use pointmill_validate::{Check, Options, Outcome, validate};
 use serde_json::{Value, json};
 
+use crate::surfels::{self, Surfel};
+
 pub(crate) const BATCH: usize = 10_240;
 
 /// One point of a source.
@@ -17,6 +19,8 @@ pub(crate) struct Point {
     pub(crate) rgb: [u8; 3],
     pub(crate) intensity: u16,
     pub(crate) class: u8,
+    /// What a conversion has computed; of all points or of none.
+    pub(crate) surfel: Option<Surfel>,
 }
 
 /// Points and how they are to be written.
@@ -46,6 +50,7 @@ pub(crate) fn terrain() -> Cloud {
                 rgb: [next(256) as u8, next(256) as u8, next(256) as u8],
                 intensity: 20 + next(1000) as u16,
                 class: next(7) as u8,
+                surfel: None,
             }
         })
         .collect();
@@ -82,6 +87,8 @@ pub(crate) struct Parts {
     pub(crate) colours: Vec<u32>,
     pub(crate) intensity: Vec<u16>,
     pub(crate) class: Vec<u8>,
+    /// In storage order, if points have them.
+    pub(crate) surfels: Vec<Surfel>,
     pub(crate) originals: Vec<(u32, u32)>,
     pub(crate) description: Value,
     /// Batches a block of compressed sections.
@@ -186,6 +193,7 @@ impl Cloud {
             colours: vec![0; n],
             intensity: vec![0; n],
             class: vec![0; n],
+            surfels: Vec::new(),
             originals: Vec::new(),
             description: Value::Null,
             block: None,
@@ -238,6 +246,10 @@ impl Cloud {
                 parts.colours[at] = mean[*i] | lod[*i] << 24;
                 parts.intensity[at] = p.intensity;
                 parts.class[at] = p.class;
+                if let Some(surfel) = p.surfel {
+                    parts.surfels.resize(n, [0.0; 5]);
+                    parts.surfels[at] = surfel;
+                }
                 parts.lattice[at] = p.x;
                 parts.morton.push(at);
                 if mean[*i] != self.word(p) {
@@ -255,13 +267,17 @@ impl Cloud {
         });
         let ([lo, hi], step) = (self.intensity_range(), [self.scale; 3]);
         parts.words.truncate(self.planes);
+        let derived = |name: &str| json!({ "name": name, "type": "float", "elements": 1 });
+        let derived = surfels::NAMES.iter().filter(|_| !parts.surfels.is_empty()).map(|name| derived(name));
+        let mut attributes = vec![
+            json!({ "name": "intensity", "type": "uint16", "elements": 1, "min": [lo], "max": [hi] }),
+            json!({ "name": "classification", "type": "uint8", "elements": 1 }),
+        ];
+        attributes.extend(derived);
         parts.description = json!({
             "version": "0.1.0", "name": "terrain", "projection": "",
             "lattice": { "scale": step, "offset": self.offset },
-            "attributes": [
-                { "name": "intensity", "type": "uint16", "elements": 1, "min": [lo], "max": [hi] },
-                { "name": "classification", "type": "uint8", "elements": 1 },
-            ],
+            "attributes": attributes,
             "colour": self.colour,
             "errors": serde_json::Map::from_iter(errors),
             "sourceStep": step,
@@ -292,9 +308,12 @@ impl Parts {
         section(&mut out, "hi10", &self.pack(&le(&self.words[0]), 4));
         section(&mut out, "colour", &self.pack(&le(&self.colours), 4));
         let intensity: Vec<u8> = self.intensity.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let (intensity, class) = (self.pack(&intensity, 2), self.pack(&self.class, 1));
-        section(&mut out, "intensity", &intensity);
-        section(&mut out, "classification", &class);
+        let mut extras = vec![("intensity", self.pack(&intensity, 2)), ("classification", self.pack(&self.class, 1))];
+        for (i, name) in surfels::NAMES.into_iter().enumerate().filter(|_| !self.surfels.is_empty()) {
+            let values: Vec<u8> = self.surfels.iter().flat_map(|surfel| surfel[i].to_le_bytes()).collect();
+            extras.push((name, self.pack(&values, 4)));
+        }
+        extras.iter().for_each(|(name, bytes)| section(&mut out, name, bytes));
         for (plane, name) in [(1, "mid10"), (2, "lo10")] {
             if let Some(words) = self.words.get(plane) {
                 section(&mut out, name, &self.pack(&le(words), 4));
@@ -307,15 +326,15 @@ impl Parts {
         }
         let mut description = self.description.clone();
         let listed = description["attributes"].is_array();
-        for (i, bytes) in [intensity.len(), class.len()].into_iter().enumerate() {
+        for (i, (_, bytes)) in extras.iter().enumerate() {
             if listed && description["attributes"][i].get("bytes").is_none() {
-                description["attributes"][i]["bytes"] = json!(bytes);
+                description["attributes"][i]["bytes"] = json!(bytes.len());
             }
         }
         // places of attributes are known by now
         section(&mut out, "description", &[]);
         let at = |name: &str| places.get(name).copied().unwrap_or(0) as u64;
-        for (i, name) in ["intensity", "classification"].iter().enumerate().filter(|_| listed) {
+        for (i, (name, _)) in extras.iter().enumerate().filter(|_| listed) {
             description["attributes"][i]["offset"] = json!(at(name));
         }
         let text = description.to_string();
@@ -379,7 +398,13 @@ pub(crate) fn check(bytes: &[u8]) -> Outcome {
 
 /// Checks the bytes of a file against sources: name and bytes.
 pub(crate) fn check_with(bytes: &[u8], sources: &[(&str, Vec<u8>)]) -> Outcome {
+    check_reported(bytes, sources, None)
+}
+
+/// The same with a report of the conversion.
+pub(crate) fn check_reported(bytes: &[u8], sources: &[(&str, Vec<u8>)], report: Option<&str>) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
+    report.iter().for_each(|text| std::fs::write(folder.path().join("report.json"), text).unwrap());
     let path = folder.path().join("points.qbatch");
     std::fs::write(&path, bytes).unwrap();
     let mut options = Options { threads: 2, ..Options::default() };

@@ -52,7 +52,13 @@ fn grey_and_white_clouds_are_checked_for_their_colours() {
 /// Points of extremes: X, Y, Z and the step.
 fn extreme(points: Vec<[i64; 3]>, scale: f64, offset: [f64; 3], cell: f64) -> Cloud {
     let points = points.into_iter().enumerate();
-    let points = points.map(|(i, x)| Point { x, rgb: [i as u8, 7, 255], intensity: 20 + (i % 9) as u16, class: 2 });
+    let points = points.map(|(i, x)| Point {
+        x,
+        rgb: [i as u8, 7, 255],
+        intensity: 20 + (i % 9) as u16,
+        class: 2,
+        surfel: None,
+    });
     Cloud { points: points.collect(), scale, offset, cell, ..terrain() }
 }
 

@@ -7,3 +7,6 @@ mod compressed;
 mod faults;
 mod golden;
 mod points_faults;
+#[path = "../support/surfels.rs"]
+mod surfels;
+mod surfels_of_batches;

@@ -4,3 +4,6 @@ mod faults;
 mod index;
 mod sources;
 mod support;
+#[path = "../support/surfels.rs"]
+mod surfels;
+mod surfels_of_leaves;

@@ -8,6 +8,8 @@ use pointmill_testkit::las::{self, Las};
 use pointmill_validate::{Check, Options, Outcome, validate};
 use serde_json::{Map, Value, json};
 
+use crate::surfels::{self, Surfel};
+
 pub(crate) const STRIDE: usize = 40;
 
 /// One point: lattice integers and attributes.
@@ -18,11 +20,13 @@ pub(crate) struct Point {
     pub(crate) rgb: [u16; 3],
     pub(crate) intensity: u16,
     pub(crate) gps_time: f64,
+    /// What a conversion has computed; of all points or of none.
+    pub(crate) surfel: Option<Surfel>,
 }
 
 impl Point {
     pub(crate) fn at(step: [i64; 3]) -> Self {
-        Self { step, class: 2.0, rgb: [256, 2, 65_535], intensity: 7, gps_time: 0.5 }
+        Self { step, class: 2.0, rgb: [256, 2, 65_535], intensity: 7, gps_time: 0.5, surfel: None }
     }
 
     /// From byte 12 of the record on: class, rgb at 16, intensity at 22, rgba at 24, gps-time at 32.
@@ -33,6 +37,11 @@ impl Point {
         out.extend(self.rgb.map(|v| ((u32::from(v) * 255 + 32_767) / 65_535) as u8));
         out.extend([255, 0, 0, 0, 0]);
         out.extend(self.gps_time.to_le_bytes());
+        // at 40, and a record is whole words of 8 bytes
+        self.surfel.iter().for_each(|surfel| {
+            surfel.iter().for_each(|v| out.extend(v.to_le_bytes()));
+            out.extend([0; 4]);
+        });
         out
     }
 }
@@ -69,6 +78,7 @@ pub(crate) fn scene() -> Vec<Point> {
             rgb: [next(65_536) as u16, next(65_536) as u16, next(65_536) as u16],
             intensity: next(4000) as u16,
             gps_time: 245_000.0 + i as f64 * 0.125,
+            surfel: None,
         });
     }
     for i in 0..50 {
@@ -127,18 +137,27 @@ impl Cloud {
         let bounds = (!self.points.is_empty()).then(|| self.node(self.points.clone(), "n".into(), None, &mut files));
         let origin = bounds.map_or([0.0; 3], |(_, b)| b[0].map(f64::floor));
         let column = |name: &str, ty: &str, elements: usize, offset: usize| json!({ "name": name, "type": ty, "elements": elements, "offset": offset });
+        let has_surfels = self.points.iter().any(|p| p.surfel.is_some());
+        let mut columns = vec![
+            column("x", "float", 1, 0),
+            column("y", "float", 1, 4),
+            column("z", "float", 1, 8),
+            column("classification", "float", 1, 12),
+            column("rgb", "uint16", 3, 16),
+            column("intensity", "uint16", 1, 22),
+            column("rgba", "uint8", 4, 24),
+            column("gps-time", "double", 1, 32),
+        ];
+        let derived = surfels::NAMES.iter().enumerate().filter(|_| has_surfels);
+        columns.extend(derived.map(|(i, name)| column(name, "float", 1, STRIDE + 4 * i)));
         let head = json!({
             "format": "pointmill-bintree", "version": 1, "generator": "test", "name": "corridor",
             "points": self.points.len(), "capacity": self.capacity,
             "layout": if self.packed { "packed" } else { "files" }, "split": self.rule,
             "origin": origin, "projection": "", "lattice": { "scale": self.scale, "offset": self.offset },
             "pointmill": { "rgbDepth": "16" },
-            "attributes": [
-                column("x", "float", 1, 0), column("y", "float", 1, 4), column("z", "float", 1, 8),
-                column("classification", "float", 1, 12), column("rgb", "uint16", 3, 16),
-                column("intensity", "uint16", 1, 22), column("rgba", "uint8", 4, 24), column("gps-time", "double", 1, 32)
-            ],
-            "stride": STRIDE,
+            "attributes": columns,
+            "stride": if has_surfels { STRIDE + 24 } else { STRIDE },
         });
         files.head = head.as_object().unwrap().clone();
         files
@@ -297,8 +316,14 @@ impl Files {
 
     /// Compares with a LAS file of these points.
     pub(crate) fn validate_against(&self, cloud: &Cloud, points: &[Point]) -> Outcome {
+        self.validate_reported(cloud, points, None)
+    }
+
+    /// The same with a report of the conversion.
+    pub(crate) fn validate_reported(&self, cloud: &Cloud, points: &[Point], report: Option<&str>) -> Outcome {
         let folder = tempfile::tempdir().unwrap();
         self.write(folder.path());
+        report.iter().for_each(|text| std::fs::write(folder.path().join("report.json"), text).unwrap());
         let scan = folder.path().join("scan.las");
         std::fs::write(&scan, las(cloud, points)).unwrap();
         let options = Options { against: vec![scan], threads: 2, ..Options::default() };

@@ -12,7 +12,7 @@ use pointmill_testkit::damage::put;
 use pointmill_validate::{Options, Outcome, validate};
 use serde_json::{Value, json};
 
-use crate::support::{Cloud, OFFSET, Point, SCALE, SIDE, Sampler};
+use crate::support::{Cloud, OFFSET, Point, SCALE, SIDE, Sampler, surfels};
 
 pub(crate) const WKT: &str = "PROJCS[\"test\",UNIT[\"metre\",1]]";
 
@@ -85,6 +85,7 @@ fn record(point: &Point, has_extra: bool) -> Vec<u8> {
     out.extend(point.gps_time.to_le_bytes());
     point.rgb.iter().for_each(|v| out.extend(v.to_le_bytes()));
     out.extend(has_extra.then_some(3 + (point.position[0] % 200) as u8));
+    point.surfel.iter().flatten().for_each(|v| out.extend(v.to_le_bytes()));
     out
 }
 
@@ -139,8 +140,24 @@ fn pages(cloud: &Cloud) -> Vec<(NodeKey, Vec<NodeKey>)> {
 }
 
 impl Writer {
+    /// Bytes of a point behind the fields of its format.
+    fn extra_bytes(&self, cloud: &Cloud) -> u16 {
+        u16::from(self.has_extra) + if cloud.has_surfels() { 20 } else { 0 }
+    }
+
+    fn descriptors(&self, cloud: &Cloud) -> Vec<u8> {
+        let mut out = if self.has_extra { descriptor() } else { Vec::new() };
+        for name in surfels::NAMES.iter().filter(|_| cloud.has_surfels()) {
+            let mut descriptor = vec![0; 192];
+            put(&mut descriptor, 2, &[9]);
+            put(&mut descriptor, 4, name.as_bytes());
+            out.extend(descriptor);
+        }
+        out
+    }
+
     pub(crate) fn encode(&self, cloud: &Cloud) -> Copc {
-        let extra = u16::from(self.has_extra);
+        let extra = self.extra_bytes(cloud);
         let builder = LazVlrBuilder::default().with_point_format(7, extra).unwrap();
         let vlr = builder.with_variable_chunk_size().build();
         let nodes: Vec<(NodeKey, i32, Vec<u8>)> = cloud
@@ -162,9 +179,12 @@ impl Writer {
         let mut laszip = Vec::new();
         vlr.write_to(&mut laszip).unwrap();
         let wkt = [WKT.as_bytes(), &[0]].concat();
-        let others =
-            [("laszip encoded", 22204, laszip), ("LASF_Projection", 2112, wkt), ("LASF_Spec", 4, descriptor())];
-        let count = 3 + u32::from(self.has_extra);
+        let others = [
+            ("laszip encoded", 22204, laszip),
+            ("LASF_Projection", 2112, wkt),
+            ("LASF_Spec", 4, self.descriptors(cloud)),
+        ];
+        let count = 3 + u32::from(extra > 0);
         for ((user, number, data), at) in others.into_iter().zip(&mut at).take(count as usize - 1) {
             records.extend(head(user, number, data.len() as u64, false));
             *at = 375 + records.len();
@@ -242,7 +262,7 @@ impl Writer {
         put(out, 96, &start.to_le_bytes());
         put(out, 100, &records.to_le_bytes());
         put(out, 104, &[7 | 0x80]);
-        put(out, 105, &(36 + u16::from(self.has_extra)).to_le_bytes());
+        put(out, 105, &(36 + self.extra_bytes(cloud)).to_le_bytes());
         let range = |values: &mut dyn Iterator<Item = f64>| {
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], v| [min.min(v), max.max(v)])
         };

@@ -10,3 +10,4 @@ mod points;
 mod sources;
 #[path = "../support/mod.rs"]
 mod support;
+mod surfels;

@@ -39,7 +39,20 @@ fn record(key: NodeKey, point: &Point) -> Vec<u8> {
     out.extend(point.rgb.map(|v| ((u32::from(v) * 255 + 32_767) / 65_535) as u8));
     out.push(255);
     out.extend(point.intensity.to_le_bytes());
+    out.extend(point.surfel.iter().flat_map(|[x, y, z, ..]| oct16([*x, *y, *z])));
     out
+}
+
+/// A normal in two bytes; upwards, if it is none.
+fn oct16(normal: [f32; 3]) -> [u8; 2] {
+    let [x, y, z] = if normal == [0.0; 3] { [0.0, 0.0, 1.0] } else { normal };
+    let s = 1.0 / (x.abs() + y.abs() + z.abs());
+    let sign = |v: f32| if v < 0.0 { -1.0 } else { 1.0 };
+    let [u, v] = match z >= 0.0 {
+        true => [x * s, y * s],
+        false => [sign(x) * (1.0 - y.abs() * s), sign(y) * (1.0 - x.abs() * s)],
+    };
+    [u, v].map(|v| ((v + 1.0) * 128.0).min(255.0) as u8)
 }
 
 pub(crate) fn encode(cloud: &Cloud) -> Files {
@@ -90,6 +103,8 @@ fn description(cloud: &Cloud) -> Value {
             f64::from(steps) * SCALE + OFFSET[a]
         })
     };
+    let mut attributes = vec!["POSITION_CARTESIAN", "COLOR_PACKED", "INTENSITY"];
+    attributes.extend(cloud.has_surfels().then_some("NORMAL_OCT16"));
     json!({
         "version": "1.7",
         "octreeDir": "data",
@@ -97,7 +112,7 @@ fn description(cloud: &Cloud) -> Value {
         "points": cloud.points().count(),
         "boundingBox": corners(OFFSET, OFFSET.map(|v| v + side)),
         "tightBoundingBox": corners(world(i32::min), world(i32::max)),
-        "pointAttributes": ["POSITION_CARTESIAN", "COLOR_PACKED", "INTENSITY"],
+        "pointAttributes": attributes,
         "spacing": side / 128.0,
         "scale": SCALE / f64::from(FINE),
         "hierarchyStepSize": STEP,

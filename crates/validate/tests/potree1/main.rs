@@ -7,3 +7,4 @@ mod points;
 mod sources;
 #[path = "../support/mod.rs"]
 mod support;
+mod surfels;

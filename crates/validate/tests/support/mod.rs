@@ -1,6 +1,8 @@
 //! A tiny correct octree, written from the format page by the plainest means, to plant faults in.
 #![allow(dead_code, unreachable_pub)] // each test binary uses a part
 
+pub mod surfels;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -27,9 +29,11 @@ pub struct Point {
     pub classification: u8,
     pub scan_angle: i8,
     pub gps_time: f64,
+    /// What a conversion has computed; of all points or of none.
+    pub surfel: Option<surfels::Surfel>,
 }
 
-/// Bytes of a point, DEFAULT.
+/// Bytes of a point without computed attributes, DEFAULT.
 pub const STRIDE: usize = 12 + 6 + 2 + 1 + 1 + 8;
 
 impl Point {
@@ -40,6 +44,7 @@ impl Point {
         out.extend(self.intensity.to_le_bytes());
         out.extend([self.classification, self.scan_angle as u8]);
         out.extend(self.gps_time.to_le_bytes());
+        self.surfel.iter().flatten().for_each(|v| out.extend(v.to_le_bytes()));
         out
     }
 }
@@ -66,8 +71,24 @@ pub fn scene() -> Vec<Point> {
             classification: [2, 5, 6, 64][next(4) as usize],
             scan_angle: (next(60) - 30) as i8,
             gps_time: 245_000.0 + f64::from(i) * 0.125,
+            surfel: None,
         });
     }
+    points
+}
+
+/// Points of [`surfel_scene`] that have neither normal nor radius: they share one place.
+pub const FLAT: u64 = 20;
+
+/// [`scene`] with right normals, curvatures and radii.
+pub fn surfel_scene() -> Vec<Point> {
+    let mut points = scene();
+    points.iter_mut().for_each(|p| p.classification = 2);
+    let one = Point { position: [9000, 9000, 5000], ..points[0] };
+    points.extend((0..FLAT).map(|i| Point { intensity: i as u16, ..one }));
+    let steps: Vec<[i64; 3]> = points.iter().map(|p| p.position.map(i64::from)).collect();
+    let right = surfels::right(&steps, [SCALE; 3]);
+    points.iter_mut().zip(right).for_each(|(p, surfel)| p.surfel = Some(surfel));
     points
 }
 
@@ -204,6 +225,11 @@ impl Cloud {
         }
     }
 
+    /// True if points have attributes that a conversion has computed.
+    pub fn has_surfels(&self) -> bool {
+        self.points().any(|p| p.surfel.is_some())
+    }
+
     /// All points, in the order of nodes.
     pub fn points(&self) -> impl Iterator<Item = &Point> {
         self.nodes.values().flatten()
@@ -211,7 +237,7 @@ impl Cloud {
 
     /// The three files, correct.
     pub fn encode(&self, encoding: Encoding) -> Files {
-        let attributes = attributes();
+        let attributes = self.attributes();
         let mut octree = Vec::new();
         let mut scratch = BrotliScratch::default();
         let mut entries = Vec::new();
@@ -247,17 +273,36 @@ impl Cloud {
         Files { metadata, text: None, hierarchy: hierarchy.bytes, octree, entries }
     }
 
+    fn attributes(&self) -> Vec<Attribute> {
+        let mut attributes = vec![
+            Attribute::new("position", AttributeType::Int32, 3),
+            Attribute::new("rgb", AttributeType::UInt16, 3),
+            Attribute::new("intensity", AttributeType::UInt16, 1),
+            Attribute::new("classification", AttributeType::UInt8, 1),
+            Attribute::new("scan angle rank", AttributeType::Int8, 1),
+            Attribute::new("gps-time", AttributeType::Float64, 1),
+        ];
+        let derived = surfels::NAMES.iter().filter(|_| self.has_surfels());
+        attributes.extend(derived.map(|name| Attribute::new(*name, AttributeType::Float32, 1)));
+        attributes
+    }
+
     fn stats(&self) -> Vec<AttributeStats> {
-        let columns: [fn(&Point) -> Vec<f64>; 6] = [
+        let columns: [fn(&Point) -> Vec<f64>; 11] = [
             |p| (0..3).map(|a| f64::from(p.position[a]) * SCALE + OFFSET[a]).collect(),
             |p| p.rgb.map(f64::from).to_vec(),
             |p| vec![f64::from(p.intensity)],
             |p| vec![f64::from(p.classification)],
             |p| vec![f64::from(p.scan_angle)],
             |p| vec![p.gps_time],
+            |p| vec![f64::from(p.surfel.unwrap()[0])],
+            |p| vec![f64::from(p.surfel.unwrap()[1])],
+            |p| vec![f64::from(p.surfel.unwrap()[2])],
+            |p| vec![f64::from(p.surfel.unwrap()[3])],
+            |p| vec![f64::from(p.surfel.unwrap()[4])],
         ];
         let mut stats = Vec::new();
-        for (attribute, values) in attributes().into_iter().zip(columns) {
+        for (attribute, values) in self.attributes().into_iter().zip(columns) {
             let mut min = vec![f64::INFINITY; attribute.elements];
             let mut max = vec![f64::NEG_INFINITY; attribute.elements];
             for p in self.points() {
@@ -275,17 +320,6 @@ impl Cloud {
         }
         stats
     }
-}
-
-pub fn attributes() -> Vec<Attribute> {
-    vec![
-        Attribute::new("position", AttributeType::Int32, 3),
-        Attribute::new("rgb", AttributeType::UInt16, 3),
-        Attribute::new("intensity", AttributeType::UInt16, 1),
-        Attribute::new("classification", AttributeType::UInt8, 1),
-        Attribute::new("scan angle rank", AttributeType::Int8, 1),
-        Attribute::new("gps-time", AttributeType::Float64, 1),
-    ]
 }
 
 fn octant(position: [i32; 3], level: u8) -> usize {

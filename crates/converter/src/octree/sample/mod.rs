@@ -4,7 +4,6 @@
 //! were sampled before have taken near the border; they depend on nothing else.
 
 mod cells;
-mod lanes;
 mod neighbours;
 mod poisson;
 mod spacing;

@@ -18,15 +18,14 @@
 //! What neighbours have taken over the border of the node ([`OverBorder`]) is among the points around a tile, and is
 //! kept at the same distance.
 
-#[cfg(target_arch = "x86_64")]
-use super::lanes::Avx2;
-use super::lanes::{Compare, Portable};
 use super::neighbours::{OverBorder, TILE_BITS};
 use super::spacing::Spacing;
 use super::taken::Taken;
 use super::tile::Tile;
 use crate::cloud::TreePoint;
-use crate::runtime::Vectors;
+#[cfg(target_arch = "x86_64")]
+use crate::runtime::Avx2;
+use crate::runtime::{Compare, Portable, Vectors};
 
 /// Added to the squared spacing (at least a quarter of a squared unit): coordinates carry an error of 2^-22,
 /// differences of 2^-21, squared distances near 1 of 2·√3·2^-21 + rounding < 1.9e-6.

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::lanes::{Compare, LANES};
 use crate::cloud::TreePoint;
+use crate::runtime::{Compare, LANES};
 
 /// Candidates that are decided together: a bit of a word each.
 const BLOCK: usize = 64;

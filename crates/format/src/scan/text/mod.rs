@@ -1,6 +1,6 @@
-//! Points as lines of numbers: XYZ, TXT, CSV, ASC; PTS; PTX; OFF.
+//! Points as lines of numbers: XYZ, TXT, CSV, ASC; PTS; PTX; OFF; OBJ.
 //!
-//! [`open`] detects the four kinds by content ([`kind`]), counts the lines (one pass over the newlines, so that
+//! [`open`] detects the five kinds by content ([`kind`]), counts the lines (one pass over the newlines, so that
 //! every piece knows the number of its first point) and looks at some thousand rows to learn what the columns hold.
 //!
 //! **Separator and decimal mark** (`dialect.rs`), by a sample of the rows: `;` if the first row has one, else `,`, else
@@ -25,15 +25,18 @@
 //! **PTS**: lines with one whole number are counts (a file may have several). **PTX**: the matrix of each scan is applied
 //! in double precision; grid cells at 0 0 0 are places without a point, not points; with more than one scan, "point
 //! source id" is the index of a point's scan. **OFF**: vertices with the colours and normals of COFF, NOFF, CNOFF and
-//! STOFF; faces are not read.
+//! STOFF; faces are not read. **OBJ**: the vertices `v x y z [w] [r g b]`; the weight w, faces, lines, normals and texture
+//! coordinates are not read. Colours of 0–1 are taken as such, even if all of them are 0 or 1.
 //!
-//! Sources: Leica Geosystems, "PTS File Format", "PTX File Format"; Geomview manual, "OFF Files".
+//! Sources: Leica Geosystems, "PTS File Format", "PTX File Format"; Geomview manual, "OFF Files"; Alias|Wavefront,
+//! "Object Files (.obj)".
 
 mod column;
 mod commas;
 mod dialect;
 mod head;
 mod index_column;
+mod obj;
 mod off;
 mod options;
 mod pts;
@@ -64,6 +67,8 @@ pub enum TextKind {
     Ptx,
     /// Geomview's object file format.
     Off,
+    /// Wavefront's object files.
+    Obj,
 }
 
 /// What the first bytes of a file (some kB) are, if they are text of points.
@@ -73,6 +78,9 @@ pub enum TextKind {
 pub fn kind(first_bytes: &[u8]) -> Option<TextKind> {
     if is_off(first_bytes) {
         return Some(TextKind::Off);
+    }
+    if is_obj(first_bytes) {
+        return Some(TextKind::Obj);
     }
     if is_ptx(first_bytes) {
         return Some(TextKind::Ptx);
@@ -86,6 +94,11 @@ pub fn kind(first_bytes: &[u8]) -> Option<TextKind> {
 /// True for OFF, with any of its prefixes.
 pub fn is_off(first_bytes: &[u8]) -> bool {
     off::Keyword::find(first_bytes).is_some()
+}
+
+/// True for Wavefront OBJ: lines of its keywords alone, vertices, normals or texture coordinates among them.
+pub fn is_obj(first_bytes: &[u8]) -> bool {
+    obj::is_obj(first_bytes)
 }
 
 /// True for PTS: a line of one whole number, then one of three numbers or more; comments and a line of titles may stand
@@ -146,7 +159,7 @@ pub fn is_other_text(first_bytes: &[u8]) -> bool {
     }
 }
 
-/// Opens a file of any of the four kinds. One that is none of them by content is tried as XYZ.
+/// Opens a file of any of the five kinds. One that is none of them by content is tried as XYZ.
 ///
 /// # Errors
 /// Not text, columns that cannot be determined or do not fit `options`, a header (PTX, OFF) that is cut short or makes
@@ -166,6 +179,7 @@ pub fn open(path: impl AsRef<Path>, options: &TextOptions) -> Result<Box<dyn Sca
     }
     match kind(&first) {
         Some(TextKind::Off) => off::open(source),
+        Some(TextKind::Obj) => obj::open(source),
         Some(TextKind::Ptx) => ptx::open(source),
         Some(TextKind::Pts) => pts::open(source, options),
         Some(TextKind::Xyz) | None => xyz::open(source, options),
@@ -186,7 +200,7 @@ mod tests {
 
     #[test]
     fn kinds_are_told_by_content() {
-        let cases: [(&[u8], Option<TextKind>); 12] = [
+        let cases: [(&[u8], Option<TextKind>); 13] = [
             (b"1 2 3\n4 5 6\n", Some(TextKind::Xyz)),
             (b"\xef\xbb\xbfX,Y,Z\r\n1,2,3\r\n", Some(TextKind::Xyz)),
             (b"//X Y Z R\n1 2 3 4\n", Some(TextKind::Xyz)),
@@ -194,6 +208,7 @@ mod tests {
             (b"2\n3\n0 0 0\n1 0 0\n", Some(TextKind::Ptx)),
             (b"OFF\n8 6 12\n", Some(TextKind::Off)),
             (b"COFF 8 6 12\n", Some(TextKind::Off)),
+            (b"# Blender\no Cube\nv 1 2 3\n", Some(TextKind::Obj)),
             (b"OFFSET of the scan\n", None),
             (b"Dear reader,\nthis is a letter of 3 lines\nand no scan\n", None),
             (b"{\"a\": [1, 2, 3]}\n", None),

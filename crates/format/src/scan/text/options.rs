@@ -8,11 +8,11 @@ use crate::Decimal;
 pub struct TextOptions {
     /// Names of all columns in file order: `x`, `y`, `z`, `r`, `g`, `b`, `i` (intensity), `c` (classification), `nx`,
     /// `ny`, `nz`; `-` is omitted; any other becomes an attribute of that name. A type may follow a colon
-    /// (`quality:uint8`). `None`: found by the rules above. Ignored in PTX and OFF files.
+    /// (`quality:uint8`). `None`: found by the rules above. Ignored in PTX, OFF and OBJ files.
     pub columns: Option<Vec<String>>,
     /// Between two fields; `None`: found. A blank means any blanks.
     pub separator: Option<char>,
-    /// Before the decimals of a number. Ignored in PTX and OFF files, which have points.
+    /// Before the decimals of a number. Ignored in PTX, OFF and OBJ files, which have points.
     pub decimal: Decimal,
 }
 

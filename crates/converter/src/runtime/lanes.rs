@@ -1,20 +1,23 @@
-//! Comparing one point with eight at once.
+//! Comparing eight numbers, or one point with eight, at once.
 
 #[cfg(target_arch = "x86_64")]
-use crate::runtime::Detected;
+use super::vectors::Detected;
 
 /// Points that are compared at once.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// A way to compare; all give the same bits.
-pub(super) trait Compare: Copy {
+pub(crate) trait Compare: Copy {
     /// Bit `i` is set if point `i` of eight is nearer to `point` than the square root of `below`.
     fn nearer(self, axes: [&[f32; LANES]; 3], point: [f32; 3], below: f32) -> u32;
+
+    /// Bit `i` is set if number `i` of eight is at most `bound`.
+    fn at_most(self, values: &[f32; LANES], bound: f32) -> u32;
 }
 
 /// For every processor.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Portable;
+pub(crate) struct Portable;
 
 impl Compare for Portable {
     #[inline(always)]
@@ -26,16 +29,21 @@ impl Compare for Portable {
         }
         hits.iter().fold(0, |any, hit| any | hit)
     }
+
+    #[inline(always)]
+    fn at_most(self, values: &[f32; LANES], bound: f32) -> u32 {
+        values.iter().enumerate().fold(0, |any, (i, value)| any | u32::from(*value <= bound) << i)
+    }
 }
 
 /// For code that runs on processors with AVX2 alone.
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Avx2(Detected);
+pub(crate) struct Avx2(Detected);
 
 #[cfg(target_arch = "x86_64")]
 impl Avx2 {
-    pub(super) fn new(detected: Detected) -> Self {
+    pub(crate) fn new(detected: Detected) -> Self {
         Self(detected)
     }
 }
@@ -57,13 +65,37 @@ impl Compare for Avx2 {
             _mm256_movemask_ps(hits).cast_unsigned()
         }
     }
+
+    #[inline(always)]
+    fn at_most(self, values: &[f32; LANES], bound: f32) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: the processor has AVX2, or there were no `Detected`; the load reads the 32 bytes of the array.
+        unsafe {
+            let values = _mm256_loadu_ps(values.as_ptr());
+            let hits = _mm256_cmp_ps::<_CMP_LE_OQ>(values, _mm256_set1_ps(bound));
+            _mm256_movemask_ps(hits).cast_unsigned()
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::vectors::Vectors;
     use super::*;
-    use crate::runtime::Vectors;
     use pointmill_testkit::Random;
+
+    #[test]
+    fn numbers_that_are_equal_count_and_others_do_not() {
+        let values = [1.0, 2.0, 3.0, f32::NAN, f32::NEG_INFINITY, 2.0f32.next_up(), 0.0, f32::INFINITY];
+        for vectors in Vectors::all() {
+            let found = |bound: f32| match vectors {
+                Vectors::Portable => Portable.at_most(&values, bound),
+                #[cfg(target_arch = "x86_64")]
+                Vectors::Avx2(detected) => Avx2::new(detected).at_most(&values, bound),
+            };
+            assert_eq!((found(2.0), found(f32::INFINITY)), (0b0101_0011, 0b1111_0111), "{vectors:?}");
+        }
+    }
 
     #[test]
     fn each_way_gives_the_same_bits() {
