@@ -26,7 +26,7 @@ except ImportError:
     open3d = None
 
 NEIGHBOURS = (8, 16, 32)
-PLY_TYPES = {"double": "<f8", "float": "<f4", "uchar": "u1", "ushort": "<u2", "short": "<i2", "int": "<i4"}
+PLY_TYPES = {"double": "<f8", "float": "<f4", "uchar": "u1", "ushort": "<u2", "short": "<i2", "int": "<i4", "char": "i1", "uint": "<u4"}
 
 
 def sphere(rng, n):

@@ -11,6 +11,7 @@ mod batches;
 mod copc;
 mod cut_short;
 mod depth_maps;
+mod derive;
 mod export;
 mod export_datasets;
 mod export_text;

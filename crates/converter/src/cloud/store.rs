@@ -11,6 +11,7 @@ use super::record::position;
 use super::segments::Segment;
 use crate::error::{ConvertError, JobFault};
 use crate::runtime::{Consumer, DiskFile, Evict, Pool, TempFiles, os_hints};
+use crate::sources::POSITION_BYTES;
 
 /// Blocks grow to this size: a few large pages, and one long write when they go to disk.
 pub(crate) const BLOCK_BYTES: usize = 8 << 20;
@@ -417,6 +418,23 @@ impl Store {
         }
         self.give(freed);
         Ok(freed)
+    }
+
+    /// Appends the positions of the records of a segment to `out`, [`POSITION_BYTES`] each; they can be taken still.
+    pub(crate) fn read_positions(&self, segment: Segment, out: &mut Vec<u8>) -> Result<(), ConvertError> {
+        let place = self.blocks.lock().map_err(|_| poisoned())?.get(segment.block as usize).map(|b| b.place.clone());
+        let (start, len) = (segment.start as usize * self.stride, segment.count as usize * self.stride);
+        let mut copied = Vec::new();
+        let records = match &place {
+            Some(Place::Memory(bytes)) if self.limits.get().is_none() => &bytes[start..start + len],
+            _ => {
+                self.read(segment, &mut copied)?;
+                &copied[..]
+            }
+        };
+        let positions = records.chunks_exact(self.stride).filter_map(|record| record.first_chunk::<POSITION_BYTES>());
+        positions.for_each(|position| out.extend_from_slice(position));
+        Ok(())
     }
 
     /// [`Self::take`], but the records can be taken still.

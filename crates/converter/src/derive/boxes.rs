@@ -25,6 +25,14 @@ impl Box3 {
         Self { min: [x.0, y.0, z.0], max: [x.1, y.1, z.1] }
     }
 
+    /// Of some places.
+    pub(super) fn around(places: impl Iterator<Item = [i32; 3]>) -> Self {
+        places.fold(Self::EMPTY, |mut all, place| {
+            all.join(&Self { min: place, max: place });
+            all
+        })
+    }
+
     fn join(&mut self, other: &Self) {
         for a in 0..3 {
             self.min[a] = self.min[a].min(other.min[a]);

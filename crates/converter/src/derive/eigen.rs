@@ -40,7 +40,10 @@ fn by_polynomial(&[xx, xy, xz, yy, yz, zz]: &Symmetric) -> Option<Smallest> {
     let (m_x, m_y, m_z) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
     let minors = m_x + m_y + m_z;
     let determinant = xx * m_x - xy * (xy * zz - xz * yz) + xz * (xy * yz - xz * yy);
-    let mut least = 0.0;
+    if minors < FAR_FROM_LINE / 3.0 {
+        return None; // the middle eigenvalue is less than it has to be
+    }
+    let mut least = 0.0f64;
     for _ in 0..STEPS {
         let value = ((least - trace) * least + minors) * least - determinant;
         let slope = (3.0 * least - 2.0 * trace) * least + minors;
@@ -55,7 +58,7 @@ fn by_polynomial(&[xx, xy, xz, yy, yz, zz]: &Symmetric) -> Option<Smallest> {
     let root = (sum * sum - 4.0 * product).max(0.0).sqrt();
     let largest = (sum + root) / 2.0;
     let middle = product / largest;
-    let is_clear = middle >= FAR_FROM_LINE && least <= NEAR_PLANE * middle;
+    let is_clear = (FAR_FROM_LINE..=1.0).contains(&middle) && least.abs() <= 1.0 && least <= NEAR_PLANE * middle;
     if !is_clear {
         return None; // also where something is not a number
     }

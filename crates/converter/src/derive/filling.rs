@@ -1,6 +1,6 @@
 //! Blocks of the store while a unit puts its records back.
 
-use crate::cloud::{BLOCK_BYTES, Checksum, Segment, Store};
+use crate::cloud::{BLOCK_BYTES, Checksum, Segment, Store, copy_record};
 use crate::error::ConvertError;
 
 /// The records of one source.
@@ -35,7 +35,8 @@ impl<'a> Filling<'a> {
             self.next_block(segments, put)?;
         }
         let at = self.records.len();
-        self.records.extend_from_slice(record);
+        self.records.resize(at + self.stride, 0);
+        copy_record(record, &mut self.records[at..]);
         self.left = self.left.saturating_sub(1);
         Ok(&mut self.records[at..])
     }

@@ -61,26 +61,26 @@ impl Runs {
 }
 
 impl UnitRuns {
-    /// Adds points whose coordinates are in columns, in order.
+    /// Adds the points of records that have a position alone, in that order.
     pub(super) fn add(
         &mut self,
-        columns: [&[i32]; 3],
+        records: &[u8],
+        order: impl ExactSizeIterator<Item = usize>,
         store: &Store,
-        records: &mut Vec<u8>,
     ) -> Result<(), ConvertError> {
-        let [x, y, z] = columns;
-        records.clear();
-        records.reserve_exact(x.len() * POSITION_BYTES);
-        for ((x, y), z) in x.iter().zip(y).zip(z) {
-            records.extend([x, y, z].into_iter().flat_map(|v| v.to_le_bytes()));
+        let mut sorted = Vec::with_capacity(order.len() * POSITION_BYTES);
+        for record in order {
+            sorted.extend_from_slice(&records[record * POSITION_BYTES..][..POSITION_BYTES]);
         }
         let block = store.open(0)?;
-        for start in (0..x.len()).step_by(RUN_POINTS) {
-            let end = (start + RUN_POINTS).min(x.len());
-            let of = Box3::of(columns.map(|axis| &axis[start..end]));
-            self.0.push((of, Segment { block, start: start as u32, count: (end - start) as u32 }));
+        let mut start = 0;
+        for run in sorted.chunks(RUN_POINTS * POSITION_BYTES) {
+            let places = run.chunks_exact(POSITION_BYTES).map(|record| position(record).0);
+            let count = (run.len() / POSITION_BYTES) as u32;
+            self.0.push((Box3::around(places), Segment { block, start, count }));
+            start += count;
         }
-        store.fill(block, records)
+        store.fill(block, &mut sorted)
     }
 }
 

@@ -8,11 +8,12 @@ use super::runs::{Runs, UnitRuns};
 use super::space::Space;
 use super::surface::Surface;
 use super::units::{Placed, Unit};
-use crate::cloud::{Checksum, Cloud, OrderScratch, Point, Segment, Store, order, position};
+use crate::cloud::{Checksum, Cloud, OrderScratch, Point, RecordFrame, Segment, Store, order, position};
 use crate::error::ConvertError;
 #[cfg(target_arch = "x86_64")]
 use crate::runtime::Avx2;
 use crate::runtime::{Portable, Runtime, Vectors, Workers};
+use crate::sources::POSITION_BYTES;
 
 /// Points of a place that very many share that are taken at a time.
 const PLACE_POINTS: u32 = 65_536;
@@ -82,24 +83,25 @@ impl Worker<'_> {
 
     /// Keeps the positions of a unit in `store`.
     pub(super) fn list(&mut self, unit: &Unit, store: &Store) -> Result<UnitRuns, ConvertError> {
+        let cloud = self.task.cloud;
         let mut runs = UnitRuns::default();
+        let segments = unit.cells.iter().flat_map(|cell| &cell.segments);
+        self.records.clear();
         if !unit.is_large_place(self.task.unit_points) {
-            self.load(unit, false)?;
-            let columns = self.finder.columns.each_ref().map(Vec::as_slice);
-            runs.add(columns, store, &mut self.records)?;
+            for segment in segments {
+                cloud.store.read_positions(*segment, &mut self.records)?;
+            }
+            // a record of nothing but its position
+            let frame = RecordFrame { stride: POSITION_BYTES, ..cloud.frame.clone() };
+            order(&self.records, &frame, unit.key.level, &mut self.scratch, &mut self.points);
+            runs.add(&self.records, self.points.iter().map(|point| point.record as usize), store)?;
             return Ok(runs);
         }
-        let cloud = self.task.cloud;
-        for part in unit.cells.iter().flat_map(|cell| &cell.segments).flat_map(|s| s.split(PLACE_POINTS)) {
+        for part in segments.flat_map(|segment| segment.split(PLACE_POINTS)) {
             self.task.rt.check_stop()?;
             self.records.clear();
-            cloud.store.read(part, &mut self.records)?;
-            self.finder.columns.iter_mut().for_each(Vec::clear);
-            for record in self.records.chunks_exact(cloud.frame.stride) {
-                self.finder.columns.iter_mut().zip(position(record).0).for_each(|(axis, v)| axis.push(v));
-            }
-            let columns = self.finder.columns.each_ref().map(Vec::as_slice);
-            runs.add(columns, store, &mut self.records)?;
+            cloud.store.read_positions(part, &mut self.records)?;
+            runs.add(&self.records, 0..part.count as usize, store)?;
         }
         Ok(runs)
     }
@@ -110,36 +112,30 @@ impl Worker<'_> {
         if unit.is_large_place(self.task.unit_points) {
             return self.large_place(unit, others);
         }
-        self.load(unit, true)?;
+        self.load(unit)?;
         let Task { rt, space, .. } = self.task;
         find(self.vectors, &mut self.finder, space, others, rt, &mut self.collector)?;
         self.put_back(unit)
     }
 
-    /// Reads or takes the records of a unit, and puts its points in order.
-    fn load(&mut self, unit: &Unit, takes: bool) -> Result<(), ConvertError> {
+    /// Takes the records of a unit, and puts its points in order.
+    fn load(&mut self, unit: &Unit) -> Result<(), ConvertError> {
         let Cloud { store, frame, .. } = self.task.cloud;
         self.records.clear();
         self.records.reserve_exact(unit.points() as usize * frame.stride);
         self.sources.clear();
         self.of_record.clear();
         for segment in unit.cells.iter().flat_map(|cell| &cell.segments) {
-            let source = if takes {
-                store.take_to_put_back(*segment, true, &mut self.records)?
-            } else {
-                store.read(*segment, &mut self.records)?
-            };
+            let source = store.take_to_put_back(*segment, true, &mut self.records)?;
             self.of_record.resize(self.records.len() / frame.stride, source);
         }
-        if takes {
-            self.taken.add_all(&self.records, frame.stride);
-            self.sources.extend(&self.of_record);
-            self.sources.dedup();
-            self.sources.sort_unstable();
-            self.sources.dedup();
-            let index = |source: &u32| self.sources.binary_search(source).unwrap_or(0) as u32;
-            self.of_record.iter_mut().for_each(|source| *source = index(source));
-        }
+        self.taken.add_all(&self.records, frame.stride);
+        self.sources.extend(&self.of_record);
+        self.sources.dedup();
+        self.sources.sort_unstable();
+        self.sources.dedup();
+        let index = |source: &u32| self.sources.binary_search(source).unwrap_or(0) as u32;
+        self.of_record.iter_mut().for_each(|source| *source = index(source));
         order(&self.records, frame, unit.key.level, &mut self.scratch, &mut self.points);
         for (a, axis) in self.finder.columns.iter_mut().enumerate() {
             let place = |point: &Point| position(&self.records[point.record as usize * frame.stride..]).0[a];
