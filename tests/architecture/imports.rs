@@ -137,7 +137,9 @@ fn below(tree: &Tree, module: usize, segments: &[String], steps: usize) -> Optio
     if let Some(child) = child {
         return Some(Target::Module(child));
     }
-    for glob in this.imports.iter().filter(|import| import.alias == "*") {
+    // what a glob is of is not sought in it
+    let is_other = |glob: &&Import| glob.path.segments.first() != Some(first);
+    for glob in this.imports.iter().filter(|import| import.alias == "*").filter(is_other) {
         if let Some(Target::Module(next)) = resolve(tree, module, &glob.path.segments, steps)
             && next != module
             && defines(tree, next, first)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::cloud::Intake;
-use crate::derive::derive;
+use crate::derive::derive_attributes;
 use crate::error::{ConvertError, JobFault};
 use crate::gather::{Demand, gather, is_coarse};
 use crate::job::{Build, GroupUnits, Identity, Job, Keeper, SharedJob};
@@ -220,7 +220,7 @@ fn write(
     let mut cloud = gather(plan, &sources, &intake, demand, warnings, keeper, &rt, clock)?;
     drop(reading);
     report::check_lattice(&cloud)?;
-    derive(&mut cloud, &rt, clock)?;
+    derive_attributes(&mut cloud, &rt, clock)?;
     let cloud = cloud;
 
     let (mut outputs, mut open) = (Vec::new(), Vec::new());

@@ -131,7 +131,7 @@ fn surface(points: usize, seed: u64) -> Las {
         let x = (random.unit() * random.unit() * 90_000.0) as i32;
         let y = random.below(30_000) as i32;
         let z = (900.0 * (f64::from(x) / 5000.0).sin() + 400.0 * (f64::from(y) / 2500.0).cos()) as i32;
-        [x, y, if i % 200 == 0 { z + 20_000 + random.below(9000) as i32 } else { z + random.below(60) as i32 }]
+        [x, y, if i.is_multiple_of(200) { z + 20_000 + random.below(9000) as i32 } else { z + random.below(60) as i32 }]
     };
     Las::numbered((0..points).map(|i| place(&mut random, i)))
 }

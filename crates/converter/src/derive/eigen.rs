@@ -118,11 +118,9 @@ fn rotate<const P: usize, const Q: usize, const R: usize>(m: &mut [[f64; 3]; 3],
     m[R][P] = c * p - s * q;
     m[R][Q] = s * p + c * q;
     (m[P][R], m[Q][R]) = (m[R][P], m[R][Q]);
-    for i in 0..3 {
-        let (p, q) = (vectors[P][i], vectors[Q][i]);
-        vectors[P][i] = c * p - s * q;
-        vectors[Q][i] = s * p + c * q;
-    }
+    let (p, q) = (vectors[P], vectors[Q]);
+    vectors[P] = [0, 1, 2].map(|i| c * p[i] - s * q[i]);
+    vectors[Q] = [0, 1, 2].map(|i| s * p[i] + c * q[i]);
 }
 
 #[cfg(test)]

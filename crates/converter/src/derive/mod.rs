@@ -29,7 +29,7 @@ use fields::{Fields, Side, Written};
 use runs::{Runs, UnitRuns};
 use space::Space;
 use task::Task;
-use units::{Unit, put_together, units};
+use units::{Unit, cut, put_together};
 
 use crate::cloud::{Checksum, Cloud, Derived};
 use crate::error::ConvertError;
@@ -39,15 +39,19 @@ use crate::runtime::{Clock, Phase, Runtime};
 const MAX_UNIT_POINTS: u64 = 400_000;
 
 /// Computes what the plan asks for, of all points.
-pub(crate) fn derive(cloud: &mut Cloud<'_>, rt: &Runtime<'_>, clock: &mut Clock<'_>) -> Result<(), ConvertError> {
+pub(crate) fn derive_attributes(
+    cloud: &mut Cloud<'_>,
+    rt: &Runtime<'_>,
+    clock: &mut Clock<'_>,
+) -> Result<(), ConvertError> {
     if cloud.plan.derive.is_nothing() {
         return Ok(());
     }
     clock.begin(Phase::Derive, cloud.points());
     let _working = rt.budget.building(&rt.memory, cloud.points())?;
     let unit_points = rt.budget.task_points(task::bytes_per_point(cloud.frame.stride), MAX_UNIT_POINTS);
-    let (units, _room) = units(cloud, unit_points, rt)?;
-    let task = Task::new(cloud, rt, fields(cloud), space(cloud));
+    let (units, _room) = cut(cloud, unit_points, rt)?;
+    let task = Task::new(cloud, rt, fields(cloud), space(cloud), unit_points);
     let runs = if units.len() > 1 { Some(list_runs(&task, &units)?) } else { None };
     let done: Mutex<Vec<(usize, units::Placed)>> = Mutex::default();
     let work = |worker: &mut task::Worker<'_>, i: usize| {
@@ -72,7 +76,7 @@ pub(crate) fn derive(cloud: &mut Cloud<'_>, rt: &Runtime<'_>, clock: &mut Clock<
     put_together(&mut cloud.cells, &units, done.into_iter().map(|(_, placed)| placed));
     cloud.store.drop_spare(u64::MAX)?;
     cloud.stats.checksum = checksums[1];
-    settle(cloud, written);
+    settle(cloud, &written);
     Ok(())
 }
 
@@ -102,7 +106,7 @@ fn space(cloud: &Cloud<'_>) -> Space {
 }
 
 /// What is known of the new values, as of those that were read.
-fn settle(cloud: &mut Cloud<'_>, written: Written) {
+fn settle(cloud: &mut Cloud<'_>, written: &Written) {
     let fields = cloud.intake.derived;
     let normal = fields.normal.map(|([x, y, z], curvature)| [x, y, z, curvature]);
     let of_normal = normal.into_iter().flatten().enumerate();

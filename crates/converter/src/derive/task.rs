@@ -33,8 +33,13 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    pub(super) fn new(cloud: &'a Cloud<'a>, rt: &'a Runtime<'a>, fields: Fields, space: Space) -> Self {
-        let unit_points = rt.budget.task_points(bytes_per_point(cloud.frame.stride), super::MAX_UNIT_POINTS);
+    pub(super) fn new(
+        cloud: &'a Cloud<'a>,
+        rt: &'a Runtime<'a>,
+        fields: Fields,
+        space: Space,
+        unit_points: u64,
+    ) -> Self {
         Self { rt, cloud, fields, space, unit_points }
     }
 
@@ -156,16 +161,17 @@ impl Worker<'_> {
         let (mut placed, mut next) = (Vec::with_capacity(unit.cells.len()), 0);
         for cell in &unit.cells {
             let mut segments = Vec::new();
-            let end = next + cell.points as usize;
-            for i in next..end {
-                let record = self.points[i].record as usize;
+            let own = next..next + cell.points as usize;
+            next = own.end;
+            let surfaces = self.finder.surfaces[own.clone()].iter();
+            for ((i, point), surface) in own.clone().zip(&self.points[own]).zip(surfaces) {
+                let record = point.record as usize;
                 let of = &mut all[self.of_record[record] as usize];
                 let record = &self.records[record * frame.stride..][..frame.stride];
                 let own = of.add(record, &mut segments, &mut self.put)?;
-                let place = [columns[0][i], columns[1][i], columns[2][i]];
-                self.task.fields.put(own, place, &self.finder.surfaces[i], &mut self.written);
+                let place = columns.each_ref().map(|axis| axis[i]);
+                self.task.fields.put(own, place, surface, &mut self.written);
             }
-            next = end;
             all.iter_mut().for_each(|of| of.end_cell(&mut segments));
             placed.push(segments);
         }

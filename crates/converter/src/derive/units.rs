@@ -29,7 +29,7 @@ impl Unit {
 pub(super) type Placed = Vec<Vec<Segment>>;
 
 /// Units of at most `unit_points`, unless all of their points share one place, in Morton order; and what these lists take.
-pub(super) fn units(
+pub(super) fn cut(
     cloud: &Cloud<'_>,
     unit_points: u64,
     rt: &Runtime<'_>,

@@ -1,6 +1,9 @@
 //! Comparing eight numbers, or one point with eight, at once.
 
 #[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::*;
+
+#[cfg(target_arch = "x86_64")]
 use super::vectors::Detected;
 
 /// Points that are compared at once.
@@ -52,7 +55,6 @@ impl Avx2 {
 impl Compare for Avx2 {
     #[inline(always)]
     fn nearer(self, axes: [&[f32; LANES]; 3], point: [f32; 3], below: f32) -> u32 {
-        use std::arch::x86_64::*;
         // SAFETY: the processor has AVX2, or there were no `Detected`; each load reads the 32 bytes of its array.
         unsafe {
             let square = |a: usize| {
@@ -68,7 +70,6 @@ impl Compare for Avx2 {
 
     #[inline(always)]
     fn at_most(self, values: &[f32; LANES], bound: f32) -> u32 {
-        use std::arch::x86_64::*;
         // SAFETY: the processor has AVX2, or there were no `Detected`; the load reads the 32 bytes of the array.
         unsafe {
             let values = _mm256_loadu_ps(values.as_ptr());
