@@ -44,9 +44,9 @@ def torus(rng, n):
 
 
 def noisy_plane(rng, n):
-    """Deviations of a quarter of the mean distance between points."""
+    """Deviations of a quarter of the mean distance of 200,000 points."""
     xy = rng.uniform(0, 30, (n, 2))
-    z = rng.normal(0, 30 / np.sqrt(n) / 4, n)
+    z = rng.normal(0, 30 / np.sqrt(200_000) / 4, n)
     return np.column_stack([xy, z]), np.tile([0.0, 0.0, 1.0], (n, 1))
 
 

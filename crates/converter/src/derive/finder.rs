@@ -13,8 +13,8 @@ use crate::runtime::{Compare, LANES, Portable, Workers};
 /// Points of a leaf of the hierarchy over a unit: two vectors of single precision.
 const LEAF_POINTS: usize = 16;
 
-/// Points after which a thread looks whether the run is to stop.
-const POINTS_PER_LOOK: usize = 2048;
+/// Points after which a thread looks whether the run is to stop: few, since all of a cloud may be within a distance of each.
+const POINTS_PER_LOOK: usize = 32;
 
 /// What is known of the points outside of a unit.
 #[derive(Clone, Copy)]
