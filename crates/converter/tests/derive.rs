@@ -340,6 +340,15 @@ fn normals_of_scans_stay_unless_they_are_to_be_replaced() {
     let own = [0.6f32, 0.0, -0.8].map(f64::from);
     assert_eq!(rows.iter().filter(|row| row[..3] == own && row[3] == 0.0 && row[4] == 0.75).count(), 75);
     assert_eq!(rows.iter().filter(|row| row[..4] == [0.0, 0.0, 1.0, 0.0] && row[4] > 0.0).count(), 25);
+    // two components are no normal
+    let part = text.replace("property float nz", "property float other");
+    let plan = plan_of(dir.path(), "a.ply", part.as_bytes(), SURFELS);
+    let (report, cloud) = run(&plan);
+    assert_eq!(report.derived.unwrap().kept_normals, 0);
+    assert!(
+        derived(&cloud).iter().all(|row| row[..3] == [0.0, 0.0, 1.0])
+            && cloud.values("other").contains(&f64::from(-0.8f32))
+    );
     let (counts, rows) = made(DeriveNormals::Replace);
     assert_eq!((counts.kept_normals, counts.kept_radii), (0, 75));
     assert!(rows.iter().all(|row| row[..4] == [0.0, 0.0, 1.0, 0.0]));

@@ -80,7 +80,13 @@ impl Intake {
         let unread = all.attributes.iter().zip(needed).filter(|(_, needed)| !**needed);
         let unread = unread.map(|(a, _)| a.name.clone()).collect();
         let of_layout = |layout: &Layout| {
-            let is_replaced = |i: usize| plan.derive.replaces(&all.attributes[i].name);
+            // a part of a normal is none
+            let has = |name: &&str| layout.columns.iter().any(|c| all.attributes[c.attribute].name == **name);
+            let has_normal = NORMALS.iter().all(|name| has(&name));
+            let is_replaced = |i: usize| {
+                let name = all.attributes[i].name.as_str();
+                plan.derive.replaces(name) || plan.derive.makes(name) && NORMALS.contains(&name) && !has_normal
+            };
             let place = |i: usize| places[i].filter(|_| !is_replaced(i));
             let columns: Vec<Option<usize>> = layout.columns.iter().map(|c| place(c.attribute)).collect();
             let read = layout.columns.iter().enumerate().filter(|(i, _)| columns[*i].is_some());

@@ -91,7 +91,7 @@ impl Fields {
         if let Some((normal, curvature)) = self.normal {
             let own = normal.map(|at| read(record, at));
             let is_direction = read(record, curvature).to_bits() == DerivedFields::IS_DIRECTION.to_bits();
-            let length: f32 = own.iter().map(|v| v * v).sum();
+            let length: f64 = own.iter().map(|v| f64::from(*v) * f64::from(*v)).sum();
             let put = if !is_direction && length.is_finite() && length > 0.0 {
                 written.kept_normals += 1;
                 own
@@ -180,6 +180,9 @@ mod tests {
         let (seen, written) = put(Side::Up, [0.0, 0.0, -3.0, 0.0, 0.5], SURFACE);
         assert_eq!(seen, [0.0, 0.0, -3.0, 0.1, 0.5]);
         assert_eq!((written.kept_normals, written.kept_radii), (1, 1));
+        for own in [1e-30, 1e30] {
+            assert_eq!(put(Side::Up, [own, 0.0, 0.0, 0.0, 0.0], SURFACE).0[..3], [own, 0.0, 0.0]);
+        }
         let (seen, written) = put(Side::Up, [f32::NAN, 0.0, 0.0, 0.0, f32::NAN], Surface::default());
         assert_eq!(seen, [0.0; 5]);
         assert_eq!((written.without_normal, written.without_radius), (1, 1));

@@ -23,6 +23,9 @@ pub(super) struct Others<'a> {
     pub(super) unit: usize,
 }
 
+/// Points that are reported together.
+const POINTS_PER_STEP: usize = 512;
+
 /// A thread's memory.
 pub(super) struct Finder {
     /// Coordinates of the points of the unit, in Morton order.
@@ -62,6 +65,9 @@ impl Finder {
             if i % POINTS_PER_LOOK == 0 {
                 workers.check_stop()?;
             }
+            if i > 0 && i % POINTS_PER_STEP == 0 {
+                workers.advance(POINTS_PER_STEP as u64);
+            }
             let q = columns.map(|axis| axis[i]);
             let mut step = None;
             if let Some((place, surface)) = before {
@@ -87,6 +93,7 @@ impl Finder {
             before = Some((q, surface));
             self.surfaces.push(surface);
         }
+        workers.advance((points - points.saturating_sub(1) / POINTS_PER_STEP * POINTS_PER_STEP) as u64);
         Ok(())
     }
 

@@ -57,7 +57,6 @@ pub(crate) fn derive_attributes(
     let work = |worker: &mut task::Worker<'_>, i: usize| {
         let placed = worker.unit(&units[i], i, runs.as_ref())?;
         done.lock().map_err(|_| ConvertError::Internal("a worker thread failed".into()))?.push((i, placed));
-        rt.advance(units[i].points());
         Ok(())
     };
     let all = rt.in_parallel(units.len(), || task.worker(), work, task::Worker::finish)?;

@@ -203,6 +203,7 @@ impl Worker<'_> {
                 let block = store.open(source)?;
                 store.fill(block, &mut records)?;
                 segments.push(Segment { block, start: 0, count: part.count });
+                self.task.rt.advance(part.count.into());
             }
             placed.push(segments);
         }

@@ -13,6 +13,11 @@ pub(super) fn add(schema: &mut Schema, layouts: &mut [Layout], derive: &Derive) 
     for name in derive.names() {
         let computed = Attribute::new(name, AttributeType::Float32, 1);
         match attributes.iter().position(|a| a.name == name) {
+            // vectors are something else
+            Some(i) if attributes[i].elements != 1 => {
+                attributes[i].name = format!("{name} of the scans");
+                attributes.push(computed);
+            }
             Some(i) => {
                 let description = std::mem::take(&mut attributes[i].description);
                 attributes[i] = computed;
@@ -66,5 +71,15 @@ mod tests {
         let (column, _) = recast.apply(&pointmill_format::Column::UInt16(vec![250]));
         assert_eq!(column, pointmill_format::Column::Float32(vec![0.25]));
         assert_eq!(layouts[1].columns[0].recast, None);
+    }
+
+    #[test]
+    fn vectors_of_that_name_stay_what_they_are() {
+        let lists: [Arc<[Attribute]>; 1] = [[Attribute::new("radius", AttributeType::Float32, 3)].into()];
+        let Union { mut schema, mut layouts, .. } = Union::of(&lists);
+        add(&mut schema, &mut layouts, &Derive { radius: true, ..Derive::default() });
+        let names: Vec<(&str, usize)> = schema.attributes.iter().map(|a| (a.name.as_str(), a.elements)).collect();
+        assert_eq!(names, [("radius of the scans", 3), ("radius", 1)]);
+        assert_eq!((layouts[0].columns[0].attribute, &layouts[0].columns[0].recast), (0, &None));
     }
 }
