@@ -81,8 +81,8 @@ impl Intake {
         let unread = unread.map(|(a, _)| a.name.clone()).collect();
         let of_layout = |layout: &Layout| {
             // a part of a normal is none
-            let has = |name: &&str| layout.columns.iter().any(|c| all.attributes[c.attribute].name == **name);
-            let has_normal = NORMALS.iter().all(|name| has(&name));
+            let has = |name: &&str| layout.columns.iter().any(|c| all.attributes[c.attribute].name == *name);
+            let has_normal = NORMALS.iter().all(has);
             let is_replaced = |i: usize| {
                 let name = all.attributes[i].name.as_str();
                 plan.derive.replaces(name) || plan.derive.makes(name) && NORMALS.contains(&name) && !has_normal
