@@ -3,11 +3,13 @@
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
-use std::process::{Child, ChildStderr, Command, Output, Stdio};
+use std::process::{Child, ChildStderr, Output, Stdio};
 
+use nix::sys::signal::Signal;
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 
+use crate::signals::send;
 use crate::support::{Dir, Ended};
 
 fn stage() -> Dir {
@@ -36,8 +38,14 @@ impl Stopped {
         while !said.contains(&format!("{phase:?}")) {
             assert!(stderr.read_line(&mut said).unwrap() > 0, "{said}");
         }
-        signal(&child, "-STOP");
+        send(&child, Signal::SIGSTOP);
         Self { child, stderr, said }
+    }
+
+    /// Is interrupted as Ctrl-C does it.
+    pub(crate) fn interrupt(self) -> Ended {
+        send(&self.child, Signal::SIGINT);
+        self.end()
     }
 
     /// Is killed.
@@ -48,15 +56,11 @@ impl Stopped {
 
     /// Goes on to the end.
     pub(crate) fn end(mut self) -> Ended {
-        signal(&self.child, "-CONT");
+        send(&self.child, Signal::SIGCONT);
         std::io::Read::read_to_string(&mut self.stderr, &mut self.said).unwrap();
         let status = self.child.wait().unwrap();
         Ended(Output { status, stdout: Vec::new(), stderr: self.said.into_bytes() })
     }
-}
-
-fn signal(child: &Child, signal: &str) {
-    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
 }
 
 #[test]

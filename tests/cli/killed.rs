@@ -11,6 +11,7 @@ use pointmill_testkit::Random;
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 
+use crate::signals::wait_until;
 use crate::support::{Dir, OUTPUTS};
 
 const JOB: [&str; 2] = ["--checkpoint", "10000"];
@@ -39,7 +40,12 @@ fn a_killed_run_to_any_output_leaves_the_old_dataset_or_the_new_one_and_the_next
             }
             let args = [&convert("scans", "out")[..], job, &["--overwrite"]].concat();
             let mut child = dir.command(&args).stderr(Stdio::null()).spawn().unwrap();
-            std::thread::sleep(Duration::from_micros(random.below(took)));
+            if kill == 0 {
+                // as soon as it has made something
+                wait_until("it works", || dir.names().len() > 5 || child.try_wait().unwrap().is_some());
+            } else {
+                std::thread::sleep(Duration::from_micros(random.below(took)));
+            }
             child.kill().unwrap();
             killed += u32::from(child.wait().unwrap().signal() == Some(9));
             match dir.path("out").exists() {

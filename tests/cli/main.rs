@@ -42,13 +42,14 @@ mod precision;
 mod preview;
 mod reporting;
 mod required_precision;
-
 mod resuming;
 mod same_points;
 mod sameness;
 mod scans_within;
 mod scene_attributes;
 mod several;
+#[cfg(unix)]
+mod signals;
 mod stops;
 mod support;
 mod text_inputs;

@@ -2,16 +2,16 @@
 //! process is killed.
 #![cfg(unix)]
 
-use std::os::unix::process::ExitStatusExt as _;
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
 
 use pointmill_testkit::Random;
 use pointmill_testkit::files::dataset;
 use pointmill_testkit::las::Las;
 
 use crate::at_once::Stopped;
-use crate::support::{Dir, Ended};
+use crate::signals::wait_until;
+use crate::support::Dir;
 
 const CONVERT: [&str; 7] = ["convert", "scans", "-o", "out", "--checkpoint", "50000", "-q"];
 
@@ -28,42 +28,72 @@ fn stage() -> Dir {
 fn runs_that_are_killed_again_and_again_end_in_the_same_bytes() {
     let dir = stage();
     let expected = dataset(&dir.path("plain"));
+    let begun = Instant::now();
+    dir.succeed(CONVERT);
+    let took = begun.elapsed().as_micros() as u64;
+    std::fs::remove_dir_all(dir.path("out")).unwrap();
     let mut random = Random::new(5);
-    let (mut killed, mut saved) = (0, 0);
     for round in 0..3 {
         for _ in 0..8 {
             let mut child = dir.command(CONVERT).arg("--resume").stderr(Stdio::null()).spawn().unwrap();
-            std::thread::sleep(Duration::from_micros(20_000 + random.below(400_000)));
+            std::thread::sleep(Duration::from_micros(random.below(took)));
             child.kill().unwrap();
-            killed += u32::from(child.wait().unwrap().signal() == Some(9));
+            child.wait().unwrap();
             if dir.path("out").exists() {
                 std::fs::remove_dir_all(dir.path("out")).unwrap();
             }
         }
+        // whatever these have left, one more ends with all points read
+        Stopped::new(&dir, &["--checkpoint", "50000", "--resume"], "build").kill();
         dir.succeed(CONVERT.into_iter().chain(["--resume"]));
-        saved += dir.report("out")["recalled_points"].as_u64().unwrap_or(0);
+        assert_eq!(dir.report("out")["recalled_points"], 360_000, "round {round}");
         assert!(dataset(&dir.path("out")) == expected, "round {round}");
         assert_eq!(dir.names(), ["out", "plain", "scans"], "round {round}");
         std::fs::remove_dir_all(dir.path("out")).unwrap();
     }
-    assert!(killed >= 6 && saved > 0, "{killed} runs were killed, {saved} points were not read again");
+}
+
+/// Some of the points are safe, and the rest is read: the first segments of a run that is killed as soon as there are any.
+#[test]
+fn a_run_that_is_killed_while_it_reads_has_its_finished_units() {
+    let dir = stage();
+    let mut saved = 0;
+    for _ in 0..20 {
+        let mut child = dir.command(CONVERT).args(["--threads", "1"]).stderr(Stdio::null()).spawn().unwrap();
+        let journal = dir.path("out.job/journal");
+        let size = || std::fs::metadata(&journal).map_or(0, |file| file.len());
+        // it grows with its magic, with the plan, and with each unit
+        let mut sizes = vec![0];
+        wait_until("a unit is done", || {
+            let now = size();
+            if sizes.last() != Some(&now) {
+                sizes.push(now);
+            }
+            sizes.len() > 3 || child.try_wait().unwrap().is_some()
+        });
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if dir.path("out").exists() {
+            std::fs::remove_dir_all(dir.path("out")).unwrap();
+            continue;
+        }
+        dir.succeed(CONVERT.into_iter().chain(["--resume"]));
+        saved = dir.report("out")["recalled_points"].as_u64().unwrap();
+        assert!(dataset(&dir.path("out")) == dataset(&dir.path("plain")));
+        std::fs::remove_dir_all(dir.path("out")).unwrap();
+        if 0 < saved && saved < 360_000 {
+            return;
+        }
+    }
+    panic!("no run was met while it read; the last had saved {saved} points");
 }
 
 #[test]
 fn an_interrupted_run_says_what_is_safe_and_a_changed_one_is_refused() {
     let dir = stage();
-    let mut random = Random::new(6);
-    let said = (0..40).find_map(|_| {
-        let child = dir.command(CONVERT).stderr(Stdio::piped()).spawn().unwrap();
-        std::thread::sleep(Duration::from_micros(20_000 + random.below(400_000)));
-        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-        let ended = Ended(child.wait_with_output().unwrap());
-        if dir.path("out").exists() {
-            std::fs::remove_dir_all(dir.path("out")).unwrap();
-        }
-        (ended.0.status.code() == Some(130) && dir.path("out.job").exists()).then_some(ended)
-    });
-    let said = said.expect("a run that was met while it read").stderr();
+    let ended = Stopped::new(&dir, &["--checkpoint", "50000"], "build").interrupt();
+    assert_eq!((ended.code(), dir.path("out.job").exists()), (130, true), "{}", ended.stderr());
+    let said = ended.stderr();
     assert!(said.contains("interrupted; what was read is safe in ") && said.contains("--resume"), "{said}");
     let more =
         |more: &[&'static str]| CONVERT.into_iter().chain(["--resume"]).chain(more.iter().copied()).collect::<Vec<_>>();

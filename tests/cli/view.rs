@@ -7,10 +7,14 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, SystemTime};
 
+#[cfg(unix)]
+use nix::sys::signal::Signal;
 use pointmill_testkit::files::fixture;
 use pointmill_testkit::las::Las;
 use serde_json::Value;
 
+#[cfg(unix)]
+use crate::signals::send;
 use crate::support::Dir;
 
 /// The program while it serves; killed if it was not stopped.
@@ -57,8 +61,7 @@ impl Serving {
     /// Ends it as Ctrl-C does; exit code and lines on standard error.
     #[cfg(unix)]
     fn interrupt(mut self) -> (Option<i32>, String) {
-        let kill = std::process::Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
-        assert!(kill.success());
+        send(&self.child, Signal::SIGINT);
         let mut lines = String::new();
         self.child.stderr.take().unwrap().read_to_string(&mut lines).unwrap();
         (self.child.wait().unwrap().code(), lines)
@@ -115,8 +118,7 @@ fn a_conversion_that_is_interrupted_leaves_nothing() {
     let mut child = dir.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     let seen: Vec<String> = lines.by_ref().take_while(|line| !line.contains("\"build\"")).collect();
-    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(kill.success(), "{seen:?}");
+    send(&child, Signal::SIGINT);
     let rest: Vec<String> = lines.collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
     assert!(rest.last().unwrap().starts_with("pointmill: interrupted"), "{rest:?}");
