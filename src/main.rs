@@ -15,6 +15,7 @@ mod crs_choice;
 mod datasets;
 mod depth_choice;
 mod exit;
+mod fitting;
 mod flags;
 mod human;
 mod inputs;
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
+    fitting::begins(&args.command);
     match &args.command {
         Command::Convert(convert) => convert::run(convert),
         Command::Job(job) => job::run(job),

@@ -27,7 +27,9 @@ pub(crate) use convert::{
     TargetArg, VerifyArg,
 };
 pub(crate) use export::ExportArgs;
-pub(crate) use job::{JobArgs, JobCommand, JobFinishArgs, JobPlanArgs, JobResources, JobRunArgs, JobUnitsArgs, Share};
+pub(crate) use job::{
+    JobArgs, JobCommand, JobFinishArgs, JobPlanArgs, JobResources, JobRunArgs, JobUnitsArgs, NOT_IN_JOBS, Share,
+};
 pub(crate) use manual::{CompletionsArgs, ManArgs};
 pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use preview::PreviewArgs;
