@@ -246,8 +246,9 @@ impl Description {
         })?;
         if !Lattice::from(description.lattice).is_valid() {
             let Lattice { scale, offset: origin } = description.lattice.into();
-            let what =
-                format!("the description has the scales {scale:?} and offsets {origin:?}; scales have to be above 0");
+            let what = format!(
+                "the description has the lattice of scales {scale:?} and offsets {origin:?}; scales have to be > 0"
+            );
             return Err(ReadError::broken(path, offset, what).advise(super::header::CORRUPT));
         }
         Ok(description)

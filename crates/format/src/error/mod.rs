@@ -203,7 +203,7 @@ pub(crate) fn json_reason(error: &serde_json::Error) -> String {
 ///
 /// ```
 /// let error = pointmill_format::serde_json::from_str::<Vec<f64>>("[1, {}]").unwrap_err();
-/// assert_eq!(pointmill_format::json_fault(&error), "an object, expected a number (line 1, column 5)");
+/// assert_eq!(pointmill_format::json_fault(&error), "an object, expected a number (line 1, column 4)");
 /// ```
 #[must_use]
 pub fn json_fault(error: &serde_json::Error) -> String {
