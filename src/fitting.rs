@@ -2,22 +2,23 @@
 
 use std::sync::OnceLock;
 
-use clap::CommandFactory as _;
+use clap::Command;
 
-use crate::args::{Args, Command, JobCommand, NOT_IN_JOBS};
+/// Options of `convert` that a job cannot have.
+pub(crate) const NOT_IN_JOBS: [&str; 5] = ["--dry-run", "--resume", "--append", "--page", "--json"];
 
-/// The command that runs, as it is typed behind the name of the program.
-static RUNNING: OnceLock<&'static str> = OnceLock::new();
+/// The command that runs, as it is typed behind the name of the program, and all that there are.
+static RUNNING: OnceLock<(&'static str, Command)> = OnceLock::new();
 
-/// Advice is for this command from now on.
-pub(crate) fn begins(command: &Command) {
+/// Advice is for this command from now on. `all`: the definition of the command line.
+pub(crate) fn begins(command: &'static str, all: Command) {
     // a process runs one command
-    let _ = RUNNING.set(name(command));
+    let _ = RUNNING.set((command, all));
 }
 
 /// The command that runs.
 pub(crate) fn running() -> &'static str {
-    RUNNING.get().copied().unwrap_or("convert")
+    RUNNING.get().map_or("convert", |(command, _)| *command)
 }
 
 /// The advice, if somebody who typed `command` can follow it; where its options are those of another command, with the name of that
@@ -49,13 +50,9 @@ fn has_all(command: &str, advice: &str) -> bool {
 
 /// The options of a command, without the dashes.
 fn options(command: &str) -> Vec<String> {
-    let mut found = Args::command();
-    for word in command.split(' ') {
-        match found.find_subcommand(word).cloned() {
-            Some(inner) => found = inner,
-            None => return Vec::new(),
-        }
-    }
+    let all = RUNNING.get().map(|(_, all)| all);
+    let inner = |found: Option<&'static Command>, word| found.and_then(|found| found.find_subcommand(word));
+    let Some(found) = command.split(' ').fold(all, inner) else { return Vec::new() };
     let names = found.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned));
     let is_refused = |name: &str| command == "job plan" && NOT_IN_JOBS.iter().any(|option| option[2..] == *name);
     names.filter(|name| !is_refused(name)).collect()
@@ -67,34 +64,16 @@ fn named(text: &str) -> impl Iterator<Item = &str> {
     words.filter_map(|word| word.strip_prefix("--")).filter(|name| !name.is_empty())
 }
 
-const fn name(command: &Command) -> &'static str {
-    match command {
-        Command::Convert(_) => "convert",
-        Command::Job(job) => match &job.command {
-            JobCommand::Plan(_) => "job plan",
-            JobCommand::Units(_) => "job units",
-            JobCommand::Run(_) => "job run",
-            JobCommand::Finish(_) => "job finish",
-            JobCommand::Status(_) => "job status",
-        },
-        Command::Export(_) => "export",
-        Command::Measure(_) => "measure",
-        Command::Validate(_) => "validate",
-        Command::Extract(_) => "extract",
-        Command::Info(_) => "info",
-        Command::Preview(_) => "preview",
-        Command::View(_) => "view",
-        Command::Completions(_) => "completions",
-        Command::Man(_) => "man",
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use clap::{CommandFactory as _, Parser as _};
+
     use super::*;
+    use crate::args::Args;
 
     #[test]
     fn advice_is_followed_where_its_options_are() {
+        begins("convert", Args::command());
         let skip = "pass --unreadable skip";
         for command in ["convert", "export", "extract", "job plan"] {
             assert_eq!(fitted(command, skip).as_deref(), Some(skip), "{command}");
@@ -113,6 +92,7 @@ mod tests {
     /// A name that is none of a command has no options, and would hide that of a command that was renamed.
     #[test]
     fn every_name_is_that_of_a_command() {
+        begins("convert", Args::command());
         let mut leaves = Vec::new();
         for command in Args::command().get_subcommands() {
             let inner: Vec<_> = command.get_subcommands().map(|inner| inner.get_name()).collect();
@@ -129,9 +109,8 @@ mod tests {
         for typed in
             ["job run d --share 1/1", "job status d", "view a", "info a", "export a -o b.las", "extract a -o d"]
         {
-            let args =
-                <Args as clap::Parser>::try_parse_from(["pointmill"].into_iter().chain(typed.split(' '))).unwrap();
-            assert!(typed.starts_with(name(&args.command)), "{typed}");
+            let args = Args::try_parse_from(["pointmill"].into_iter().chain(typed.split(' '))).unwrap();
+            assert!(typed.starts_with(args.command.name()), "{typed}");
         }
     }
 }

@@ -204,6 +204,7 @@ mod tests {
 
     #[test]
     fn every_line_names_an_option_and_nothing_is_said_twice() {
+        crate::fitting::begins("convert", <crate::args::Args as clap::CommandFactory>::command());
         let others = Aabb { min: [0.0, -1.0, 2.5], max: [10.0, 20.0, 30.0] };
         let outliers = Warning::Outliers { points: 2, others, factor: 11.0, holds_back_step: false };
         let line = warning_line(&outliers);
@@ -218,6 +219,7 @@ mod tests {
 
     #[test]
     fn a_line_fits_the_command() {
+        crate::fitting::begins("convert", <crate::args::Args as clap::CommandFactory>::command());
         let skip = |command| read_advice_in(command, &ReadAdvice::SkipUnreadable);
         assert_eq!(skip("validate"), "copy the file again");
         assert_eq!(skip("convert"), "copy the file again, or pass --unreadable skip to convert the rest");

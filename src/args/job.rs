@@ -33,9 +33,6 @@ pub(crate) enum JobCommand {
     Status(JobUnitsArgs),
 }
 
-/// Options of [`ConvertArgs`] that a job cannot have.
-pub(crate) const NOT_IN_JOBS: [&str; 5] = ["--dry-run", "--resume", "--append", "--page", "--json"];
-
 #[derive(Debug, ClapArgs)]
 pub(crate) struct JobPlanArgs {
     /// Folder of the job, which all processes see under this path; it is made

@@ -27,9 +27,7 @@ pub(crate) use convert::{
     TargetArg, VerifyArg,
 };
 pub(crate) use export::ExportArgs;
-pub(crate) use job::{
-    JobArgs, JobCommand, JobFinishArgs, JobPlanArgs, JobResources, JobRunArgs, JobUnitsArgs, NOT_IN_JOBS, Share,
-};
+pub(crate) use job::{JobArgs, JobCommand, JobFinishArgs, JobPlanArgs, JobResources, JobRunArgs, JobUnitsArgs, Share};
 pub(crate) use manual::{CompletionsArgs, ManArgs};
 pub(crate) use measure::{BUDGET, MeasureArgs, SAMPLE};
 pub(crate) use preview::PreviewArgs;
@@ -84,6 +82,31 @@ pub(crate) enum Command {
     /// Writes manual pages
     #[command(after_help = examples::MAN)]
     Man(ManArgs),
+}
+
+impl Command {
+    /// As it is typed behind the name of the program.
+    pub(crate) const fn name(&self) -> &'static str {
+        match self {
+            Self::Convert(_) => "convert",
+            Self::Job(job) => match &job.command {
+                JobCommand::Plan(_) => "job plan",
+                JobCommand::Units(_) => "job units",
+                JobCommand::Run(_) => "job run",
+                JobCommand::Finish(_) => "job finish",
+                JobCommand::Status(_) => "job status",
+            },
+            Self::Export(_) => "export",
+            Self::Measure(_) => "measure",
+            Self::Validate(_) => "validate",
+            Self::Extract(_) => "extract",
+            Self::Info(_) => "info",
+            Self::Preview(_) => "preview",
+            Self::View(_) => "view",
+            Self::Completions(_) => "completions",
+            Self::Man(_) => "man",
+        }
+    }
 }
 
 #[derive(Debug, ClapArgs)]

@@ -17,9 +17,10 @@ use super::report_file::ReportFile;
 use super::verify::verify;
 use crate::args::{
     CheckpointArg, Command, ConvertArgs, JobArgs, JobCommand, JobFinishArgs, JobPlanArgs, JobResources, JobRunArgs,
-    JobUnitsArgs, NOT_IN_JOBS, Share,
+    JobUnitsArgs, Share,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
+use crate::fitting::NOT_IN_JOBS;
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::interrupt::{no_more_checks, stop_flag};
