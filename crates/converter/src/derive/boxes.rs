@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::space::{Space, outside, squared};
+use super::space::{Space, apart, squared};
 use crate::runtime::{Compare, LANES};
 
 /// Children of a node.
@@ -18,6 +18,12 @@ pub(super) struct Box3 {
 impl Box3 {
     const EMPTY: Self = Self { min: [i32::MAX; 3], max: [i32::MIN; 3] };
 
+    /// Of one place.
+    #[inline(always)]
+    pub(super) fn at(place: [i32; 3]) -> Self {
+        Self { min: place, max: place }
+    }
+
     /// Of points whose coordinates are in columns.
     pub(super) fn of([x, y, z]: [&[i32]; 3]) -> Self {
         let ends = |axis: &[i32]| axis.iter().fold((i32::MAX, i32::MIN), |(min, max), v| (min.min(*v), max.max(*v)));
@@ -28,12 +34,13 @@ impl Box3 {
     /// Of some places.
     pub(super) fn around(places: impl Iterator<Item = [i32; 3]>) -> Self {
         places.fold(Self::EMPTY, |mut all, place| {
-            all.join(&Self { min: place, max: place });
+            all.join(&Self::at(place));
             all
         })
     }
 
-    fn join(&mut self, other: &Self) {
+    #[inline(always)]
+    pub(super) fn join(&mut self, other: &Self) {
         for a in 0..3 {
             self.min[a] = self.min[a].min(other.min[a]);
             self.max[a] = self.max[a].max(other.max[a]);
@@ -51,16 +58,12 @@ struct Node {
 }
 
 impl Node {
-    /// Squares of the distances of a place from the boxes.
+    /// Squares of the distances of a box from the boxes.
     #[inline(always)]
-    fn distances(&self, q: [i32; 3], space: &Space) -> [f32; WIDTH] {
+    fn distances(&self, of: &Box3, space: &Space) -> [f32; WIDTH] {
         let mut sums = [0.0; WIDTH];
         for (i, sum) in sums.iter_mut().enumerate() {
-            let beside = [
-                outside(q[0], self.min[0][i], self.max[0][i]),
-                outside(q[1], self.min[1][i], self.max[1][i]),
-                outside(q[2], self.min[2][i], self.max[2][i]),
-            ];
+            let beside = [0, 1, 2].map(|a| apart([of.min[a], of.max[a]], [self.min[a][i], self.max[a][i]]));
             *sum = squared(beside, space.scale);
         }
         sums
@@ -131,26 +134,26 @@ impl Boxes {
         self.levels.iter().map(|nodes| (nodes.capacity() * size_of::<Node>()) as u64).sum()
     }
 
-    /// The runs whose boxes may hold a point that is near enough to `q`, but for those in `known`; nearer boxes first, by and large.
+    /// The runs whose boxes may hold a point that is near enough to a box, but for those in `known`; nearer boxes first, by and large.
     /// `stack` is memory.
     #[inline(always)]
     pub(super) fn near<'a>(
         &'a self,
-        q: [i32; 3],
+        of: Box3,
         space: &'a Space,
         known: &'a Range<u32>,
         stack: &'a mut Vec<Waiting>,
     ) -> Near<'a> {
         stack.clear();
         stack.push(Waiting { distance: 0.0, level: self.levels.len() as u32, index: 0 });
-        Near { boxes: self, q, space, known, stack }
+        Near { boxes: self, of, space, known, stack }
     }
 }
 
-/// A walk through the boxes near a place.
+/// A walk through the boxes near one.
 pub(super) struct Near<'a> {
     boxes: &'a Boxes,
-    q: [i32; 3],
+    of: Box3,
     space: &'a Space,
     known: &'a Range<u32>,
     stack: &'a mut Vec<Waiting>,
@@ -171,7 +174,7 @@ impl Near<'_> {
             else {
                 continue;
             };
-            let distances = node.distances(self.q, self.space);
+            let distances = node.distances(&self.of, self.space);
             let base = self.stack.len();
             let mut hits = lanes.at_most(&distances, bound);
             hits &= (1 << node.children) - 1;
@@ -228,13 +231,14 @@ mod tests {
                 .collect();
             boxes.build(all.iter().copied());
             for _ in 0..50 {
-                let q: [i32; 3] = std::array::from_fn(|_| random.below(1000) as i32);
+                let of = Box3::at(std::array::from_fn(|_| random.below(1000) as i32));
+                let of = Box3 { max: of.max.map(|v| v + random.below(2) as i32 * 40), ..of };
                 let bound = random.below(200_000) as f32;
                 let known = random.below(runs as u64 + 1) as u32;
                 let known = known..known + random.below(u64::from(runs as u32 - known) + 1) as u32;
                 let mut found = Vec::new();
                 let mut stack = Vec::new();
-                let mut near = boxes.near(q, &space, &known, &mut stack);
+                let mut near = boxes.near(of, &space, &known, &mut stack);
                 while let Some(run) = near.next(Portable, bound) {
                     found.push(run);
                 }
@@ -242,7 +246,7 @@ mod tests {
                 found.sort_unstable();
                 let is_near = |run: &u32| {
                     let Box3 { min, max } = all[*run as usize];
-                    let beside = std::array::from_fn(|a| outside(q[a], min[a], max[a]));
+                    let beside = std::array::from_fn(|a| apart([of.min[a], of.max[a]], [min[a], max[a]]));
                     squared(beside, space.scale) <= bound && !known.contains(run)
                 };
                 let expected: Vec<u32> = (0..runs as u32).filter(is_near).collect();

@@ -1,7 +1,11 @@
 //! The surfaces through the points of a unit: a thread's part of the work.
+//!
+//! Points that follow each other in Morton order lie close together: what is around them is gathered once, and their neighbours are
+//! chosen of that. Where these turn out to be farther away than was gathered, the hierarchy is asked for the one point.
 
 use std::ops::Range;
 
+use super::around::{Around, Places};
 use super::boxes::{Box3, Boxes, Waiting};
 use super::collect::Collect;
 use super::runs::{Lookup, Runs};
@@ -16,15 +20,22 @@ const LEAF_POINTS: usize = 16;
 /// Points after which a thread looks whether the run is to stop: few, since all of a cloud may be within a distance of each.
 const POINTS_PER_LOOK: usize = 32;
 
+/// Points around which what is near is gathered at once, at most, and the side of their box, to the distance that is gathered.
+const TOGETHER: usize = 32;
+const SIDE: f32 = 2.0;
+
+/// So many points are looked at by themselves where there is too much around them.
+const ALONE: usize = 16;
+
+/// Points that are reported together.
+const POINTS_PER_STEP: usize = 512;
+
 /// What is known of the points outside of a unit.
 #[derive(Clone, Copy)]
 pub(super) struct Others<'a> {
     pub(super) runs: &'a Runs,
     pub(super) unit: usize,
 }
-
-/// Points that are reported together.
-const POINTS_PER_STEP: usize = 512;
 
 /// A thread's memory.
 pub(super) struct Finder {
@@ -33,14 +44,22 @@ pub(super) struct Finder {
     /// By point.
     pub(super) surfaces: Vec<Surface>,
     leaves: Boxes,
+    around: Around,
     stack: Vec<Waiting>,
     lookup: Lookup,
 }
 
 impl Finder {
-    pub(super) fn new() -> Self {
-        let columns = std::array::from_fn(|_| Vec::new());
-        Self { columns, surfaces: Vec::new(), leaves: Boxes::default(), stack: Vec::new(), lookup: Lookup::new() }
+    /// For neighbourhoods of so many points, where that is known.
+    pub(super) fn new(neighbours: Option<usize>) -> Self {
+        Self {
+            columns: std::array::from_fn(|_| Vec::new()),
+            surfaces: Vec::new(),
+            leaves: Boxes::default(),
+            around: Around::new(neighbours),
+            stack: Vec::new(),
+            lookup: Lookup::new(),
+        }
     }
 
     /// Finds the surface through each point of the unit. `others`: nothing, if the unit is the cloud.
@@ -54,13 +73,16 @@ impl Finder {
         collect: &mut impl Collect,
     ) -> Result<(), ConvertError> {
         let points = self.columns[0].len();
-        let leaf = |i: usize| i * LEAF_POINTS..((i + 1) * LEAF_POINTS).min(points);
         let columns = self.columns.each_ref().map(Vec::as_slice);
-        let of = |range: Range<usize>| columns.map(|axis| &axis[range.clone()]);
-        self.leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(of(leaf(i)))));
+        let leaf = |i: usize| columns.map(|axis| &axis[i * LEAF_POINTS..((i + 1) * LEAF_POINTS).min(points)]);
+        self.leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(leaf(i))));
         self.surfaces.clear();
         self.surfaces.reserve(points);
+        let places = Places { columns, leaves: &self.leaves, leaf_points: LEAF_POINTS, others };
+        let (stack, lookup) = (&mut self.stack, &mut self.lookup);
+        let mut search = Search { lanes, space, places, around: &mut self.around, within: 0.0, stack, lookup, collect };
         let mut before: Option<([i32; 3], Surface)> = None;
+        let (mut gathered, mut alone) = (0..0, 0);
         for i in 0..points {
             if i % POINTS_PER_LOOK == 0 {
                 workers.check_stop()?;
@@ -77,19 +99,17 @@ impl Finder {
                 }
                 step = Some(squared([0, 1, 2].map(|a| between(q[a], place[a])), space.scale));
             }
-            collect.begin(q, step);
-            // its own leaf first: then the bound is near to what it will be
-            let own = i / LEAF_POINTS;
-            let known = own as u32..own as u32 + 1;
-            scan(lanes, of(leaf(own)), q, space, collect);
-            let mut near = self.leaves.near(q, space, &known, &mut self.stack);
-            while let Some(run) = near.next(lanes, collect.bound()) {
-                scan(lanes, of(leaf(run as usize)), q, space, collect);
+            if i >= gathered.end && i >= alone {
+                gathered = search.gather(i)?;
+                if gathered.is_empty() {
+                    alone = i + ALONE;
+                }
             }
-            if let Some(others) = others {
-                beyond(lanes, q, space, others, &mut self.stack, &mut self.lookup, collect)?;
+            if !(gathered.contains(&i) && search.choose(q, step)) {
+                search.one(i, q, step)?;
+                gathered = 0..0; // the next ones are as far from their neighbours
             }
-            let surface = collect.surface(space);
+            let surface = search.collect.surface(space);
             before = Some((q, surface));
             self.surfaces.push(surface);
         }
@@ -109,6 +129,81 @@ impl Finder {
     }
 }
 
+/// The search in a unit.
+struct Search<'a, L, C> {
+    lanes: L,
+    space: &'a Space,
+    places: Places<'a>,
+    around: &'a mut Around,
+    /// What it has gathered: of all points within this square of a distance of each of some.
+    within: f32,
+    stack: &'a mut Vec<Waiting>,
+    lookup: &'a mut Lookup,
+    collect: &'a mut C,
+}
+
+impl<L: Compare, C: Collect> Search<'_, L, C> {
+    /// Gathers what is around the next points; those are returned.
+    #[inline(always)]
+    fn gather(&mut self, i: usize) -> Result<Range<usize>, ConvertError> {
+        let Some(within) = self.collect.gathered() else { return Ok(0..0) };
+        let columns = self.places.columns;
+        let most = SIDE * SIDE * within;
+        let mut of = Box3::at(columns.map(|axis| axis[i]));
+        let mut end = i + 1;
+        while end < columns[0].len().min(i + TOGETHER) {
+            let mut all = of;
+            all.join(&Box3::at(columns.map(|axis| axis[end])));
+            let side = |a: usize| between(all.max[a], all.min[a]) * self.space.scale[a];
+            if (0..3).any(|a| side(a) * side(a) > most) {
+                break;
+            }
+            (of, end) = (all, end + 1);
+        }
+        self.within = within;
+        let is_all = self.around.gather(self.lanes, of, within, &self.places, self.space, self.stack, self.lookup)?;
+        Ok(if is_all { i..end } else { 0..0 })
+    }
+
+    /// Puts the neighbourhood of a point together of what was gathered. False: it reaches beyond that.
+    #[inline(always)]
+    fn choose(&mut self, q: [i32; 3], step: Option<f32>) -> bool {
+        let expected = self.collect.expected(step).min(self.within);
+        for within in [expected, self.within] {
+            self.collect.begin_within(q, within);
+            self.around.offer_all(self.lanes, q, self.space, self.collect);
+            if self.collect.is_complete() {
+                return true;
+            }
+            if expected == self.within {
+                break;
+            }
+        }
+        false
+    }
+
+    /// Puts the neighbourhood of a point together of what the hierarchy finds.
+    #[inline(always)]
+    fn one(&mut self, i: usize, q: [i32; 3], step: Option<f32>) -> Result<(), ConvertError> {
+        let Places { columns, leaves, leaf_points, others } = self.places;
+        let points = columns[0].len();
+        let leaf = |i: usize| columns.map(|axis| &axis[i * leaf_points..((i + 1) * leaf_points).min(points)]);
+        self.collect.begin(q, step);
+        // its own leaf first: then the bound is near to what it will be
+        let own = i / leaf_points;
+        let known = own as u32..own as u32 + 1;
+        scan(self.lanes, leaf(own), q, self.space, self.collect);
+        let mut near = leaves.near(Box3::at(q), self.space, &known, self.stack);
+        while let Some(found) = near.next(self.lanes, self.collect.bound()) {
+            scan(self.lanes, leaf(found as usize), q, self.space, self.collect);
+        }
+        match others {
+            Some(others) => beyond(self.lanes, q, self.space, others, self.stack, self.lookup, self.collect),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Offers the points of other units.
 #[inline(always)]
 fn beyond(
@@ -121,7 +216,7 @@ fn beyond(
     collect: &mut impl Collect,
 ) -> Result<(), ConvertError> {
     let own = runs.of(unit);
-    let mut near = runs.boxes.near(q, space, &own, stack);
+    let mut near = runs.boxes.near(Box3::at(q), space, &own, stack);
     while let Some(run) = near.next(lanes, collect.bound()) {
         if !own.contains(&run) {
             scan(lanes, lookup.columns(runs, run)?, q, space, collect);

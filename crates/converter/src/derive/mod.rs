@@ -9,6 +9,7 @@
 //! The neighbourhood of a point depends on the points alone, sums over it are exact, and all other arithmetic is the same on every
 //! processor: so no byte depends on units, threads or memory.
 
+mod around;
 mod boxes;
 mod collect;
 mod eigen;

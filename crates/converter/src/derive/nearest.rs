@@ -37,6 +37,17 @@ impl Nearest {
         (self.count, self.bound) = (0, within);
     }
 
+    /// How many are wanted.
+    pub(super) fn most(&self) -> usize {
+        self.most
+    }
+
+    /// True if there are as many as are wanted.
+    #[inline(always)]
+    pub(super) fn is_full(&self) -> bool {
+        self.count == self.most
+    }
+
     /// What is farther does not matter any more.
     #[inline(always)]
     pub(super) fn bound(&self) -> f32 {

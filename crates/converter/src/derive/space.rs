@@ -34,7 +34,13 @@ pub(super) fn between(a: i32, b: i32) -> f32 {
 /// How far `q` is outside of `min..=max`, rounded once.
 #[inline(always)]
 pub(super) fn outside(q: i32, min: i32, max: i32) -> f32 {
-    min.wrapping_sub(q).max(q.wrapping_sub(max)).max(0) as f32
+    apart([q, q], [min, max])
+}
+
+/// How far two ranges, ends included, are apart, rounded once.
+#[inline(always)]
+pub(super) fn apart(a: [i32; 2], b: [i32; 2]) -> f32 {
+    b[0].wrapping_sub(a[1]).max(a[0].wrapping_sub(b[1])).max(0) as f32
 }
 
 /// The square of the length of a difference.
@@ -58,6 +64,10 @@ mod tests {
             let (q, a, b) = ([next(), next(), next()], [next(), next(), next()], [next(), next(), next()]);
             let beside = std::array::from_fn(|i| outside(q[i], a[i].min(b[i]), a[i].max(b[i])));
             let least = squared(beside, space.scale);
+            let r = [next(), next(), next()];
+            let box_of = |a: [i32; 3], b: [i32; 3], i: usize| [a[i].min(b[i]), a[i].max(b[i])];
+            let of_boxes = squared(std::array::from_fn(|i| apart(box_of(q, r, i), box_of(a, b, i))), space.scale);
+            assert!(least >= of_boxes, "{q:?} {r:?} {a:?} {b:?}");
             for p in [a, b, [a[0], b[1], a[2]]] {
                 let d = squared(std::array::from_fn(|i| between(p[i], q[i])), space.scale);
                 assert!(d >= least, "{q:?} {a:?} {b:?}");

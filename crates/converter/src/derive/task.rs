@@ -44,6 +44,7 @@ impl<'a> Task<'a> {
     }
 
     pub(super) fn worker(&self) -> Worker<'_> {
+        let collector = Collector::new(self.cloud.plan.derive.neighbourhood, &self.space);
         Worker {
             task: self,
             vectors: Vectors::default(),
@@ -52,8 +53,8 @@ impl<'a> Task<'a> {
             of_record: Vec::new(),
             points: Vec::new(),
             scratch: OrderScratch::default(),
-            finder: Finder::new(),
-            collector: Collector::new(self.cloud.plan.derive.neighbourhood, &self.space),
+            finder: Finder::new(collector.neighbours()),
+            collector,
             written: Written::default(),
             taken: Checksum::default(),
             put: Checksum::default(),

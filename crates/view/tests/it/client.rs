@@ -52,9 +52,10 @@ impl Served {
     /// Sends bytes as they are and reads until the server closes.
     pub(crate) fn raw(&self, request: &[u8]) -> Vec<u8> {
         let mut stream = self.connect();
-        stream.write_all(request).unwrap();
+        // a server that refuses what it has not read resets: neither all is written, then, nor is the answer followed by an end
+        let _ = stream.write_all(request);
         let mut bytes = Vec::new();
-        let _ = stream.read_to_end(&mut bytes); // a server that refuses what it did not read resets
+        let _ = stream.read_to_end(&mut bytes);
         bytes
     }
 
