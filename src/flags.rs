@@ -3,6 +3,8 @@
 use pointmill_converter::{Advice, ConvertError, DropReason, MemoryNeed, PlanError, PlanFault, Setting, Warning};
 use pointmill_format::{Aabb, Advice as ReadAdvice, ReadError, ScanWarning};
 
+use crate::fitting::{fitted, running};
+
 /// The option that a setting comes from.
 fn option(setting: Setting) -> &'static str {
     match setting {
@@ -27,12 +29,20 @@ fn option(setting: Setting) -> &'static str {
     }
 }
 
-/// What the user can do, in options.
-fn advice(advice: &Advice) -> String {
+/// What the user of a command can do.
+fn advice_in(command: &str, advice: &Advice) -> String {
+    fitted(command, &advice_of_convert(advice)).unwrap_or_else(|| match advice {
+        Advice::StartAnew if command.starts_with("job") => Advice::PlanAnew.to_string(),
+        other => other.to_string(),
+    })
+}
+
+/// What the user can do, in options of `convert`.
+fn advice_of_convert(advice: &Advice) -> String {
     match advice {
         Advice::ReplaceOutput => "choose another output, or pass --overwrite".to_owned(),
         Advice::RaiseMemory { mib } => format!("pass --memory {mib}MiB or more"),
-        Advice::StartAnew => "begin anew: leave out --resume, or plan the job in another folder".to_owned(),
+        Advice::StartAnew => "begin anew: leave out --resume".to_owned(),
         Advice::FreeTemporaryDisk => {
             "free some space there, or put temporary files elsewhere with --temp-dir".to_owned()
         }
@@ -83,7 +93,7 @@ fn bounds_value(b: &Aabb) -> String {
 
 fn with_advice(what: String, advised: Option<&Advice>) -> String {
     match advised {
-        Some(advised) => format!("{what}; {}", advice(advised)),
+        Some(advised) => format!("{what}; {}", advice_in(running(), advised)),
         None => what,
     }
 }
@@ -104,35 +114,55 @@ pub(crate) fn error_line(error: &ConvertError) -> String {
 
 /// An error of a reader, one line.
 pub(crate) fn read_error_line(error: &ReadError) -> String {
-    let advice = match error.advice() {
-        None => return error.to_string(),
-        Some(ReadAdvice::SkipUnreadable) => {
-            "copy the file again, or pass --unreadable skip to convert the rest".to_owned()
-        }
-        Some(ReadAdvice::MoreMemory) => "pass a larger --memory".to_owned(),
-        Some(ReadAdvice::NameCamera) => {
+    match error.advice() {
+        None => error.to_string(),
+        Some(advice) => format!("{}; {}", error.what_and_where(), read_advice_in(running(), advice)),
+    }
+}
+
+/// What helps where a place cannot be searched for scans.
+pub(crate) fn skip_unread() -> String {
+    fitted(running(), &format!("; pass {}", skip(running()))).unwrap_or_default()
+}
+
+/// The option, and what is done with what is left.
+fn skip(command: &str) -> String {
+    let verb = if matches!(command, "export" | "extract") { command } else { "convert" };
+    format!("--unreadable skip to {verb} the rest")
+}
+
+/// What the user of a command can do about an input.
+fn read_advice_in(command: &str, advice: &ReadAdvice) -> String {
+    let with_options = match advice {
+        ReadAdvice::SkipUnreadable => format!("copy the file again, or pass {}", skip(command)),
+        ReadAdvice::MoreMemory => "pass a larger --memory".to_owned(),
+        ReadAdvice::NameCamera => {
             "describe the camera in a JSON file beside it, or with --intrinsics and --depth-scale".to_owned()
         }
-        Some(ReadAdvice::NameCrs) => "name its coordinate reference system with --crs".to_owned(),
-        Some(ReadAdvice::OtherCrs) => {
+        ReadAdvice::NameCrs => "name its coordinate reference system with --crs".to_owned(),
+        ReadAdvice::OtherCrs => {
             "choose a system for --reproject on the same datum and with the same heights, or reproject the scan elsewhere"
                 .to_owned()
         }
-        Some(ReadAdvice::WidenColumn) => "the rows that were sampled hold none like it; name the columns, this one with a \
-                                          wider type, as in --columns x,y,z,c:int32"
+        ReadAdvice::WidenColumn => "the rows that were sampled hold none like it; name the columns, this one with a \
+                                    wider type, as in --columns x,y,z,c:int32"
             .to_owned(),
-        Some(ReadAdvice::NameColumns) => {
+        ReadAdvice::NameColumns => {
             "if it was cut short, copy it again; if its columns are x,y alone, say so with --columns".to_owned()
         }
-        Some(ReadAdvice::DetectSeparator) => {
+        ReadAdvice::DetectSeparator => {
             "name the one that the rows have, or leave out --separator to have it detected".to_owned()
         }
-        Some(ReadAdvice::DecimalMark) => {
+        ReadAdvice::DecimalMark => {
             "say whether commas are decimal marks: --decimal comma or --decimal point".to_owned()
         }
-        Some(advice) => advice.to_string(),
+        advice => advice.to_string(),
     };
-    format!("{}; {advice}", error.what_and_where())
+    fitted(command, &with_options).unwrap_or_else(|| match advice {
+        ReadAdvice::SkipUnreadable => "copy the file again".to_owned(),
+        ReadAdvice::MoreMemory => "this command takes no more".to_owned(),
+        advice => advice.to_string(),
+    })
 }
 
 fn plan_line(error: &PlanError) -> String {
@@ -160,11 +190,12 @@ pub(crate) fn warning_line(warning: &Warning) -> String {
 
 /// Why an attribute is not in a dataset.
 pub(crate) fn drop_reason(why: &DropReason) -> String {
-    match why {
-        DropReason::NotUsual => format!("{why}; --attributes adds it"),
-        DropReason::NoPlace("1.7") => format!("{why}; --potree1-version 1.8 has"),
-        other => other.to_string(),
-    }
+    let remedy = match why {
+        DropReason::NotUsual => "--attributes adds it",
+        DropReason::NoPlace("1.7") => "--potree1-version 1.8 has",
+        _ => return why.to_string(),
+    };
+    fitted(running(), remedy).map_or_else(|| why.to_string(), |remedy| format!("{why}; {remedy}"))
 }
 
 #[cfg(test)]
@@ -173,6 +204,7 @@ mod tests {
 
     #[test]
     fn every_line_names_an_option_and_nothing_is_said_twice() {
+        crate::fitting::begins("convert", <crate::args::Args as clap::CommandFactory>::command());
         let others = Aabb { min: [0.0, -1.0, 2.5], max: [10.0, 20.0, 30.0] };
         let outliers = Warning::Outliers { points: 2, others, factor: 11.0, holds_back_step: false };
         let line = warning_line(&outliers);
@@ -183,5 +215,24 @@ mod tests {
             why: pointmill_converter::MemoryNeed::Part("nodes"),
         };
         assert!(error_line(&memory).ends_with("; pass --memory 91MiB or more"), "{}", error_line(&memory));
+    }
+
+    #[test]
+    fn a_line_fits_the_command() {
+        crate::fitting::begins("convert", <crate::args::Args as clap::CommandFactory>::command());
+        let skip = |command| read_advice_in(command, &ReadAdvice::SkipUnreadable);
+        assert_eq!(skip("validate"), "copy the file again");
+        assert_eq!(skip("convert"), "copy the file again, or pass --unreadable skip to convert the rest");
+        assert_eq!(skip("extract"), "copy the file again, or pass --unreadable skip to extract the rest");
+        assert_eq!(skip("info"), skip("convert") + " (with 'pointmill convert')");
+        assert_eq!(skip("job run"), skip("convert") + " (in a new 'pointmill job plan')");
+        let memory = |command| read_advice_in(command, &ReadAdvice::MoreMemory);
+        assert_eq!(memory("validate"), "pass a larger --memory");
+        assert_eq!(memory("extract"), "this command takes no more");
+        assert!(memory("preview").starts_with("pass a larger --memory (with 'pointmill convert', "));
+        assert_eq!(read_advice_in("info", &ReadAdvice::Damaged), "it is damaged; copy or export it again");
+        assert_eq!(advice_in("convert", &Advice::StartAnew), "begin anew: leave out --resume");
+        assert_eq!(advice_in("job run", &Advice::StartAnew), "plan the job anew, in another folder");
+        assert_eq!(advice_in("job run", &Advice::RaiseMemory { mib: 5 }), "pass --memory 5MiB or more");
     }
 }

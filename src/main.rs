@@ -15,6 +15,7 @@ mod crs_choice;
 mod datasets;
 mod depth_choice;
 mod exit;
+mod fitting;
 mod flags;
 mod human;
 mod inputs;
@@ -27,6 +28,7 @@ mod text_choice;
 use std::process::ExitCode;
 
 use args::{Args, Command};
+use clap::CommandFactory as _;
 use commands::{convert, export, extract, info, job, manual, measure, preview, validate, view};
 use exit::Failure;
 
@@ -49,6 +51,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
+    fitting::begins(args.command.name(), Args::command());
     match &args.command {
         Command::Convert(convert) => convert::run(convert),
         Command::Job(job) => job::run(job),

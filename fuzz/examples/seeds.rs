@@ -39,9 +39,9 @@ fn main() -> io::Result<()> {
     }
     let corpus = fuzz.join("corpus/depth");
     fs::create_dir_all(&corpus)?;
-    for (which, name) in ["single.png", "single.json", "single_colour.png"].into_iter().enumerate() {
+    for (which, name) in pointmill_fuzz::DEPTH_FILES.into_iter().enumerate() {
         let bytes = fs::read(fixtures.join("depth").join(name))?;
-        fs::write(corpus.join(name), [vec![which as u8], bytes].concat())?;
+        fs::write(corpus.join(name.replace('/', "_")), [vec![which as u8], bytes].concat())?;
     }
     let corpus = fuzz.join("corpus/potree2");
     fs::create_dir_all(&corpus)?;

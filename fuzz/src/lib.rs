@@ -11,6 +11,18 @@ use pointmill_testkit::reader::{check_scan_error, keeps_promises};
 /// Points that are decoded of one input: a few bytes may honestly stand for many points.
 pub const MAX_POINTS: u64 = 1 << 20;
 
+/// The files of depth maps that are fuzzed, by the first byte of an input: of a single one, and of a folder with a trajectory.
+pub const DEPTH_FILES: [&str; 8] = [
+    "single.png",
+    "single.json",
+    "single_colour.png",
+    "tum/depth.txt",
+    "tum/rgb.txt",
+    "tum/groundtruth.txt",
+    "tum/depth/1305031102.194330.png",
+    "tum/rgb/1305031102.209430.png",
+];
+
 /// How a file is opened.
 pub type Open = fn(&Path) -> Result<Box<dyn Scan>, ReadError>;
 

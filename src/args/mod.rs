@@ -84,6 +84,31 @@ pub(crate) enum Command {
     Man(ManArgs),
 }
 
+impl Command {
+    /// As it is typed behind the name of the program.
+    pub(crate) const fn name(&self) -> &'static str {
+        match self {
+            Self::Convert(_) => "convert",
+            Self::Job(job) => match &job.command {
+                JobCommand::Plan(_) => "job plan",
+                JobCommand::Units(_) => "job units",
+                JobCommand::Run(_) => "job run",
+                JobCommand::Finish(_) => "job finish",
+                JobCommand::Status(_) => "job status",
+            },
+            Self::Export(_) => "export",
+            Self::Measure(_) => "measure",
+            Self::Validate(_) => "validate",
+            Self::Extract(_) => "extract",
+            Self::Info(_) => "info",
+            Self::Preview(_) => "preview",
+            Self::View(_) => "view",
+            Self::Completions(_) => "completions",
+            Self::Man(_) => "man",
+        }
+    }
+}
+
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ValidateArgs {
     /// Folder of a dataset, or a .qbatch or COPC file; the format is detected from the content

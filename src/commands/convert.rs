@@ -20,6 +20,7 @@ use crate::args::{
 };
 use crate::datasets;
 use crate::exit::{Failure, emit, print_line, to_json};
+use crate::flags;
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::inputs::Inputs;
@@ -30,7 +31,7 @@ pub(super) fn planned(args: &ConvertArgs) -> Result<(Plan, Vec<Target>), Failure
     let targets = targets(args)?;
     let mut inputs = args.inputs.expand(&args.output)?;
     if args.unreadable == FaultArg::Fail
-        && let Some(failure) = inputs.unread_failure("; pass --unreadable skip to convert the rest")
+        && let Some(failure) = inputs.unread_failure(&flags::skip_unread())
     {
         return Err(failure);
     }

@@ -7,6 +7,7 @@ use pointmill_converter::{AttributeChoice, ExportFormat, ExportReport, OnFault, 
 use super::report_file::ReportFile;
 use crate::args::{Attributes, ExportArgs, FaultArg};
 use crate::exit::{Failure, emit, print_line, to_json};
+use crate::flags;
 use crate::human::export;
 use crate::human::progress::Progress;
 use crate::inputs::Inputs;
@@ -16,7 +17,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), Failure> {
     let format = format(&args.output)?;
     let inputs = args.inputs.expand(&args.output)?;
     if args.unreadable == FaultArg::Fail
-        && let Some(failure) = inputs.unread_failure("; pass --unreadable skip to export the rest")
+        && let Some(failure) = inputs.unread_failure(&flags::skip_unread())
     {
         return Err(failure);
     }

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use pointmill_converter::{
     ConvertError, JobFault, JobUnits, Plan, Report, Target, UnitName, finish_job, job_units, plan_job, run_units,
 };
+use pointmill_format::{json_fault, system_reason};
 use serde::{Deserialize, Serialize};
 
 use super::convert::{after_all, protect_inputs, tell};
@@ -19,6 +20,7 @@ use crate::args::{
     JobUnitsArgs, Share,
 };
 use crate::exit::{Failure, emit, print_line, to_json};
+use crate::fitting::NOT_IN_JOBS;
 use crate::human::conversion;
 use crate::human::progress::Progress;
 use crate::interrupt::{no_more_checks, stop_flag};
@@ -116,7 +118,8 @@ fn open(folder: &Path) -> Result<Job, Failure> {
         Err(e) => return Err(Failure::io(&path, "reading the plan", &e)),
     };
     let folder = folder.canonicalize().map_err(|e| Failure::io(folder, "opening the job", &e))?;
-    let broken = |e| Failure::Input(format!("{}: not as it was written ({e}); plan the job anew", path.display()));
+    let broken =
+        |e| Failure::Input(format!("{}: not as it was written: {}; plan the job anew", path.display(), json_fault(&e)));
     let planned: Planned = serde_json::from_str(&text).map_err(broken)?;
     if planned.version != env!("CARGO_PKG_VERSION") {
         let (was, is) = (&planned.version, env!("CARGO_PKG_VERSION"));
@@ -138,15 +141,10 @@ fn job_of(planned: &Planned, folder: PathBuf) -> Result<Job, Failure> {
     if convert.inputs.files_from.as_ref().is_some_and(|list| list.as_os_str() == "-") {
         return Err(Failure::Usage("--files-from - does not go with a job: every process reads the list".to_owned()));
     }
-    let useless = [
-        ("--dry-run", convert.dry_run),
-        ("--resume", convert.resume),
-        ("--append", convert.append),
-        ("--page", convert.page),
-        ("--json", convert.json),
-        ("--checkpoint auto", matches!(convert.checkpoint, Some(CheckpointArg::Auto))),
-    ];
-    if let Some((option, _)) = useless.iter().find(|(_, given)| *given) {
+    let given = [convert.dry_run, convert.resume, convert.append, convert.page, convert.json];
+    let mut useless = NOT_IN_JOBS.iter().zip(given).filter(|(_, given)| *given).map(|(option, _)| *option);
+    let checkpoint = matches!(convert.checkpoint, Some(CheckpointArg::Auto)).then_some("--checkpoint auto");
+    if let Some(option) = useless.next().or(checkpoint) {
         return Err(Failure::Usage(format!("{option} does not go with a job")));
     }
     let (mut plan, targets) = super::convert::planned(&convert)?;
@@ -328,6 +326,6 @@ fn finish(args: &JobFinishArgs) -> Result<(), Failure> {
 fn remove(folder: &Path) {
     let removed = fs::remove_file(folder.join(PLAN)).and_then(|()| fs::remove_dir(folder));
     if let Err(e) = removed {
-        print_line(&format!("{}: the folder of the job stays ({e})", folder.display()));
+        print_line(&format!("{}: the folder of the job stays ({})", folder.display(), system_reason(&e)));
     }
 }

@@ -8,6 +8,7 @@ use pointmill_measure::{MeasureError, Measured, Measurement, Shown, Watch, repor
 
 use crate::args::{BUDGET, InputArgs, MeasureArgs, SAMPLE};
 use crate::exit::{Failure, emit, print_line, to_json};
+use crate::fitting::{fitted, running};
 use crate::human::measurement;
 use crate::human::progress::{MEASURE, Progress};
 use crate::interrupt::{keeps, no_more_checks, stop_flag, works_in};
@@ -68,6 +69,8 @@ fn all_failed(result: &Measured) -> Option<Failure> {
     let first = reasons.first()?;
     let code = first.strip_prefix("exit code ").and_then(|rest| rest.split(':').next());
     let line = format!("no setting could be measured; the first: {first}");
+    // a conversion that was measured gives advice for `convert`
+    let line = fitted(running(), &line).unwrap_or(line);
     Some(match code {
         Some("2") => Failure::Usage(line),
         Some("3") => Failure::Input(line),

@@ -22,7 +22,8 @@ const LAYERS: [(&str, Layers<'static>); 9] = [
     (
         "pointmill",
         &[
-            &["flags", "printable"],
+            &["fitting", "printable"],
+            &["flags"],
             &["exit", "datasets"],
             &["args", "allocator", "crs_choice", "interrupt", "profiles"],
             &["depth_choice", "human", "scan_choice", "text_choice"],

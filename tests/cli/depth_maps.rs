@@ -230,6 +230,52 @@ fn a_frame_that_is_missing_or_has_no_pose_ends_the_run_or_is_skipped() {
     }
 }
 
+#[test]
+fn advice_about_a_bad_frame_names_options_that_the_command_has() {
+    let dir = dir();
+    dir.succeed(with(&["convert", "tum", "-o", "out"]));
+    fs::remove_file(dir.path(MIDDLE)).unwrap();
+    dir.succeed(with(&["job", "plan", "--job", "job", "tum", "-o", "out2"]));
+    let skip = "1305031102.194330.png: no such picture; copy the file again, or pass --unreadable skip to";
+    let taken = "(with 'pointmill convert', whose dataset this command takes, too)";
+    for (args, line) in [
+        (with(&["convert", "tum", "-o", "out3"]), format!("{skip} convert the rest")),
+        (with(&["export", "tum", "-o", "out.las"]), format!("{skip} export the rest")),
+        (with(&["validate", "out", "--against", "tum"]), "no such picture; copy the file again".to_owned()),
+        (with(&["preview", "tum", "-o", "a.png"]), format!("{skip} convert the rest {taken}")),
+        (with(&["view", "tum", "--no-open"]), format!("{skip} convert the rest {taken}")),
+        (with(&["info", "tum", "--deep"]), format!("{skip} convert the rest (with 'pointmill convert')")),
+        (
+            vec!["job", "run", "job", "--share", "1/1"],
+            format!("{skip} convert the rest (in a new 'pointmill job plan')"),
+        ),
+    ] {
+        let ended = dir.run(args);
+        ended.failed_with(3, &[]);
+        assert!(ended.stderr().trim_end().ends_with(&line), "{line}: {}", ended.stderr());
+    }
+    for file in ["out3", "out.las", "a.png"] {
+        assert!(!dir.path(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_picture_that_was_cut_within_its_header_is_broken_and_no_other_file() {
+    let dir = dir();
+    let whole = fixture_bytes("depth/single.png");
+    for cut in [1, 8, 20, 25, 26, 32, 33] {
+        dir.write("single.png", &whole[..cut]);
+        for input in ["single.png", "."] {
+            dir.run(with(&["convert", input, "-o", "../out", "--dry-run"]))
+                .failed_with(3, &["single.png: the picture ends before its last pixel (byte "]);
+        }
+    }
+    fs::remove_file(dir.path("single.json")).unwrap();
+    dir.write("single.png", &whole[..20]);
+    dir.run(["convert", "single.png", "-o", "out"]).failed_with(3, &["ends before its last pixel", "(byte 20)"]);
+    assert_eq!(dir.names(), ["single.png", "single_colour.png", "tum"]);
+}
+
 /// A picture of 16-bit grey without depth.
 fn picture([width, height]: [u32; 2]) -> Vec<u8> {
     let mut bytes = Vec::new();

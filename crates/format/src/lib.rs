@@ -79,7 +79,7 @@ pub mod potree2;
 pub mod scan;
 
 pub use dataset_kind::{DatasetKind, Located, locate};
-pub use error::{Advice, ErrorKind, Fault, ReadError, system_reason};
+pub use error::{Advice, ErrorKind, Fault, ReadError, json_fault, system_reason};
 pub use geometry::{Aabb, Affine, AffineFault, AxisGrid, Deviations, Frustum, Lattice, NodeKey, Ray};
 pub use names::UnknownName;
 pub use open_octree::open_octree;

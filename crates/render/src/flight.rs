@@ -1,5 +1,6 @@
 //! A camera that moves.
 
+use pointmill_format::json_fault;
 use pointmill_format::serde_json::Value;
 
 use crate::{Camera, CameraError};
@@ -62,7 +63,7 @@ impl Flight {
     /// Another form, and those of [`Self::new`].
     pub fn from_json(bytes: &[u8]) -> Result<Self, FlightError> {
         let form = |what: String| FlightError::Form(what);
-        let value: Value = pointmill_format::serde_json::from_slice(bytes).map_err(|e| form(e.to_string()))?;
+        let value: Value = pointmill_format::serde_json::from_slice(bytes).map_err(|e| form(json_fault(&e)))?;
         let keyframes = value.get("keyframes").and_then(Value::as_array);
         let keyframes = keyframes.ok_or_else(|| form("there is no array \"keyframes\"".to_owned()))?;
         let cameras = keyframes.iter().enumerate().map(|(i, keyframe)| {

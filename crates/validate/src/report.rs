@@ -8,7 +8,7 @@ use std::io::{self, BufReader, Read as _};
 use std::path::{Component, Path, PathBuf};
 
 use pointmill_format::bytes::open_file;
-use pointmill_format::{DatasetKind, Located, ReadError, locate};
+use pointmill_format::{DatasetKind, Located, ReadError, json_fault, locate, system_reason};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -118,7 +118,7 @@ fn read(folder: &Path) -> Result<Read, ReadError> {
     match serde_json::from_reader::<_, Report>(file) {
         Ok(report) => Ok(report.outputs().map_or(Read::Foreign, Read::Outputs)),
         Err(error) if error.is_io() => Err(ReadError::io(&path, "reading", error.into())),
-        Err(error) => Ok(Read::Broken(error.to_string())),
+        Err(error) => Ok(Read::Broken(json_fault(&error))),
     }
 }
 
@@ -271,7 +271,7 @@ fn whereabouts(folder: &Path, name: &str) -> String {
         Ok(about) if about.is_dir() => "a folder without it".into(),
         Ok(_) => "no folder".into(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => "nothing".into(),
-        Err(error) => error.to_string(),
+        Err(error) => system_reason(&error),
     }
 }
 

@@ -245,7 +245,10 @@ impl Description {
             ReadError::broken(path, offset, what).advise(super::header::CORRUPT)
         })?;
         if !Lattice::from(description.lattice).is_valid() {
-            let what = format!("the description has the lattice {:?}; scales have to be > 0", description.lattice);
+            let Lattice { scale, offset: origin } = description.lattice.into();
+            let what = format!(
+                "the description has the lattice of scales {scale:?} and offsets {origin:?}; scales have to be > 0"
+            );
             return Err(ReadError::broken(path, offset, what).advise(super::header::CORRUPT));
         }
         Ok(description)

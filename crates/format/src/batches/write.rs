@@ -207,7 +207,8 @@ impl Cloud<'_> {
 fn check(cloud: &Cloud) -> Result<(), WriteError> {
     let points = cloud.colours.len();
     if !cloud.lattice.is_valid() {
-        return Err(WriteError::input(format!("{:?} is no lattice", cloud.lattice)));
+        let Lattice { scale, offset } = cloud.lattice;
+        return Err(WriteError::input(format!("the scales {scale:?} and offsets {offset:?} are those of no lattice")));
     }
     if cloud.positions.iter().any(|p| p.len() != points) {
         return Err(WriteError::input("positions and colours are not equally many"));

@@ -48,8 +48,8 @@ impl<W: Write> IndexWriter<W> {
     pub fn new(mut out: W, header: &Header) -> Result<Self, WriteError> {
         if !header.lattice.is_valid() || header.origin.iter().any(|v| !v.is_finite()) || header.capacity == 0 {
             return invalid(format!(
-                "index.json cannot have the lattice {:?}, the origin {:?} or the capacity {}",
-                header.lattice, header.origin, header.capacity
+                "index.json cannot have the scales {:?}, the offsets {:?}, the origin {:?} or the capacity {}",
+                header.lattice.scale, header.lattice.offset, header.origin, header.capacity
             ));
         }
         out.write_all(b"{\n")?;

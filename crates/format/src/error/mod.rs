@@ -161,16 +161,53 @@ pub fn system_reason(error: &io::Error) -> String {
 /// Why a text is not the JSON that it should be, for people: without the place, which is said as a byte, and without the
 /// types of a program.
 pub(crate) fn json_reason(error: &serde_json::Error) -> String {
+    /// What the parser expects, by the types of a program.
+    const TYPES: [(&str, &str); 6] = [
+        ("f", "a number"),
+        ("u", "a whole number, at least 0"),
+        ("i", "a whole number"),
+        ("struct ", "an object"),
+        ("a map", "an object"),
+        ("a sequence", "an array"),
+    ];
+    const WORDS: [(&str, &str); 9] = [
+        ("EOF while parsing", "it ends within"),
+        ("expected value", "a value is expected"),
+        ("expected ident", "a word that is none of true, false and null"),
+        ("trailing characters", "something follows its end"),
+        ("trailing comma", "a comma that nothing follows"),
+        ("recursion limit exceeded", "it is nested too deeply"),
+        ("invalid type: map,", "an object,"),
+        ("invalid type: sequence,", "an array,"),
+        ("invalid type: ", ""),
+    ];
     let text = error.to_string();
     let reason = text.rsplit_once(" at line ").map_or(text.as_str(), |(reason, _)| reason);
-    let words = [("f64", "a number"), ("u64", "a whole number"), ("u32", "a whole number"), ("u8", "a whole number")];
-    let reason = words.iter().fold(reason.to_owned(), |reason, (word, plain)| {
-        reason.replace(&format!("expected {word}"), &format!("expected {plain}"))
-    });
-    reason
-        .replace('`', "\"")
-        .replace("expected struct ", "expected the object ")
-        .replace("EOF while parsing", "it ends within")
+    let reason = WORDS.iter().fold(reason.to_owned(), |reason, (theirs, plain)| reason.replace(theirs, plain));
+    let reason = match reason.rsplit_once(", expected ") {
+        None => reason,
+        Some((found, expected)) => {
+            let is_number = |word: &str| matches!(word.get(1..), Some("8" | "16" | "32" | "64" | "size"));
+            let is_of = |start: &str| match start.len() {
+                1 => expected.starts_with(start) && is_number(expected),
+                _ => expected.starts_with(start),
+            };
+            let plain = TYPES.iter().find(|(start, _)| is_of(start)).map_or(expected, |(_, plain)| plain);
+            format!("{found}, expected {plain}")
+        }
+    };
+    reason.replace('`', "\"")
+}
+
+/// Why a text is not the JSON that it should be, in words for people, and where.
+///
+/// ```
+/// let error = pointmill_format::serde_json::from_str::<Vec<f64>>("[1, {}]").unwrap_err();
+/// assert_eq!(pointmill_format::json_fault(&error), "an object, expected a number (line 1, column 4)");
+/// ```
+#[must_use]
+pub fn json_fault(error: &serde_json::Error) -> String {
+    format!("{} (line {}, column {})", json_reason(error), error.line(), error.column())
 }
 
 /// Text for people that may quote a file: control characters become blanks, so that it stays one line and no terminal
@@ -222,8 +259,22 @@ mod tests {
     #[test]
     fn json_is_explained_in_plain_words() {
         let of = |text: &str| json_reason(&serde_json::from_str::<Vec<f64>>(text).unwrap_err());
-        assert_eq!(of("[1, \"x\"]"), "invalid type: string \"x\", expected a number");
+        assert_eq!(of("[1, \"x\"]"), "string \"x\", expected a number");
         assert_eq!(of("[1,"), "it ends within a value");
+        assert_eq!(of("{}"), "an object, expected an array");
+        assert_eq!(of("[1, [2]]"), "an array, expected a number");
+        assert_eq!(of("[1, x]"), "a value is expected");
+        assert_eq!(of("[1] 2"), "something follows its end");
+        #[derive(Debug, serde::Deserialize)]
+        struct Inner {
+            _whole: u16,
+            _object: Option<Box<Self>>,
+        }
+        let of = |text: &str| json_reason(&serde_json::from_str::<Inner>(text).unwrap_err());
+        assert_eq!(of("[]"), "invalid length 0, expected an object");
+        assert_eq!(of("7"), "integer \"7\", expected an object");
+        assert_eq!(of("{\"_whole\": -1}"), "invalid value: integer \"-1\", expected a whole number, at least 0");
+        assert_eq!(of("{}"), "missing field \"_whole\"");
     }
 
     #[test]

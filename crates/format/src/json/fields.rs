@@ -132,7 +132,7 @@ pub(crate) fn syntax_error(bytes: &[u8], path: &Path, error: &serde_json::Error)
     let offset = (line_start + error.column().saturating_sub(1)).min(bytes.len());
     let word = bytes[offset..].trim_ascii_start();
     let word = word.strip_prefix(b"-").unwrap_or(word);
-    if word.starts_with(b"inf") || word.starts_with(b"nan") {
+    if word.get(..3).is_some_and(|word| word.eq_ignore_ascii_case(b"inf") || word.eq_ignore_ascii_case(b"nan")) {
         let what = "is not valid JSON: a number is written as inf or nan";
         return ReadError::broken(path, offset as u64, what)
             .advise("PotreeConverter does so for attributes that it leaves empty; replace the word by 0");

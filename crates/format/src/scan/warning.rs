@@ -161,6 +161,8 @@ pub enum ScanWarning {
     FramesEmpty { frames: usize, of: usize },
     /// Depth maps: frames without a colour picture, whose colours are 0.
     FramesColourless { frames: usize, of: usize },
+    /// Depth maps: colour pictures are listed with their times, and no depth map has one near in time.
+    ColoursElsewhere { of: usize },
     /// What a dataset, read as a scan, does not say or have.
     Dataset(DatasetNote),
     /// Anything else, as text.
@@ -274,6 +276,11 @@ impl ScanWarning {
             Self::FramesEmpty { frames, of } => format!("{frames} of {of} depth maps have no depth"),
             Self::FramesColourless { frames, of } => {
                 format!("{frames} of {of} depth maps have no colour picture; their colours are 0")
+            }
+            Self::ColoursElsewhere { of } => {
+                format!(
+                    "none of the {of} depth maps has a picture near in time in the list of colours; there are no colours"
+                )
             }
             Self::Dataset(note) => note.to_string(),
             Self::Other(text) => text.clone(),

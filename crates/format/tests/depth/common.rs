@@ -42,6 +42,9 @@ pub(crate) const SINGLE: Reader = Reader {
     max_decoded: |bytes| 2000 * bytes + 4096,
 };
 
+/// Folders: pieces of frames that cannot be read promise as many points as their camera has pixels.
+pub(crate) const SEQUENCE: Reader = Reader { max_points: |_| 1 << 27, max_decoded: |_| 1 << 27, ..SINGLE };
+
 /// A copy of a fixture's folder.
 pub(crate) fn copy_of(name: &str) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();

@@ -2,11 +2,12 @@
 
 use std::fs;
 
-use pointmill_format::DepthOptions;
+use pointmill_format::{Advice, DepthOptions, ErrorKind, ReadError, Wanted};
 use pointmill_testkit::files::fixture_bytes;
+use pointmill_testkit::reader::{check_error, read};
 use pointmill_testkit::{Random, damage};
 
-use crate::common::{SINGLE, cloud, refused, write_depth};
+use crate::common::{SEQUENCE, SINGLE, cloud, copy_of, open, refused, write_depth};
 
 /// A folder with the fixture of one picture.
 fn folder() -> tempfile::TempDir {
@@ -32,6 +33,74 @@ fn a_cut_picture_is_an_error_at_its_end() {
             );
         }
         fs::write(&path, &whole).unwrap();
+    }
+}
+
+#[test]
+fn a_picture_cut_within_its_header_is_damaged_and_no_picture_of_another_kind() {
+    let dir = folder();
+    let whole = fixture_bytes("depth/single.png");
+    for name in ["single.png", "without_camera.png"] {
+        let path = dir.path().join(name);
+        for cut in 8..=60 {
+            fs::write(&path, &whole[..cut]).unwrap();
+            let error = pointmill_format::open_scan(&path, &Default::default()).err().unwrap();
+            assert!(matches!(error.kind(), ErrorKind::Broken), "{name} cut to {cut}: {error}");
+            // a camera that nothing describes is reported of a header that is whole
+            if name == "single.png" || cut < 26 {
+                assert_eq!(error.advice(), Some(&Advice::CutShort), "{name} cut to {cut}: {error}");
+            }
+        }
+    }
+    let picture = fixture_bytes("depth/single_colour.png");
+    fs::write(dir.path().join("without_camera.png"), &picture[..33]).unwrap();
+    let error = pointmill_format::open_scan(dir.path().join("without_camera.png"), &Default::default()).err().unwrap();
+    assert!(matches!(error.kind(), ErrorKind::Unsupported), "{error}");
+}
+
+/// Where each chunk of a PNG file starts, and its name.
+fn chunks(png: &[u8]) -> Vec<(usize, [u8; 4])> {
+    let mut at = 8;
+    let mut found = Vec::new();
+    while at + 12 <= png.len() {
+        let bytes = u32::from_be_bytes(png[at..at + 4].try_into().unwrap()) as usize;
+        found.push((at, png[at + 4..at + 8].try_into().unwrap()));
+        at += bytes + 12;
+    }
+    found
+}
+
+#[test]
+fn what_is_wrong_with_a_picture_is_said_in_plain_words() {
+    let dir = folder();
+    let whole = fixture_bytes("depth/single.png");
+    let chunks = chunks(&whole);
+    let start = |name: &[u8; 4]| chunks.iter().find(|(_, found)| found == name).unwrap().0;
+    let (data, end) = (start(b"IDAT"), start(b"IEND"));
+    type Change<'a> = &'a dyn Fn(&mut Vec<u8>);
+    let changes: [(Change<'_>, &str); 8] = [
+        (&|bytes| bytes[29] ^= 1, "the checksum of its chunk IHDR is wrong"),
+        (&|bytes| bytes[data + 20] ^= 1, "its compressed pixels are corrupt"),
+        (&|bytes| bytes[end - 1] ^= 1, "the checksum of its chunk IDAT is wrong"),
+        (&|bytes| bytes[end + 9] ^= 1, "the checksum of its chunk IEND is wrong"),
+        (
+            &|bytes| {
+                bytes[26] = 9; // a method of compression; with the checksum that goes with it
+                bytes[29..33].copy_from_slice(&0xe179_4724_u32.to_be_bytes());
+            },
+            "its header is wrong",
+        ),
+        (&|bytes| drop(bytes.drain(data..end)), "it has no pixels"),
+        (&|bytes| bytes[data + 4..data + 8].copy_from_slice(b"IXXX"), "its chunk IXXX is not known"),
+        (&|bytes| drop(bytes.splice(data..data, whole[8..33].iter().copied())), "its chunk IHDR is there twice"),
+    ];
+    for (change, what) in changes {
+        let mut bytes = whole.clone();
+        change(&mut bytes);
+        fs::write(dir.path().join("single.png"), &bytes).unwrap();
+        let line = refused(&dir.path().join("single.png"), DepthOptions::default());
+        assert!(line.contains(&format!("single.png: the picture cannot be decoded: {what} (byte ")), "{what}: {line}");
+        assert!(line.ends_with("; it is damaged; copy or export it again"), "{line}");
     }
 }
 
@@ -81,6 +150,91 @@ fn corrupt_jpeg_colours_are_an_error_or_colours() {
             let _ = SINGLE.check(&path, &format!("round {round}"));
         }
     }
+}
+
+#[test]
+fn what_is_wrong_with_a_jpeg_is_said_in_plain_words() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = write_depth(dir.path(), "a", [40, 24], &[1000; 960], r#", "color": "c.jpg""#);
+    let colours: Vec<u8> = (0..40 * 24 * 3).map(|i| (i * 7 % 251) as u8).collect();
+    let mut whole = Vec::new();
+    jpeg_encoder::Encoder::new(&mut whole, 90).encode(&colours, 40, 24, jpeg_encoder::ColorType::Rgb).unwrap();
+    let marker = |second: u8| whole.windows(2).position(|pair| pair == [0xff, second]).unwrap();
+    let (frame, scan) = (marker(0xc0), marker(0xda));
+    type Change<'a> = &'a dyn Fn(&mut Vec<u8>);
+    let changes: [(Change<'_>, bool, &str); 6] = [
+        (
+            &|bytes| bytes[frame + 1] = 0xc3,
+            false,
+            "the colour picture is a JPEG of a coding that is not read: lossless",
+        ),
+        (
+            &|bytes| bytes[frame + 1] = 0xc9,
+            false,
+            "the colour picture is a JPEG of a coding that is not read: arithmetic coding",
+        ),
+        (&|bytes| bytes[frame + 9] = 77, true, "its header of a frame is wrong"),
+        (&|bytes| bytes[scan + 4] = 77, true, "its header of a scan is wrong"),
+        (&|bytes| bytes[frame + 5..frame + 9].fill(0), true, "it declares no pixels"),
+        (&|bytes| bytes.truncate(scan + 1), true, "it ends before its last pixel"),
+    ];
+    for (change, is_broken, what) in changes {
+        let mut bytes = whole.clone();
+        change(&mut bytes);
+        fs::write(dir.path().join("c.jpg"), &bytes).unwrap();
+        let error = open(&path, DepthOptions::default()).err().unwrap();
+        assert!(error.what().contains(what), "{what}: {error}");
+        assert_eq!(matches!(error.kind(), ErrorKind::Broken), is_broken, "{error}");
+        assert!(error.advice().is_some(), "{error}");
+    }
+}
+
+#[test]
+fn damage_of_any_file_of_a_folder_is_an_error_or_a_frame_less() {
+    let mut random = Random::new(20_261_129);
+    let dir = copy_of("tum");
+    let at = |name: &str| dir.path().join(name);
+    let camera = r#"{"fx": 26.25, "fy": 26, "cx": 15.75, "cy": 11.5, "width": 32, "height": 24, "depth_scale": 5000}"#;
+    fs::write(at("camera.json"), camera).unwrap();
+    let files = [
+        "camera.json",
+        "depth.txt",
+        "rgb.txt",
+        "groundtruth.txt",
+        "depth/1305031102.194330.png",
+        "rgb/1305031102.209430.png",
+    ];
+    let sequence = |what: &str| {
+        // an error of the description of a camera has no byte
+        if !what.starts_with("camera.json") {
+            return SEQUENCE.check(dir.path(), what).map(|cloud| cloud.errors.len());
+        }
+        let scan = open(dir.path(), DepthOptions::default()).inspect_err(check_error)?;
+        Ok::<_, ReadError>(read(scan.as_ref(), &Wanted::all(scan.info())).errors.len())
+    };
+    assert_eq!(sequence("the whole").unwrap(), 0);
+    let mut ends = [0; 3];
+    for name in files {
+        let whole = fs::read(at(name)).unwrap();
+        let cuts = damage::cuts(&whole).map(<[u8]>::to_vec);
+        let mutations = (0..damage::rounds(60)).map(|_| match random.below(2) {
+            0 => damage::mutated(&whole, &[0..60, 0..whole.len()], &mut random),
+            _ => {
+                let mut bytes = whole.clone();
+                let place = random.index(bytes.len());
+                damage::hit(&mut bytes, place, &mut random);
+                bytes
+            }
+        });
+        let damaged: Vec<Vec<u8>> = cuts.chain(mutations).collect();
+        for (i, bytes) in damaged.iter().enumerate() {
+            fs::write(at(name), bytes).unwrap();
+            let end = sequence(&format!("{name}, damage {i}"));
+            ends[end.map_or(0, |errors| 1 + usize::from(errors > 0))] += 1;
+        }
+        fs::write(at(name), &whole).unwrap();
+    }
+    assert!(ends.iter().all(|count| *count > 20), "refused, whole, with bad frames: {ends:?}");
 }
 
 #[test]

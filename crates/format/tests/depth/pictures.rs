@@ -89,6 +89,12 @@ fn what_does_not_fit_is_refused_with_the_reason() {
     let none = DepthOptions::default;
     let at = write_depth(dir.path(), "a", SIZE, &DEPTHS, r#", "color": "c.png""#);
     assert!(refused(&at, none()).contains("c.png: no such picture"));
+    for (name, shown) in [(".", "/.: "), ("", ": "), ("..", "/..: "), ("sub", "sub: ")] {
+        fs::create_dir_all(dir.path().join("sub")).unwrap();
+        let at = write_depth(dir.path(), "folder", SIZE, &DEPTHS, &format!(r#", "color": "{name}""#));
+        let line = refused(&at, none());
+        assert!(line.contains(&format!("{shown}this is a folder, not a picture; correct the path")), "{line}");
+    }
     write_png(&dir.path().join("c.png"), [2, 3], ColorType::Grayscale, BitDepth::Eight, &[0; 6]);
     assert!(refused(&at, none()).contains("the colour picture has 2 × 3 pixels, the depth map 3 × 2"));
     fs::write(dir.path().join("c.png"), "BM").unwrap();
@@ -108,7 +114,14 @@ fn what_does_not_fit_is_refused_with_the_reason() {
     for (text, what) in [
         (r#"{"fx": 1, "fy": 1, "cx": 1, "cy": 0}"#, "nothing says the scale of the depths"),
         (r#"{"depth_scale": 1000}"#, "nothing says the intrinsics of the camera"),
-        (r#"{"fx": "1"}"#, "b.json: not the description of a camera: invalid type"),
+        (r#"{"fx": "1"}"#, r#"b.json: not the description of a camera: fx is "1", not a number; correct it"#),
+        ("[1, 2]", "b.json: not the description of a camera: it is an array, not an object; correct it"),
+        (r#"{"fx": 1,"#, "b.json: is not valid JSON: it ends within a value (byte 8); correct it, or give the camera"),
+        (r#"{"fx": NaN}"#, "b.json: is not valid JSON: a number is written as inf or nan (byte 7); correct it"),
+        (r#"{"width": 1.5}"#, "width is 1.5, not a whole number below 2^32"),
+        (r#"{"cx": 1, "ppx": 1}"#, "cx and ppx are the same: leave one of them out"),
+        (r#"{"color": 7}"#, "color is 7, not a string"),
+        (r#"{"pose": {"a": 1}}"#, r#"pose is {"a":1}, not an array of numbers"#),
         (
             r#"{"fx": 1, "fy": 1, "cx": 1, "cy": 0, "width": 2, "height": 2, "depth_scale": 1000, "pose": [1]}"#,
             "1 numbers",

@@ -70,6 +70,117 @@ fn poses_come_from_files_of_each_kind() {
 }
 
 #[test]
+fn what_is_wrong_with_a_pose_is_reported_at_its_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fs::write(at("camera.json"), CAMERA).unwrap();
+    frames(dir.path(), ["a", "b"]);
+    // the second matrix starts at byte 44: 0 0 1, then four rows
+    let first = format!("0 0 1\n{}", moved(5.0));
+    let second = first.len() + "1 1 2\n".len();
+    let rows = moved(7.0);
+    let row = |n: usize| second + rows.match_indices('\n').nth(n - 1).map_or(0, |(end, _)| end + 1);
+    let with = |wrong: &str, n: usize| {
+        let lines: Vec<&str> = rows.lines().enumerate().map(|(i, line)| if i == n { wrong } else { line }).collect();
+        format!("{first}1 1 2\n{}\n", lines.join("\n"))
+    };
+    for (text, byte, what) in [
+        (with("0 NaN 0 0", 1), row(1), "no pose: a number is not finite"),
+        (with("0 0 inf 0", 2), row(2), "no pose: a number is not finite"),
+        (with("0 0 0 2", 3), row(3), "no pose: the last row"),
+        (with("0 1 0 1e300", 1), row(1), "no pose: row 2 of the matrix places no point where coordinates can be"),
+        (with("0 1 0", 1), row(1), "expected 4 numbers, a row of a matrix"),
+        (with("0 1 0 x", 1), row(1), "expected 4 numbers, a row of a matrix"),
+        (with("0 0 1 0", 1), second, "no pose: "),
+        (format!("{first}1 1\n{rows}"), first.len(), "expected 3 numbers, those above a matrix"),
+        (format!("{first}1 1 2\n1 0 0 7\n"), first.len(), "expected 3 numbers and the 4 rows of a matrix"),
+    ] {
+        fs::write(at("trajectory.log"), text).unwrap();
+        let line = refused(dir.path(), DepthOptions::default());
+        assert!(line.contains(&format!("trajectory.log: {what}")), "{line}");
+        assert!(line.contains(&format!("(byte {byte})")), "{line}");
+    }
+    fs::remove_file(at("trajectory.log")).unwrap();
+    fs::write(at("a.pose.txt"), moved(1.0)).unwrap();
+    for (text, byte, what) in [
+        ("1 0 0 7\n0 1 0 0\n0 0 -inf 0\n0 0 0 1\n", 16, "no pose: a number is not finite"),
+        ("1 0 0 7\n0 1 x 0\n0 0 1 0\n0 0 0 1\n", 8, "not the 16 numbers of a pose"),
+        ("1 0 0 7\n0 1 0 0\n", 0, "not the 16 numbers of a pose"),
+    ] {
+        fs::write(at("b.pose.txt"), text).unwrap();
+        let [error] = &cloud(dir.path(), DepthOptions::default()).errors[..] else { panic!("{text}") };
+        assert!(error.to_string().contains(&format!("b.pose.txt: {what} (byte {byte})")), "{error}");
+    }
+}
+
+/// The first red value of each frame; none if there are no colours.
+fn reds(folder: &Path) -> Option<Vec<u16>> {
+    let cloud = cloud(folder, DepthOptions::default());
+    assert!(cloud.errors.is_empty(), "{:?}", cloud.errors);
+    cloud.info.attribute("rgb")?;
+    Some(cloud.column("rgb").values::<u16>().unwrap().chunks(12).map(|frame| frame[0] / 257).collect())
+}
+
+#[test]
+fn a_frame_has_the_colours_that_are_listed_near_in_time_else_those_of_its_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let picture = |name: &str, red: u8| {
+        crate::common::write_png(&at(name), [2, 2], png::ColorType::Rgb, png::BitDepth::Eight, &[red; 12]);
+    };
+    fs::write(at("camera.json"), CAMERA).unwrap();
+    frames(&at("depth"), ["1.00", "2.00"]);
+    fs::write(at("groundtruth.txt"), "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").unwrap();
+    fs::create_dir(at("rgb")).unwrap();
+    picture("rgb/2.00.png", 20);
+    picture("listed.png", 50);
+    assert_eq!(reds(dir.path()), Some(vec![0, 20]), "by name");
+    fs::write(at("rgb.txt"), "1.01 listed.png\n").unwrap();
+    assert_eq!(reds(dir.path()), Some(vec![50, 20]), "one from the list, one by name");
+    fs::write(at("rgb.txt"), "2.01 listed.png\n").unwrap();
+    assert_eq!(reds(dir.path()), Some(vec![0, 50]), "the list goes before the name");
+    fs::remove_file(at("rgb/2.00.png")).unwrap();
+    fs::write(at("rgb.txt"), "2.05 listed.png\n").unwrap();
+    assert_eq!(reds(dir.path()), None);
+    let warned = cloud(dir.path(), DepthOptions::default());
+    assert!(
+        warned.warned("none of the 2 depth maps has a picture near in time in the list of colours"),
+        "{:?}",
+        warned.info.warnings
+    );
+    // names that are no times, as 7-Scenes has
+    let named = tempfile::tempdir().unwrap();
+    fs::write(named.path().join("camera.json"), CAMERA).unwrap();
+    frames(named.path(), ["frame-0.depth", "frame-1.depth"]);
+    for name in ["frame-0", "frame-1"] {
+        fs::write(named.path().join(format!("{name}.pose.txt")), moved(0.0)).unwrap();
+        let path = named.path().join(format!("{name}.color.png"));
+        crate::common::write_png(&path, [2, 2], png::ColorType::Rgb, png::BitDepth::Eight, &[30; 12]);
+    }
+    fs::write(named.path().join("rgb.txt"), "0 frame-1.color.png\n").unwrap();
+    assert_eq!(reds(named.path()), Some(vec![30, 30]));
+}
+
+#[test]
+fn a_frame_whose_picture_was_cut_within_its_header_is_not_passed_over() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fs::write(at("camera.json"), CAMERA).unwrap();
+    frames(dir.path(), ["a", "b"]);
+    fs::create_dir(at("pose")).unwrap();
+    for name in ["a", "b"] {
+        fs::write(at(&format!("pose/{name}.txt")), moved(1.0)).unwrap();
+    }
+    let whole = fs::read(at("b.png")).unwrap();
+    for cut in [0, 4, 8, 20, 26, 33] {
+        fs::write(at("b.png"), &whole[..cut]).unwrap();
+        let cloud = cloud(dir.path(), DepthOptions::default());
+        let [error] = &cloud.errors[..] else { panic!("cut to {cut}: {:?}", cloud.errors) };
+        assert!(error.to_string().contains("b.png: the picture ends before its last pixel"), "cut to {cut}: {error}");
+    }
+}
+
+#[test]
 fn a_frame_that_cannot_be_read_is_an_error_of_its_own_piece() {
     type Change = (&'static str, fn(&Path), &'static str);
     let middle = "depth/1305031102.194330.png";

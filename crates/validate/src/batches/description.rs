@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use pointmill_format::{Attribute, AttributeType, Lattice, ReadError};
+use pointmill_format::{Attribute, AttributeType, Lattice, ReadError, json_fault};
 use serde_json::{Map, Value, json};
 
 use super::bytes::Bytes;
@@ -78,7 +78,7 @@ pub(crate) fn read(bytes: &Bytes, header: &Header, findings: &Findings) -> Resul
     let json: Map<String, Value> = match serde_json::from_slice(&raw) {
         Ok(json) => json,
         Err(error) => {
-            fault(findings, "text", "a JSON object in UTF-8", error.to_string());
+            fault(findings, "text", "a JSON object in UTF-8", json_fault(&error));
             return Ok(None);
         }
     };

@@ -5,11 +5,11 @@ use std::io::Read as _;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde_json::Value;
 
-use crate::error::json_reason;
+use crate::json::{Fault, Fields, broken, syntax_error};
 use crate::scan::depth_options::UNITS_PER_METRE;
-use crate::{Advice, Affine, DepthOptions, Intrinsics, ReadError};
+use crate::{Advice, Affine, AffineFault, DepthOptions, Intrinsics, ReadError};
 
 /// Where the centre of a camera lies in its pictures, as parts of a side. Of cut pictures it may lie elsewhere: their size must
 /// be given.
@@ -18,23 +18,22 @@ const CENTRAL: RangeInclusive<f64> = 0.125..=0.875;
 /// A description of a camera is smaller.
 const MAX_BYTES: u64 = 1 << 20;
 
+/// What to do about a file that is none.
+const CORRECT: &str = "correct it, or give the camera in options";
+
 /// What a JSON file says of a camera; other keys are not read.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Sidecar {
     fx: Option<f64>,
     fy: Option<f64>,
-    #[serde(alias = "ppx")]
     cx: Option<f64>,
-    #[serde(alias = "ppy")]
     cy: Option<f64>,
     width: Option<u32>,
     height: Option<u32>,
     depth_scale: Option<f64>,
     pose: Option<Vec<f64>>,
-    #[serde(alias = "colour")]
     color: Option<PathBuf>,
     /// The file.
-    #[serde(skip)]
     path: PathBuf,
 }
 
@@ -47,12 +46,40 @@ impl Sidecar {
         let io = |e| ReadError::io(path, "reading the camera", e);
         let mut bytes = Vec::new();
         File::open(path).map_err(io)?.take(MAX_BYTES).read_to_end(&mut bytes).map_err(io)?;
-        let broken = |e: serde_json::Error| {
-            let what = format!("not the description of a camera: {}", json_reason(&e));
-            ReadError::broken(path, None, what).advise("correct it, or give the camera in options")
+        Self::parse(&bytes, path).map(Some)
+    }
+
+    fn parse(bytes: &[u8], path: &Path) -> Result<Self, ReadError> {
+        let value: Value = serde_json::from_slice(bytes).map_err(|e| syntax_error(bytes, path, &e).advise(CORRECT))?;
+        Self::of(value, path).map_err(|fault| {
+            let (Fault::Broken(what) | Fault::Unsupported(what)) = fault;
+            ReadError::broken(path, None, format!("not the description of a camera: {what}")).advise(CORRECT)
+        })
+    }
+
+    fn of(value: Value, path: &Path) -> Result<Self, Fault> {
+        let mut map = match value {
+            Value::Object(map) => map,
+            Value::Array(_) => return broken("it is an array, not an object"),
+            _ => return broken("it is a single value, not an object"),
         };
-        let sidecar: Self = serde_json::from_slice(&bytes).map_err(broken)?;
-        Ok(Some(Self { path: path.to_path_buf(), ..sidecar }))
+        map.retain(|_, value| !value.is_null());
+        let fields = &mut Fields { map: &mut map, place: "" };
+        let [cx, cy] = [["cx", "ppx"], ["cy", "ppy"]].map(|names| one_of(fields, names));
+        let color = one_of(fields, ["color", "colour"])?;
+        let path = path.to_path_buf();
+        Ok(Self {
+            fx: fields.optional_number("fx")?,
+            fy: fields.optional_number("fy")?,
+            cx: fields.optional_number(cx?)?,
+            cy: fields.optional_number(cy?)?,
+            width: whole(fields, "width")?,
+            height: whole(fields, "height")?,
+            depth_scale: fields.optional_number("depth_scale")?,
+            pose: fields.numbers("pose")?,
+            color: if fields.map.contains_key(color) { Some(fields.text(color)?.into()) } else { None },
+            path,
+        })
     }
 
     /// True if it describes a camera.
@@ -73,7 +100,7 @@ impl Sidecar {
         let matrix: [f64; 16] = numbers.as_slice().try_into().map_err(|_| {
             broken(format!("the pose has {} numbers; a 4 × 4 matrix, row by row, has 16", numbers.len()))
         })?;
-        pose(&matrix).map(Some).map_err(|what| broken(format!("the pose is none: {what}")))
+        pose(&matrix).map(Some).map_err(|fault| broken(format!("the pose is none: {}", fault.what)))
     }
 
     fn intrinsics(&self) -> Result<Option<Intrinsics>, String> {
@@ -91,13 +118,42 @@ impl Sidecar {
     }
 }
 
+/// Which of two names for the same an object has; the first if it has neither.
+fn one_of<'n>(fields: &Fields<'_>, [name, other]: [&'n str; 2]) -> Result<&'n str, Fault> {
+    match [name, other].map(|name| fields.map.contains_key(name)) {
+        [true, true] => broken(format!("{name} and {other} are the same: leave one of them out")),
+        [false, true] => Ok(other),
+        _ => Ok(name),
+    }
+}
+
+fn whole(fields: &mut Fields<'_>, key: &str) -> Result<Option<u32>, Fault> {
+    if fields.map.contains_key(key) { fields.small(key).map(Some) } else { Ok(None) }
+}
+
+/// Why a matrix is no pose.
+#[derive(Debug)]
+pub(super) struct PoseFault {
+    /// The row that is to blame, from 0, if it is one.
+    pub(super) row: Option<usize>,
+    pub(super) what: String,
+}
+
 /// A pose by its matrix, row by row.
-///
-/// `Err` says why it is none.
-pub(super) fn pose(matrix: &[f64; 16]) -> Result<Affine, String> {
-    let map = Affine::from_matrix(matrix).map_err(|fault| fault.to_string())?;
+pub(super) fn pose(matrix: &[f64; 16]) -> Result<Affine, PoseFault> {
+    let map = Affine::from_matrix(matrix).map_err(|fault| {
+        let row = match fault {
+            AffineFault::NotFinite => matrix.chunks(4).position(|row| row.iter().any(|v| !v.is_finite())),
+            AffineFault::LastRow(_) => Some(3),
+            _ => None,
+        };
+        PoseFault { row, what: fault.to_string() }
+    })?;
     match map.misplaced_row() {
-        Some(row) => Err(format!("row {} of the matrix places no point where coordinates can be", row + 1)),
+        Some(row) => {
+            let what = format!("row {} of the matrix places no point where coordinates can be", row + 1);
+            Err(PoseFault { row: Some(row), what })
+        }
         None => Ok(map),
     }
 }
@@ -180,7 +236,7 @@ mod tests {
     use super::*;
 
     fn sidecar(text: &str) -> Sidecar {
-        serde_json::from_str(text).unwrap()
+        Sidecar::parse(text.as_bytes(), Path::new("a.json")).unwrap()
     }
 
     #[test]

@@ -1,14 +1,17 @@
 //! Colour pictures that are registered to a depth image: PNG and JPEG.
 
+use std::io;
 use std::path::Path;
 
 use png::{BitDepth, Transformations};
+use zune_core::bytestream::ZByteIoError;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 
 use super::picture::{Header, check_size, first_bytes, open_png, refuse};
+use super::reasons::{ENDS, jpeg_reason, unknown_coding};
 use super::tracked::{Place, Tracked};
 use crate::{Advice, ReadError};
 
@@ -102,7 +105,7 @@ fn read_png(path: &Path, expected: [u32; 2]) -> Result<Colours, ReadError> {
 fn read_jpeg(path: &Path, start: &[u8], expected: [u32; 2]) -> Result<Colours, ReadError> {
     let (mut decoder, size, place) = jpeg(path, start)?;
     check(path, size, expected)?;
-    let bytes = decoder.decode().map_err(|e| refuse_jpeg(path, &place, &e))?;
+    let bytes = decoder.decode().map_err(|e| refuse_jpeg(path, &place, e))?;
     let channels = decoder.output_colorspace().map_or(3, |space| space.num_components());
     Ok(Colours { bytes, channels, is_wide: false })
 }
@@ -117,7 +120,7 @@ fn jpeg(path: &Path, start: &[u8]) -> Result<(JpegDecoder<Tracked>, [u32; 2], Pl
     // what is cut short or corrupt is an error, not grey
     let options = DecoderOptions::new_safe().set_strict_mode(true);
     let mut decoder = JpegDecoder::new_with_options(file, options);
-    decoder.decode_headers().map_err(|e| refuse_jpeg(path, &place, &e))?;
+    decoder.decode_headers().map_err(|e| refuse_jpeg(path, &place, e))?;
     let size = decoder.dimensions().and_then(|(w, h)| Some([u32::try_from(w).ok()?, u32::try_from(h).ok()?]));
     let size = size.unwrap_or_default();
     check_size(path, size)?;
@@ -127,9 +130,18 @@ fn jpeg(path: &Path, start: &[u8]) -> Result<(JpegDecoder<Tracked>, [u32; 2], Pl
     Ok((decoder, size, place))
 }
 
-fn refuse_jpeg(path: &Path, place: &Place, error: &DecodeErrors) -> ReadError {
-    // its text repeats the name of the variant and breaks lines
-    let why = format!("{error:?}").split_whitespace().collect::<Vec<_>>().join(" ");
-    let what = format!("the colour picture cannot be decoded: {why}");
-    ReadError::broken(path, place.get(), what).advise(Advice::Damaged)
+fn refuse_jpeg(path: &Path, place: &Place, error: DecodeErrors) -> ReadError {
+    let error = match error {
+        DecodeErrors::IoErrors(ZByteIoError::StdIoError(e)) if e.kind() != io::ErrorKind::UnexpectedEof => {
+            return ReadError::io(path, "reading the picture", e);
+        }
+        other => other,
+    };
+    if let Some(coding) = unknown_coding(path) {
+        let what = format!("the colour picture is a JPEG of a coding that is not read: {coding}");
+        return ReadError::unsupported(path, what).advise("save it as a JPEG of the usual kind, or as PNG");
+    }
+    let reason = jpeg_reason(&error);
+    let advice = if reason == ENDS { Advice::CutShort } else { Advice::Damaged };
+    ReadError::broken(path, place.get(), format!("the colour picture cannot be decoded: {reason}")).advise(advice)
 }

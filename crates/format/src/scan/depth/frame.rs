@@ -7,7 +7,7 @@ use super::colour::{self, Colours};
 use super::filter;
 use super::grid::Grid;
 use super::normals::normal;
-use super::picture::{DepthPicture, Header, Rule, SIZE_AT, check_size, first_bytes, not_depth};
+use super::picture::{DepthPicture, Header, Rule, SIZE_AT, check_size, cut, first_bytes, is_cut, not_depth};
 use crate::{Advice, Affine, DepthFilter, DepthOptions, ReadError};
 
 /// A frame of a scan.
@@ -73,6 +73,10 @@ impl Frame {
             return Err(ReadError::broken(path, *at, what.clone()).advise(Advice::SkipUnreadable));
         }
         for path in [Some(&self.depth), self.colour.as_ref()].into_iter().flatten() {
+            if path.is_dir() {
+                let what = "this is a folder, not a picture";
+                return Err(ReadError::broken(path, None, what).advise("correct the path of the picture"));
+            }
             if !path.is_file() {
                 return Err(ReadError::broken(path, None, "no such picture").advise(Advice::SkipUnreadable));
             }
@@ -134,8 +138,11 @@ impl Frame {
 /// The header of a depth picture.
 pub(super) fn header_of(path: &Path) -> Result<Header, ReadError> {
     let first = first_bytes(path)?;
-    let header = Header::of(&first).ok_or_else(|| {
-        ReadError::broken(path, 0, "no PNG picture; a depth map is one of 16-bit grey").advise(Advice::Damaged)
+    let header = Header::of(&first).ok_or_else(|| match is_cut(&first) || first.is_empty() {
+        true => cut(path, first.len() as u64),
+        false => {
+            ReadError::broken(path, 0, "no PNG picture; a depth map is one of 16-bit grey").advise(Advice::Damaged)
+        }
     })?;
     if header.is_depth() { Ok(header) } else { Err(not_depth(path, header)) }
 }

@@ -27,6 +27,7 @@ mod grid;
 mod normals;
 mod open;
 mod picture;
+mod reasons;
 mod scan;
 mod sequence;
 mod tracked;
@@ -37,9 +38,10 @@ use std::path::Path;
 use crate::{DepthOptions, ReadError, Scan};
 use picture::Header;
 
-/// True for a PNG picture of 16-bit grey, by the first bytes of its file.
+/// True for a PNG picture of 16-bit grey, by the first bytes of its file; also for what is left of one that ends before it
+/// says what it is.
 pub fn is_depth(first_bytes: &[u8]) -> bool {
-    Header::of(first_bytes).is_some_and(Header::is_depth)
+    Header::of(first_bytes).map_or_else(|| picture::is_cut(first_bytes), Header::is_depth)
 }
 
 /// True for a folder of depth maps with a trajectory.

@@ -9,7 +9,7 @@ use super::picture::MAX_PIXELS;
 use super::scan::DepthScan;
 use super::sequence::{Sequence, name_of, pose_file};
 use super::trajectory::{self, MAX_SECONDS, Trajectory, nearest};
-use crate::{Affine, DepthOptions, ReadError};
+use crate::{Affine, DepthOptions, ReadError, ScanWarning};
 
 /// A single depth map.
 pub(super) fn single(path: &Path, options: &DepthOptions, scans: Option<&[String]>) -> Result<DepthScan, ReadError> {
@@ -52,7 +52,12 @@ pub(super) fn sequence(
     }
     let frames = (0..count).map(|index| frame(&sequence, index, options)).collect::<Result<Vec<_>, _>>()?;
     let title = format!("{count} depth maps with a trajectory");
-    assemble(folder, frames, (options, scans), title, true)
+    let is_colourless = frames.iter().all(|frame| frame.colour.is_none());
+    let mut scan = assemble(folder, frames, (options, scans), title, true)?;
+    if sequence.lists_colours && is_colourless {
+        scan.info.warnings.push(ScanWarning::ColoursElsewhere { of: count });
+    }
+    Ok(scan)
 }
 
 /// A frame of a sequence; what is wrong with it alone stays in it.
@@ -109,7 +114,7 @@ fn pose_of(sequence: &Sequence, index: usize) -> Result<Result<Affine, Flaw>, Re
             match trajectory::of_file(&path) {
                 Ok(pose) => Ok(Ok(pose)),
                 Err(error) if error.is_io() => Err(error),
-                Err(error) => flaw(&path, 0, error.what()),
+                Err(error) => flaw(&path, error.offset().unwrap_or(0), error.what()),
             }
         }
     }

@@ -8,6 +8,7 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader};
 
 use super::grid::Grid;
+use super::reasons::png_reason;
 use super::tracked::{Place, Tracked};
 use crate::{Advice, ReadError};
 
@@ -31,6 +32,17 @@ pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut first = Vec::new();
     File::open(path).map_err(io)?.take(FIRST_BYTES).read_to_end(&mut first).map_err(io)?;
     Ok(first)
+}
+
+/// True for the start of a PNG file that ends within its first chunk.
+pub(super) fn is_cut(first_bytes: &[u8]) -> bool {
+    let starts = first_bytes.starts_with(SIGNATURE) || !first_bytes.is_empty() && SIGNATURE.starts_with(first_bytes);
+    starts && (first_bytes.len() as u64) < BITS_AT + 2
+}
+
+/// The error of such a file.
+pub(super) fn cut(path: &Path, at: u64) -> ReadError {
+    ReadError::broken(path, at, "the picture ends before its last pixel").advise(Advice::CutShort)
 }
 
 /// What the first chunk of a PNG file says.
@@ -97,11 +109,11 @@ pub(super) fn refuse(path: &Path, place: &Place, error: DecodingError) -> ReadEr
         DecodingError::IoError(e) if e.kind() != io::ErrorKind::UnexpectedEof => {
             ReadError::io(path, "reading the picture", e)
         }
-        DecodingError::IoError(_) => {
-            ReadError::broken(path, place.get(), "the picture ends before its last pixel").advise(Advice::CutShort)
+        DecodingError::IoError(_) => cut(path, place.get()),
+        other => {
+            let what = format!("the picture cannot be decoded: {}", png_reason(&other));
+            ReadError::broken(path, place.get(), what).advise(Advice::Damaged)
         }
-        other => ReadError::broken(path, place.get(), format!("the picture cannot be decoded: {other}"))
-            .advise(Advice::Damaged),
     }
 }
 

@@ -7,7 +7,7 @@
 //! | `NAME.pose.txt`, `pose/NAME.txt`, `poses/NAME.txt` | a 4 × 4 matrix for each frame (7-Scenes, ScanNet) |
 //! | `depth.txt`, `rgb.txt` | `timestamp file`, a line for each picture (TUM RGB-D) |
 //! | `depth/*.png`, else `*.depth.png` and PNG pictures of 16-bit grey | the frames where there is no `depth.txt` |
-//! | `rgb/`, `color/`, `colour/` or `image/` `NAME.png`, `.jpg`; `NAME.color.png`, `.jpg` | colours where there is no `rgb.txt` |
+//! | `rgb/`, `color/`, `colour/` or `image/` `NAME.png`, `.jpg`; `NAME.color.png`, `.jpg` | colours of a frame that has none in `rgb.txt` |
 //! | `camera.json`, `intrinsics.json` | the camera of all frames |
 
 use std::ffi::OsStr;
@@ -15,7 +15,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::camera::Sidecar;
-use super::picture::{Header, first_bytes};
+use super::picture::{Header, first_bytes, is_cut};
 use super::trajectory::{MAX_SECONDS, Trajectory, lines, nearest, text};
 use crate::{Advice, ReadError};
 
@@ -29,6 +29,7 @@ const DEPTH_LIST: &str = "depth.txt";
 const COLOUR_LIST: &str = "rgb.txt";
 const DEPTH_FOLDER: &str = "depth";
 const DEPTH_ENDING: &str = ".depth.png";
+const COLOUR_ENDING: &str = ".color.png";
 const COLOUR_FOLDERS: [&str; 4] = ["rgb", "color", "colour", "image"];
 const COLOUR_ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 const CAMERAS: [&str; 2] = ["camera.json", "intrinsics.json"];
@@ -53,6 +54,8 @@ pub(super) struct Sequence {
     pub(super) folder: PathBuf,
     pub(super) trajectory: Trajectory,
     pub(super) frames: Vec<Listed>,
+    /// True if a list names colour pictures and their times.
+    pub(super) lists_colours: bool,
     /// That of all frames.
     pub(super) camera: Option<Sidecar>,
 }
@@ -85,10 +88,16 @@ fn has_depths(folder: &Path) -> bool {
         || files(folder).any(|path| is_depth_file(&path))
 }
 
-/// A depth picture outside of a folder of depths: by name, or by what it is.
+/// A depth picture outside of a folder of depths: by name, or by what it is. One that was cut within its header may be a frame,
+/// and is not passed over.
 fn is_depth_file(path: &Path) -> bool {
-    file_name(path).ends_with(DEPTH_ENDING)
-        || is_png(path) && first_bytes(path).is_ok_and(|first| Header::of(&first).is_some_and(Header::is_depth))
+    let is_depth = |first: Vec<u8>| match Header::of(&first) {
+        Some(header) => header.is_depth(),
+        None => first.is_empty() || is_cut(&first),
+    };
+    let name = file_name(path);
+    name.ends_with(DEPTH_ENDING)
+        || is_png(path) && !name.ends_with(COLOUR_ENDING) && first_bytes(path).is_ok_and(is_depth)
 }
 
 impl Sequence {
@@ -104,20 +113,17 @@ impl Sequence {
             let what = format!("there are more than {MAX_FRAMES} frames in it");
             return Err(ReadError::unsupported(folder, what).advise("divide it into several folders"));
         }
-        match folder.join(COLOUR_LIST) {
-            list if list.is_file() => {
-                let mut colours = list_of(folder, &list)?;
-                colours.sort_by(|a, b| a.0.total_cmp(&b.0));
-                for frame in &mut frames {
-                    let found = frame.time.and_then(|time| nearest(&colours, time));
-                    frame.colour = found.filter(|(_, seconds)| *seconds <= MAX_SECONDS).map(|(path, _)| path.clone());
-                }
-            }
-            _ => frames.iter_mut().for_each(|frame| frame.colour = colour_of(folder, frame)),
+        let list = folder.join(COLOUR_LIST);
+        let mut colours = if list.is_file() { list_of(folder, &list)? } else { Vec::new() };
+        colours.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for frame in &mut frames {
+            let found = frame.time.and_then(|time| nearest(&colours, time));
+            let near = found.filter(|(_, seconds)| *seconds <= MAX_SECONDS).map(|(path, _)| path.clone());
+            frame.colour = near.or_else(|| colour_of(folder, frame));
         }
         let files = CAMERAS.iter().map(|name| Sidecar::read(&folder.join(name)));
         let camera = files.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().next();
-        Ok(Self { folder: folder.to_path_buf(), trajectory, frames, camera })
+        Ok(Self { folder: folder.to_path_buf(), trajectory, frames, lists_colours: !colours.is_empty(), camera })
     }
 }
 

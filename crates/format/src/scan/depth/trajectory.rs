@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use super::camera::pose;
+use super::camera::{PoseFault, pose};
 use crate::{Advice, Affine, ReadError};
 
 /// A frame and its pose, or its colour picture, may be that many seconds apart.
@@ -81,7 +81,7 @@ impl Trajectory {
             let [time, x, y, z, quaternion @ ..] =
                 numbers.ok_or_else(|| broken("expected the 8 numbers timestamp tx ty tz qx qy qz qw".to_owned()))?;
             let matrix = matrix(quaternion, [x, y, z]).map_err(broken)?;
-            let pose = pose(&matrix).map_err(|what| broken(format!("no pose: {what}")))?;
+            let pose = pose(&matrix).map_err(|fault| broken(format!("no pose: {}", fault.what)))?;
             poses.push((time, (line.at, pose)));
         }
         poses.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -94,13 +94,22 @@ impl Trajectory {
         let lines: Vec<Line<'_>> = lines(&text).collect();
         let mut poses = Vec::new();
         for frame in lines.chunks(LOG_LINES) {
-            let at = frame.first().map_or(0, |line| line.at);
-            let broken = |what: String| ReadError::broken(path, at, what).advise(Advice::ExportAgain);
-            let rows: Option<Vec<Vec<f64>>> = frame.iter().map(|line| numbers(line.text)).collect();
-            let rows = rows.filter(|rows| rows.iter().map(Vec::len).eq([3, 4, 4, 4, 4]));
-            let rows = rows.ok_or_else(|| broken("expected a line of 3 numbers and 4 lines of 4".to_owned()))?;
-            let matrix = <[f64; 16]>::try_from(rows[1..].concat()).map_err(|_| broken("no matrix".to_owned()))?;
-            poses.push(pose(&matrix).map_err(|what| broken(format!("no pose: {what}")))?);
+            let broken = |at, what: &str| ReadError::broken(path, at, what).advise(Advice::ExportAgain);
+            let [above, rows @ ..] = frame else { break };
+            if frame.len() < LOG_LINES {
+                return Err(broken(above.at, "expected 3 numbers and the 4 rows of a matrix"));
+            }
+            if numbers(above.text).is_none_or(|numbers| numbers.len() != 3) {
+                return Err(broken(above.at, "expected 3 numbers, those above a matrix"));
+            }
+            let mut matrix = [0.0; 16];
+            for (line, row) in rows.iter().zip(matrix.chunks_exact_mut(4)) {
+                let found = numbers(line.text).filter(|numbers| numbers.len() == 4);
+                row.copy_from_slice(&found.ok_or_else(|| broken(line.at, "expected 4 numbers, a row of a matrix"))?);
+            }
+            let at = |row: Option<usize>| rows.get(row.unwrap_or(0)).map_or(above.at, |line| line.at);
+            let no_pose = |PoseFault { row, what }| broken(at(row), &format!("no pose: {what}"));
+            poses.push(pose(&matrix).map_err(no_pose)?);
         }
         Ok(Self::Counted { path: path.to_path_buf(), poses })
     }
@@ -109,10 +118,20 @@ impl Trajectory {
 /// The pose in a file of 16 numbers.
 pub(super) fn of_file(path: &Path) -> Result<Affine, ReadError> {
     let text = text(path)?;
-    let broken = |what: String| ReadError::broken(path, 0, what).advise(Advice::SkipUnreadable);
-    let matrix = numbers(&text).and_then(|n| <[f64; 16]>::try_from(n).ok());
-    let matrix = matrix.ok_or_else(|| broken("not the 16 numbers of a pose".to_owned()))?;
-    pose(&matrix).map_err(|what| broken(format!("no pose: {what}")))
+    let broken = |at, what: &str| ReadError::broken(path, at, what).advise(Advice::SkipUnreadable);
+    let not_16 = |at| broken(at, "not the 16 numbers of a pose");
+    // each with the start of its line
+    let mut found = Vec::new();
+    for line in lines(&text) {
+        let numbers = numbers(line.text).ok_or_else(|| not_16(line.at))?;
+        found.extend(numbers.into_iter().map(|number| (line.at, number)));
+    }
+    let numbers: Vec<f64> = found.iter().map(|(_, number)| *number).collect();
+    let matrix = <[f64; 16]>::try_from(numbers).map_err(|_| not_16(0))?;
+    pose(&matrix).map_err(|PoseFault { row, what }| {
+        let at = found.get(4 * row.unwrap_or(0)).map_or(0, |(at, _)| *at);
+        broken(at, &format!("no pose: {what}"))
+    })
 }
 
 /// The entry whose time is nearest to `time`, and how far it is; `sorted` by time.

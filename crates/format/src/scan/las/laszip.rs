@@ -25,6 +25,17 @@ pub(super) enum Arrangement {
     Layered,
 }
 
+impl Arrangement {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Plain => "not at all",
+            Self::Pointwise => "point by point",
+            Self::Chunked => "in chunks of records",
+            Self::Layered => "in layers",
+        }
+    }
+}
+
 /// The record, checked against the header: a decompressor built from `items` writes records of exactly
 /// [`Header::record_len`] bytes.
 #[derive(Debug, Clone)]
@@ -115,23 +126,25 @@ fn check_items(items: &[Item], header: &Header, arrangement: Arrangement) -> Res
     let found: Vec<K> = items.iter().map(|item| item.kind).collect();
     if found != expected {
         return Err(LaszipFault::Broken(format!(
-            "the LASzip items {found:?} are not those of point format {} with records of {} bytes",
-            header.point_format, header.record_len
+            "the LASzip items {} are not those of point format {} with records of {} bytes",
+            found.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(" "),
+            header.point_format,
+            header.record_len
         )));
     }
     if let Some(item) = items.iter().find(|item| item.bytes != item.kind.bytes().unwrap_or(extra as u16)) {
-        let what = format!("the LASzip item {:?} claims {} bytes", item.kind, item.bytes);
+        let what = format!("the LASzip item {} claims {} bytes", item.kind.name(), item.bytes);
         return Err(LaszipFault::Broken(what));
     }
     let versions = if layered { 3..=4 } else { 1..=2 };
     let fits = arrangement == Arrangement::Plain || layered == (arrangement == Arrangement::Layered);
     match items.iter().find(|item| !versions.contains(&item.version)) {
         Some(item) if arrangement != Arrangement::Plain => {
-            let what = format!("LASzip item {:?} of version {} is not known", item.kind, item.version);
+            let what = format!("LASzip item {} of version {} is not known", item.kind.name(), item.version);
             Err(LaszipFault::Unknown(what))
         }
         _ if !fits => {
-            let what = format!("point format {} cannot be arranged as {arrangement:?}", header.point_format);
+            let what = format!("point format {} cannot be compressed {}", header.point_format, arrangement.words());
             Err(LaszipFault::Broken(what))
         }
         _ => Ok(()),

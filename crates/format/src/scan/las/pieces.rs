@@ -123,7 +123,10 @@ impl Planner<'_> {
                 let own = own.ok_or_else(|| format!("no chunk starts at byte {at}"))?;
                 let fewer_at_the_end = i == last && layout.chunk_points.is_some() && own.points <= chunk.points;
                 if own.bytes != chunk.bytes || (own.points != chunk.points && !fewer_at_the_end) {
-                    return Err(format!("it gives chunk {i} as {chunk:?}, which is {own:?}"));
+                    return Err(format!(
+                        "it gives chunk {i} {} points in {} bytes; it has {} in {}",
+                        chunk.points, chunk.bytes, own.points, own.bytes
+                    ));
                 }
                 *chunk = own;
             }

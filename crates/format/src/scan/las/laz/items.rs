@@ -39,6 +39,22 @@ impl ItemKind {
         Self::Byte14,
     ];
 
+    /// What LASzip calls it.
+    pub(in super::super) const fn name(self) -> &'static str {
+        match self {
+            Self::Byte => "BYTE",
+            Self::Point10 => "POINT10",
+            Self::GpsTime11 => "GPSTIME11",
+            Self::Rgb12 => "RGB12",
+            Self::WavePacket13 => "WAVEPACKET13",
+            Self::Point14 => "POINT14",
+            Self::Rgb14 => "RGB14",
+            Self::RgbNir14 => "RGBNIR14",
+            Self::WavePacket14 => "WAVEPACKET14",
+            Self::Byte14 => "BYTE14",
+        }
+    }
+
     /// The kind of that number in the LASzip record.
     pub(in super::super) fn of_number(number: u16) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| *kind as u16 == number)
