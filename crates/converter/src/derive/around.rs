@@ -2,8 +2,7 @@
 
 use super::boxes::{Box3, Boxes, Waiting};
 use super::collect::Collect;
-use super::finder::Others;
-use super::runs::Lookup;
+use super::runs::{Lookup, Others};
 use super::space::{Space, between, outside, squared};
 use crate::error::ConvertError;
 use crate::runtime::{Compare, LANES};
@@ -34,6 +33,7 @@ pub(super) struct Places<'a> {
     pub(super) leaves: &'a Boxes,
     pub(super) leaf_points: usize,
     pub(super) others: Option<Others<'a>>,
+    pub(super) space: &'a Space,
 }
 
 impl Around {
@@ -58,10 +58,10 @@ impl Around {
         of: Box3,
         within: f32,
         places: &Places<'_>,
-        space: &Space,
         stack: &mut Vec<Waiting>,
         lookup: &mut Lookup,
     ) -> Result<bool, ConvertError> {
+        let space = places.space;
         self.count = 0;
         let points = places.columns[0].len();
         let mut near = places.leaves.near(of, space, &(0..0), stack);
@@ -224,7 +224,7 @@ mod tests {
             let of = |i: usize| columns.map(|axis| &axis[i * leaf_points..((i + 1) * leaf_points).min(points)]);
             let mut leaves = Boxes::default();
             leaves.build((0..points.div_ceil(leaf_points)).map(|i| Box3::of(of(i))));
-            let places = Places { columns, leaves: &leaves, leaf_points, others: None };
+            let places = Places { columns, leaves: &leaves, leaf_points, others: None, space: &space };
             for _ in 0..60 {
                 let min: [i32; 3] = std::array::from_fn(|_| random.below(200) as i32);
                 let some = Box3 { min, max: min.map(|v| v + random.below(20) as i32) };
@@ -236,7 +236,7 @@ mod tests {
                     found
                 };
                 let expected = near(some, within).len();
-                let is_all = around.gather(Portable, some, within, &places, &space, &mut stack, &mut lookup).unwrap();
+                let is_all = around.gather(Portable, some, within, &places, &mut stack, &mut lookup).unwrap();
                 assert_eq!(is_all, expected <= LEAST_ROOM, "{expected} points");
                 if !is_all {
                     without_room += 1;

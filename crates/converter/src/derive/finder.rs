@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::around::{Around, Places};
 use super::boxes::{Box3, Boxes, Waiting};
 use super::collect::Collect;
-use super::runs::{Lookup, Runs};
+use super::runs::{Lookup, Others};
 use super::space::{Space, between, squared};
 use super::surface::Surface;
 use crate::error::ConvertError;
@@ -29,13 +29,6 @@ const ALONE: usize = 16;
 
 /// Points that are reported together.
 const POINTS_PER_STEP: usize = 512;
-
-/// What is known of the points outside of a unit.
-#[derive(Clone, Copy)]
-pub(super) struct Others<'a> {
-    pub(super) runs: &'a Runs,
-    pub(super) unit: usize,
-}
 
 /// A thread's memory.
 pub(super) struct Finder {
@@ -78,9 +71,9 @@ impl Finder {
         self.leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(leaf(i))));
         self.surfaces.clear();
         self.surfaces.reserve(points);
-        let places = Places { columns, leaves: &self.leaves, leaf_points: LEAF_POINTS, others };
+        let places = Places { columns, leaves: &self.leaves, leaf_points: LEAF_POINTS, others, space };
         let (stack, lookup) = (&mut self.stack, &mut self.lookup);
-        let mut search = Search { lanes, space, places, around: &mut self.around, within: 0.0, stack, lookup, collect };
+        let mut search = Search { lanes, places, around: &mut self.around, within: 0.0, stack, lookup, collect };
         let mut before: Option<([i32; 3], Surface)> = None;
         let (mut gathered, mut alone) = (0..0, 0);
         for i in 0..points {
@@ -132,7 +125,6 @@ impl Finder {
 /// The search in a unit.
 struct Search<'a, L, C> {
     lanes: L,
-    space: &'a Space,
     places: Places<'a>,
     around: &'a mut Around,
     /// What it has gathered: of all points within this square of a distance of each of some.
@@ -154,14 +146,14 @@ impl<L: Compare, C: Collect> Search<'_, L, C> {
         while end < columns[0].len().min(i + TOGETHER) {
             let mut all = of;
             all.join(&Box3::at(columns.map(|axis| axis[end])));
-            let side = |a: usize| between(all.max[a], all.min[a]) * self.space.scale[a];
+            let side = |a: usize| between(all.max[a], all.min[a]) * self.places.space.scale[a];
             if (0..3).any(|a| side(a) * side(a) > most) {
                 break;
             }
             (of, end) = (all, end + 1);
         }
         self.within = within;
-        let is_all = self.around.gather(self.lanes, of, within, &self.places, self.space, self.stack, self.lookup)?;
+        let is_all = self.around.gather(self.lanes, of, within, &self.places, self.stack, self.lookup)?;
         Ok(if is_all { i..end } else { 0..0 })
     }
 
@@ -171,7 +163,7 @@ impl<L: Compare, C: Collect> Search<'_, L, C> {
         let expected = self.collect.expected(step).min(self.within);
         for within in [expected, self.within] {
             self.collect.begin_within(q, within);
-            self.around.offer_all(self.lanes, q, self.space, self.collect);
+            self.around.offer_all(self.lanes, q, self.places.space, self.collect);
             if self.collect.is_complete() {
                 return true;
             }
@@ -185,20 +177,20 @@ impl<L: Compare, C: Collect> Search<'_, L, C> {
     /// Puts the neighbourhood of a point together of what the hierarchy finds.
     #[inline(always)]
     fn one(&mut self, i: usize, q: [i32; 3], step: Option<f32>) -> Result<(), ConvertError> {
-        let Places { columns, leaves, leaf_points, others } = self.places;
+        let Places { columns, leaves, leaf_points, others, space } = self.places;
         let points = columns[0].len();
         let leaf = |i: usize| columns.map(|axis| &axis[i * leaf_points..((i + 1) * leaf_points).min(points)]);
         self.collect.begin(q, step);
         // its own leaf first: then the bound is near to what it will be
         let own = i / leaf_points;
         let known = own as u32..own as u32 + 1;
-        scan(self.lanes, leaf(own), q, self.space, self.collect);
-        let mut near = leaves.near(Box3::at(q), self.space, &known, self.stack);
+        scan(self.lanes, leaf(own), q, space, self.collect);
+        let mut near = leaves.near(Box3::at(q), space, &known, self.stack);
         while let Some(found) = near.next(self.lanes, self.collect.bound()) {
-            scan(self.lanes, leaf(found as usize), q, self.space, self.collect);
+            scan(self.lanes, leaf(found as usize), q, space, self.collect);
         }
         match others {
-            Some(others) => beyond(self.lanes, q, self.space, others, self.stack, self.lookup, self.collect),
+            Some(others) => beyond(self.lanes, q, space, others, self.stack, self.lookup, self.collect),
             None => Ok(()),
         }
     }

@@ -84,6 +84,13 @@ impl UnitRuns {
     }
 }
 
+/// What is known of the points outside of a unit.
+#[derive(Clone, Copy)]
+pub(super) struct Others<'a> {
+    pub(super) runs: &'a Runs,
+    pub(super) unit: usize,
+}
+
 /// Positions of a run, by axis.
 #[derive(Debug, Default)]
 struct Kept {

@@ -3,8 +3,8 @@
 use super::collect::{Collect, Collector};
 use super::fields::{Fields, Written};
 use super::filling::Filling;
-use super::finder::{Finder, Others};
-use super::runs::{Runs, UnitRuns};
+use super::finder::Finder;
+use super::runs::{Others, Runs, UnitRuns};
 use super::space::Space;
 use super::surface::Surface;
 use super::units::{Placed, Unit};
