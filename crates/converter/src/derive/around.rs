@@ -7,6 +7,9 @@ use super::space::{Space, between, outside, squared};
 use crate::error::ConvertError;
 use crate::runtime::{Compare, LANES};
 
+/// Points of a leaf of the hierarchy over a unit: two vectors of single precision.
+pub(super) const LEAF_POINTS: usize = 16;
+
 /// Points of which a neighbourhood of one point is chosen, for each of them.
 const PER_NEIGHBOUR: usize = 12;
 
@@ -31,9 +34,15 @@ pub(super) struct Around {
 pub(super) struct Places<'a> {
     pub(super) columns: [&'a [i32]; 3],
     pub(super) leaves: &'a Boxes,
-    pub(super) leaf_points: usize,
     pub(super) others: Option<Others<'a>>,
     pub(super) space: &'a Space,
+}
+
+/// The points of a leaf.
+#[inline(always)]
+pub(super) fn leaf(columns: [&[i32]; 3], i: usize) -> [&[i32]; 3] {
+    let first = i * LEAF_POINTS;
+    columns.map(|axis| &axis[first..(first + LEAF_POINTS).min(axis.len())])
 }
 
 impl Around {
@@ -63,12 +72,9 @@ impl Around {
     ) -> Result<bool, ConvertError> {
         let space = places.space;
         self.count = 0;
-        let points = places.columns[0].len();
         let mut near = places.leaves.near(of, space, &(0..0), stack);
-        while let Some(leaf) = near.next(lanes, within) {
-            let first = leaf as usize * places.leaf_points;
-            let leaf = first..(first + places.leaf_points).min(points);
-            if !self.add(lanes, &of, within, places.columns.map(|axis| &axis[leaf.clone()]), space) {
+        while let Some(found) = near.next(lanes, within) {
+            if !self.add(lanes, &of, within, leaf(places.columns, found as usize), space) {
                 return Ok(false);
             }
         }
@@ -220,11 +226,9 @@ mod tests {
             let columns: [Vec<i32>; 3] = [(); 3].map(|()| (0..points).map(|_| random.below(200) as i32).collect());
             let columns = columns.each_ref().map(Vec::as_slice);
             let all = || (0..points).map(|i| columns.map(|axis| axis[i]));
-            let leaf_points = 16;
-            let of = |i: usize| columns.map(|axis| &axis[i * leaf_points..((i + 1) * leaf_points).min(points)]);
             let mut leaves = Boxes::default();
-            leaves.build((0..points.div_ceil(leaf_points)).map(|i| Box3::of(of(i))));
-            let places = Places { columns, leaves: &leaves, leaf_points, others: None, space: &space };
+            leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(leaf(columns, i))));
+            let places = Places { columns, leaves: &leaves, others: None, space: &space };
             for _ in 0..60 {
                 let min: [i32; 3] = std::array::from_fn(|_| random.below(200) as i32);
                 let some = Box3 { min, max: min.map(|v| v + random.below(20) as i32) };

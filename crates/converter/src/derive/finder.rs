@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::around::{Around, Places};
+use super::around::{Around, LEAF_POINTS, Places, leaf};
 use super::boxes::{Box3, Boxes, Waiting};
 use super::collect::Collect;
 use super::runs::{Lookup, Others};
@@ -13,9 +13,6 @@ use super::space::{Space, between, squared};
 use super::surface::Surface;
 use crate::error::ConvertError;
 use crate::runtime::{Compare, LANES, Portable, Workers};
-
-/// Points of a leaf of the hierarchy over a unit: two vectors of single precision.
-const LEAF_POINTS: usize = 16;
 
 /// Points after which a thread looks whether the run is to stop: few, since all of a cloud may be within a distance of each.
 const POINTS_PER_LOOK: usize = 32;
@@ -67,11 +64,10 @@ impl Finder {
     ) -> Result<(), ConvertError> {
         let points = self.columns[0].len();
         let columns = self.columns.each_ref().map(Vec::as_slice);
-        let leaf = |i: usize| columns.map(|axis| &axis[i * LEAF_POINTS..((i + 1) * LEAF_POINTS).min(points)]);
-        self.leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(leaf(i))));
+        self.leaves.build((0..points.div_ceil(LEAF_POINTS)).map(|i| Box3::of(leaf(columns, i))));
         self.surfaces.clear();
         self.surfaces.reserve(points);
-        let places = Places { columns, leaves: &self.leaves, leaf_points: LEAF_POINTS, others, space };
+        let places = Places { columns, leaves: &self.leaves, others, space };
         let (stack, lookup) = (&mut self.stack, &mut self.lookup);
         let mut search = Search { lanes, places, around: &mut self.around, within: 0.0, stack, lookup, collect };
         let mut before: Option<([i32; 3], Surface)> = None;
@@ -177,17 +173,15 @@ impl<L: Compare, C: Collect> Search<'_, L, C> {
     /// Puts the neighbourhood of a point together of what the hierarchy finds.
     #[inline(always)]
     fn one(&mut self, i: usize, q: [i32; 3], step: Option<f32>) -> Result<(), ConvertError> {
-        let Places { columns, leaves, leaf_points, others, space } = self.places;
-        let points = columns[0].len();
-        let leaf = |i: usize| columns.map(|axis| &axis[i * leaf_points..((i + 1) * leaf_points).min(points)]);
+        let Places { columns, leaves, others, space } = self.places;
         self.collect.begin(q, step);
         // its own leaf first: then the bound is near to what it will be
-        let own = i / leaf_points;
+        let own = i / LEAF_POINTS;
         let known = own as u32..own as u32 + 1;
-        scan(self.lanes, leaf(own), q, space, self.collect);
+        scan(self.lanes, leaf(columns, own), q, space, self.collect);
         let mut near = leaves.near(Box3::at(q), space, &known, self.stack);
         while let Some(found) = near.next(self.lanes, self.collect.bound()) {
-            scan(self.lanes, leaf(found as usize), q, space, self.collect);
+            scan(self.lanes, leaf(columns, found as usize), q, space, self.collect);
         }
         match others {
             Some(others) => beyond(self.lanes, q, space, others, self.stack, self.lookup, self.collect),
