@@ -3,7 +3,7 @@
 
     python3 crates/bench/reliability.py target/quick/pointmill [--kills 160] [--points 100000] [--seed 1] [--only PART]
 
-Parts: kills, full, inodes, refused, vanished, twice, same. Each run is one of every combination of output, memory (enough, or
+Parts: kills, calls, full, inodes, refused, vanished, twice, same. Each run is one of every combination of output, memory (enough, or
 the least that works, so that points go to temporary files), job (none, or one that the next run resumes), and what stood
 at the place of the output (an old dataset, or nothing). Whatever happens to a run, these are checked:
 
@@ -12,7 +12,7 @@ at the place of the output (an old dataset, or nothing). Whatever happens to a r
 - The next run ends well, in the bytes of a run that nothing happened to; beside the output nothing is left.
 
 Full disks and disks without inodes are mounted (tmpfs) in a space of mounts of their own, which takes the rights of root; without
-them these parts are skipped. Needs Python's standard library alone. Ends with exit code 1 if a promise is broken.
+them these parts are skipped. Needs Python's standard library alone; `calls` needs strace. Ends with exit code 1 if a promise is broken.
 """
 
 import argparse
@@ -88,6 +88,46 @@ def kill(bench, name, spilled, job, over, counts):
         counts["next"] += 1
         counts["recalled"] += report.get("recalled_points", 0) > 0
     shutil.rmtree(place)
+
+
+CALLS = {
+    "opened": "openat", "listed": "getdents64", "made": "mkdir,mkdirat", "linked": "link,linkat",
+    "renamed": "rename,renameat,renameat2", "removed": "unlink,unlinkat,rmdir", "locked": "flock",
+    "written": "write,pwrite64,ftruncate", "synced": "fsync,fdatasync,syncfs", "given a mode": "chmod,fchmod,fchmodat",
+}
+
+
+def calls(bench):
+    """Kill -9 at every call of each kind by which a run of one thread changes the disk, or looks at it."""
+    if not shutil.which("strace"):
+        print("\nskipped: calls: no strace")
+        return
+    table("output", "kills", *(f"where something is {kind}" for kind in CALLS), "next runs, same bytes, nothing left")
+    for name in OUTPUTS:
+        counts = collections.Counter()
+        for kind, over, job in itertools.product(CALLS, (False, True), (False, True)):
+            number = 1
+            while kill_at(bench, name, CALLS[kind], number, over, job):
+                counts[kind] += 1
+                number += 1 + number // 40  # of many alike not each
+        row(name, counts.total(), *(counts[kind] for kind in CALLS), counts.total())
+
+
+def kill_at(bench, name, names, number, over, job):
+    """False: there are not so many such calls, and the run ended well."""
+    with tempfile.TemporaryDirectory(dir=bench.folder) as place:
+        out = Path(place) / "out"
+        before = bench.put_old(name, out) if over else None
+        command = bench.command(name, out, job=job, over=over, threads=1)
+        trace = ["strace", "-f", "-o", "/dev/null", "-e", f"trace={names}"]
+        ended = bench.end([*trace, "-e", f"inject={names}:signal=SIGKILL:when={number}", *command])
+        what = f"killed at call {number} of {names}, {'job' if job else 'no job'}, {'over' if over else 'new'}"
+        found = contents(out)
+        require(found in (before, bench.expected[name]), name, f"{what}: neither the old nor the new dataset", ended)
+        if ended.code == 0:
+            return False
+        bench.finish(name, out, what, job=job, resume=job, over=over or out.exists())
+        return True
 
 
 def mounted(options, folder):
@@ -278,7 +318,7 @@ def main():
     can_mount = os.environ.get("RELIABILITY_MOUNTS") == "1"
     if not can_mount and subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode == 0:
         os.execvpe("unshare", own_mounts, {**os.environ, "RELIABILITY_MOUNTS": "1"})
-    parts = {"kills": lambda b: kills(b, given.kills), "full": full, "inodes": inodes, "refused": refused,
+    parts = {"kills": lambda b: kills(b, given.kills), "calls": calls, "full": full, "inodes": inodes, "refused": refused,
              "vanished": vanished, "twice": twice, "same": same}
     chosen = given.only.split(",") if given.only else list(parts)
     with tempfile.TemporaryDirectory() as folder:

@@ -7,7 +7,9 @@ use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::place::parent_of;
+use crate::runtime::disk::sync_folder;
 use crate::runtime::os_files::{FileLock, Locked, is_same_file};
+use crate::runtime::{Disk, DiskOperation};
 
 /// Locked as long as the run lives; says for which output the folder was made.
 const LOCK: &str = "lock";
@@ -17,6 +19,10 @@ const MAGIC: &[u8] = b"made by pointmill, and locked while the run lives, for th
 
 /// Longest name of a file that file systems allow, bytes.
 const NAME_BYTES: usize = 255;
+
+/// There while `new` or `old` may hold what stood at the place of the output, which is judged by its content: without it
+/// they hold the beginning of an output, or what was judged to be ours, and that goes whatever it looks like.
+const HOLDS_OLD: &str = "holds-old";
 
 /// How hidden folders inside of an output are called.
 const INSIDE: &str = ".unfinished-";
@@ -162,6 +168,23 @@ impl HiddenFolder {
     /// The folder in it for what stood at the place of the output.
     pub(super) fn path_of_old(&self) -> PathBuf {
         self.path.join("old")
+    }
+
+    /// Called before what stands at the place of the output comes into this folder.
+    pub(super) fn will_hold_old(&self, disk: &dyn Disk) -> io::Result<()> {
+        disk.permit(DiskOperation::Create)?;
+        File::create(self.path.join(HOLDS_OLD))?;
+        sync_folder(disk, &self.path)
+    }
+
+    /// True if what stood at the place of the output may be in it.
+    pub(super) fn may_hold_old(&self) -> bool {
+        fs::symlink_metadata(self.path.join(HOLDS_OLD)).is_ok()
+    }
+
+    /// All that is in it may go, whoever finds it.
+    pub(super) fn holds_ours_alone(&self) -> io::Result<()> {
+        fs::remove_file(self.path.join(HOLDS_OLD))
     }
 
     /// It stays when this is dropped.

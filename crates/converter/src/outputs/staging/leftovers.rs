@@ -12,15 +12,6 @@ use crate::error::{ConvertError, OutputFault};
 use crate::runtime::Events;
 use crate::warning::Warning;
 
-/// What is in a hidden folder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Whose {
-    /// What stood at the place of the output. It was ours then; what was put into it since is kept.
-    OldOutput,
-    /// What a run has left: an output that is not finished, or as above.
-    DeadRun,
-}
-
 /// Settles what runs that are over have left for an output: what they had moved is put back, the rest is removed.
 ///
 /// # Errors
@@ -58,7 +49,7 @@ fn settle_one(
             return Err(ConvertError::io(hidden.path(), "putting back what an interrupted run has moved there", e));
         }
     }
-    warnings.extend(clear(hidden, Whose::DeadRun, events));
+    warnings.extend(clear(hidden, events));
     Ok(())
 }
 
@@ -82,24 +73,36 @@ fn settle_unknown(path: PathBuf, output: &Path, events: &dyn Events) -> Option<W
     }
 }
 
-/// Removes a hidden folder, and in it nothing that is not ours. `Some`: something stays.
-pub(super) fn clear(mut hidden: HiddenFolder, whose: Whose, events: &dyn Events) -> Option<Warning> {
-    for folder in [hidden.path_of_old(), hidden.path_of_new()] {
-        let is_unfinished = whose == Whose::DeadRun && folder == hidden.path_of_new();
-        let stays = match Standing::of(&folder, None) {
-            Ok(Standing::Nothing | Standing::Empty) => None,
-            Ok(Standing::Ours(files)) => remove(&files, events).err().map(|e| (folder, e.to_string())),
-            Ok(Standing::Other) if is_unfinished => remove_all(&folder, events).err().map(|e| (folder, e.to_string())),
-            Ok(Standing::Foreign(file)) => Some((file, "it is not part of a dataset".to_owned())),
-            Ok(Standing::Other) => Some((folder, "it is not a dataset any more".to_owned())),
-            Err(e) => Some((folder, e.to_string())),
-        };
-        if let Some((path, why)) = stays {
+/// Removes a hidden folder, and in it nothing that may be of others. `Some`: something stays.
+pub(super) fn clear(mut hidden: HiddenFolder, events: &dyn Events) -> Option<Warning> {
+    match try_clear(&hidden, events) {
+        Ok(()) => None,
+        Err((path, why)) => {
             hidden.keep();
-            return Some(Warning::Leftover { path, why });
+            Some(Warning::Leftover { path, why })
         }
     }
-    None
+}
+
+/// The error: what stays, and why.
+fn try_clear(hidden: &HiddenFolder, events: &dyn Events) -> Result<(), (PathBuf, String)> {
+    let folders = [hidden.path_of_old(), hidden.path_of_new()];
+    if !hidden.may_hold_old() {
+        let mut there = folders.into_iter().filter(|folder| fs::symlink_metadata(folder).is_ok());
+        return there.try_for_each(|folder| remove_all(&folder, events).map_err(|e| (folder, e.to_string())));
+    }
+    let mut ours = Vec::new();
+    for folder in folders {
+        match Standing::of(&folder, None) {
+            Ok(Standing::Nothing | Standing::Empty) => {}
+            Ok(Standing::Ours(files)) => ours.push((folder, files)),
+            Ok(Standing::Foreign(file)) => return Err((file, "it is not part of a dataset".to_owned())),
+            Ok(Standing::Other) => return Err((folder, "it is not a dataset any more".to_owned())),
+            Err(e) => return Err((folder, e.to_string())),
+        }
+    }
+    hidden.holds_ours_alone().map_err(|e| (hidden.path().to_path_buf(), e.to_string()))?;
+    ours.into_iter().try_for_each(|(folder, files)| remove(&files, events).map_err(|e| (folder, e.to_string())))
 }
 
 /// Files and folders, one after the other.

@@ -122,18 +122,21 @@ impl StagedFolder {
         if matches!(standing, Standing::Nothing) {
             if (Replace { hidden: &mut self.hidden, output, disk: &*self.disk }).appear()? {
                 self.hidden.keep_parents();
-                return Ok(leftovers::clear(self.hidden, leftovers::Whose::OldOutput, events));
+                return Ok(leftovers::clear(self.hidden, events));
             }
             standing = self.place.check(Some(self.hidden.path()))?; // an error, or something that may be replaced
         }
         let replace = Replace { hidden: &mut self.hidden, output, disk: &*self.disk };
         match (standing, self.replacing) {
-            (Standing::Ours(files), Replacing::EntryByEntry) => replace.entries(&names_directly_in(output, &files))?,
+            (Standing::Ours(files), Replacing::EntryByEntry) => {
+                replace.will_hold_old()?;
+                replace.entries(&names_directly_in(output, &files))?;
+            }
             (_, Replacing::EntryByEntry) => replace.entries(&[])?,
             (_, replacing) => replace.whole(replacing)?,
         }
         self.hidden.keep_parents();
-        Ok(leftovers::clear(self.hidden, leftovers::Whose::OldOutput, events))
+        Ok(leftovers::clear(self.hidden, events))
     }
 }
 

@@ -57,6 +57,7 @@ impl Replace<'_> {
         // a folder that changes its parent must be writable
         adopt_mode(&new, &before, true).map_err(self.failed("setting permissions"))?;
         let giving = "giving the output its name";
+        self.will_hold_old()?;
         let at_once = replacing == Replacing::AtOnce;
         let is_done = at_once && exchange(self.disk, &new, output).map_err(self.failed(giving))?;
         if !is_done {
@@ -77,6 +78,11 @@ impl Replace<'_> {
             return Err(self.failed("syncing the folder of the output")(e));
         }
         Ok(())
+    }
+
+    /// What is moved aside is judged before it is removed ([`Self::whole`] does so itself).
+    pub(super) fn will_hold_old(&self) -> Result<(), ConvertError> {
+        self.hidden.will_hold_old(self.disk).map_err(self.failed("preparing to move the old output aside"))
     }
 
     fn put_back(&self, old: &Path) -> Result<(), ConvertError> {

@@ -94,7 +94,7 @@ fn what_comes_into_the_old_output_at_the_last_moment_is_kept_and_named() {
     let replace = Replace { hidden: &mut staged.hidden, output: &staged.place.path, disk: &SystemDisk };
     fs::write(out.join("letter.txt"), "dear").unwrap();
     replace.whole(Replacing::AtOnce).unwrap();
-    let left = leftovers::clear(staged.hidden, leftovers::Whose::OldOutput, &Silent);
+    let left = leftovers::clear(staged.hidden, &Silent);
     let Some(Warning::Leftover { path, .. }) = left else { panic!("{left:?}") };
     assert_eq!(fs::read(path).unwrap(), b"dear");
     assert_eq!(fs::read(out.join("metadata.json")).unwrap(), b"new");
@@ -174,6 +174,54 @@ fn a_run_that_lives_keeps_its_folder_and_a_dead_one_does_not() {
     assert!(stage(&out, false).is_ok() && path.exists(), "both live");
     drop(dead);
     assert!(stage(&out, false).is_ok() && !path.exists() && living.hidden.path().exists());
+}
+
+/// A dataset that looks complete may have a file beside it that is not, as a report that is being written.
+#[test]
+fn a_run_that_is_killed_before_it_replaces_leaves_nothing_whatever_it_has_begun() {
+    for file in ["report.json", "notes.txt", "data/r/x"] {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let mut dead = stage(&out, false).unwrap();
+        dead.whole().write("metadata.json", METADATA.as_bytes()).unwrap();
+        fs::create_dir_all(dead.path_of_new().join(file).parent().unwrap()).unwrap();
+        dead.whole().write(file, b"{").unwrap();
+        dead.hidden.keep();
+        drop(dead);
+        assert_eq!(stage(&out, false).unwrap().warnings, []);
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0, "{file}");
+    }
+}
+
+/// What was judged to be ours and is half removed does not look like ours any more.
+#[test]
+fn what_a_run_that_is_killed_has_left_of_the_old_output_goes_with_the_next() {
+    struct Stops(std::sync::atomic::AtomicUsize);
+    impl Events for Stops {
+        fn stop_requested(&self) -> bool {
+            self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= 2
+        }
+    }
+    for replacing in ALL_WAYS {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let stage = || StagedFolder::new(&out, true, Arc::new(Poor(replacing)), &Silent).unwrap();
+        for _ in 0..2 {
+            let staged = stage();
+            assert_eq!(staged.warnings, [], "{replacing:?}");
+            for name in ["hierarchy.bin", "metadata.json", "octree.bin"] {
+                staged.whole().write(name, METADATA.as_bytes()).unwrap();
+            }
+            let left = staged.finish(&Stops(0.into())).unwrap();
+            assert_eq!(
+                left.is_some(),
+                out.read_dir().unwrap().count() > 3 || dir.path().read_dir().unwrap().count() > 1
+            );
+        }
+        drop(stage());
+        assert_eq!(dir.path().read_dir().unwrap().count(), 1, "{replacing:?}");
+        assert_eq!(out.read_dir().unwrap().count(), 3, "{replacing:?}");
+    }
 }
 
 #[test]
