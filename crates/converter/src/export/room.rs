@@ -2,9 +2,10 @@
 
 use crate::error::{ConvertError, MemoryNeed};
 use crate::plan::{ExportFormat, Plan};
+use crate::runtime::WRITER_BYTES;
 
 /// The program itself, its tables and stacks.
-const FIXED_BYTES: u64 = 32 << 20;
+const FIXED_BYTES: u64 = 28 << 20;
 
 /// What a thread has beside what its reader takes: columns of a slice, tables of an encoder.
 const THREAD_BYTES: u64 = 8 << 20;
@@ -41,7 +42,7 @@ impl Room {
         // text of a value is up to three times as long
         let encoded = if format == ExportFormat::Csv { 3 * row_bytes + 60 } else { row_bytes + 40 };
         let points = (PART_BYTES / row_bytes.max(1)).clamp(1, PART_POINTS);
-        let fixed = FIXED_BYTES + input_bytes + threads * (THREAD_BYTES + decode_bytes);
+        let fixed = FIXED_BYTES + WRITER_BYTES + input_bytes + threads * (THREAD_BYTES + decode_bytes);
         // the rows of a thread, and what they are becoming in two forms
         let of_threads = threads * points * (row_bytes + 2 * encoded);
         let needs = |window: u64, kept: u64| fixed + of_threads + window * kept * points * encoded;

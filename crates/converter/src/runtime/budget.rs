@@ -1,11 +1,12 @@
 //! How the memory ceiling is shared out.
 
+use super::direct::WRITER_BYTES;
 use super::pool::{Consumer, Pool, Reservation};
 use crate::error::{ConvertError, MemoryNeed};
 use crate::plan::Plan;
 
 /// The program itself, its tables and stacks.
-const FIXED_BYTES: u64 = 32 << 20;
+const FIXED_BYTES: u64 = 28 << 20;
 
 /// What a reading thread has beside what its reader takes: a block of records, columns of lattice integers, lists by which
 /// points are grouped.
@@ -89,7 +90,7 @@ impl Budget {
         let ceiling = plan.memory_bytes;
         let threads = plan.threads.max(1) as u64;
         let window = plan.threads.max(1) * (1 + AHEAD_PER_THREAD);
-        let fixed_bytes = FIXED_BYTES + least.input_bytes;
+        let fixed_bytes = FIXED_BYTES + least.streams * WRITER_BYTES + least.input_bytes;
         let reader_bytes = GATHER_BYTES + (TILE_POINTS * stride) as u64 + least.decode_bytes;
         // Allocators keep some of what is freed.
         let usable = ceiling - ceiling / 10;

@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill_format::bytes;
 
+use super::direct::DirectWriter;
 use super::{os_files, os_hints};
 use crate::error::ConvertError;
 
@@ -71,6 +72,8 @@ pub(crate) struct DiskFile {
     disk: Arc<dyn Disk>,
     /// Counts what is written, if it is a temporary file.
     written: Option<Arc<AtomicU64>>,
+    /// Of a large file of an output.
+    direct: Option<DirectWriter>,
 }
 
 impl DiskFile {
@@ -81,14 +84,20 @@ impl DiskFile {
             File::options().read(true).write(true).create(true).truncate(true).open(path)
         };
         let file = create().map_err(|e| ConvertError::io(&shown, "making the file", e))?;
-        Ok(Self { file, path: shown, disk: Arc::clone(disk), written: None })
+        Ok(Self { file, path: shown, disk: Arc::clone(disk), written: None, direct: None })
     }
 
     /// Opens the file `path`, which is there; errors name `shown`.
     pub(crate) fn open(path: &Path, shown: PathBuf, disk: &Arc<dyn Disk>) -> Result<Self, ConvertError> {
         let file = File::options().read(true).write(true).open(path);
         let file = file.map_err(|e| ConvertError::io(&shown, "opening the file again", e))?;
-        Ok(Self { file, path: shown, disk: Arc::clone(disk), written: None })
+        Ok(Self { file, path: shown, disk: Arc::clone(disk), written: None, direct: None })
+    }
+
+    /// What is written at once in large parts goes past the cache of the system, if that has such a way. `path` leads to the file.
+    pub(crate) fn past_cache(mut self, path: &Path) -> Self {
+        self.direct = DirectWriter::open(&self.file, path);
+        self
     }
 
     /// Writes all of `bytes` at `offset`; `doing` is for the error ("writing a leaf").
@@ -101,16 +110,33 @@ impl DiskFile {
         if let Some(written) = &self.written {
             written.fetch_add(bytes.len() as u64, Ordering::Relaxed);
         }
-        bytes::write_all_at(&self.file, bytes, offset)
+        let Some(direct) = &self.direct else { return bytes::write_all_at(&self.file, bytes, offset) };
+        let blocks = DirectWriter::blocks(offset, bytes.len()).unwrap_or_default();
+        let is_taken = !blocks.is_empty() && direct.write(&bytes[blocks.clone()], offset + blocks.start as u64)?;
+        let ends = if is_taken { [0..blocks.start, blocks.end..bytes.len()] } else { [0..0, 0..bytes.len()] };
+        for end in ends.into_iter().filter(|end| !end.is_empty()) {
+            let at = offset + end.start as u64;
+            direct.wait_for(&(at..offset + end.end as u64))?;
+            bytes::write_all_at(&self.file, &bytes[end], at)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for all that is on its way to the file.
+    fn settle(&self) -> io::Result<()> {
+        self.direct.as_ref().map_or(Ok(()), DirectWriter::wait)
     }
 
     /// Fills `buf` from `offset`.
     pub(crate) fn read_at(&self, buf: &mut [u8], offset: u64, doing: &'static str) -> Result<(), ConvertError> {
-        bytes::read_exact_at(&self.file, buf, offset).map_err(|e| self.failed(doing, e))
+        let range = offset..offset.saturating_add(buf.len() as u64);
+        let read = self.direct.as_ref().map_or(Ok(()), |direct| direct.wait_for(&range));
+        read.and_then(|()| bytes::read_exact_at(&self.file, buf, offset)).map_err(|e| self.failed(doing, e))
     }
 
     /// What the file system says of it.
     pub(crate) fn metadata(&self) -> io::Result<fs::Metadata> {
+        self.settle()?;
         self.file.metadata()
     }
 
@@ -121,13 +147,14 @@ impl DiskFile {
 
     /// Bytes of the file.
     pub(crate) fn len(&self, doing: &'static str) -> Result<u64, ConvertError> {
-        self.file.metadata().map(|meta| meta.len()).map_err(|e| self.failed(doing, e))
+        self.metadata().map(|meta| meta.len()).map_err(|e| self.failed(doing, e))
     }
 
     /// Cuts or extends the file.
     pub(crate) fn set_len(&self, bytes: u64, doing: &'static str) -> Result<(), ConvertError> {
         let cut = || {
             self.disk.permit(DiskOperation::Write)?;
+            self.settle()?;
             self.file.set_len(bytes)
         };
         cut().map_err(|e| self.failed(doing, e))
@@ -137,6 +164,7 @@ impl DiskFile {
     pub(crate) fn sync(&self, doing: &'static str) -> Result<(), ConvertError> {
         let sync = || {
             self.disk.permit(DiskOperation::Sync)?;
+            self.settle()?;
             self.file.sync_all()
         };
         sync().map_err(|e| self.failed(doing, e))
@@ -180,7 +208,7 @@ impl TempFiles {
         };
         let file = make().map_err(|e| ConvertError::io(&self.folder, "making a temporary file", e).temporary())?;
         let written = Some(Arc::clone(&self.written));
-        Ok(DiskFile { file, path: self.folder.clone(), disk: Arc::clone(&self.disk), written })
+        Ok(DiskFile { file, path: self.folder.clone(), disk: Arc::clone(&self.disk), written, direct: None })
     }
 }
 
@@ -195,7 +223,7 @@ impl TempFiles {
         };
         let file = open().map_err(|e| ConvertError::io(path, "opening the file for records", e).temporary())?;
         let written = Some(Arc::clone(&self.written));
-        Ok(DiskFile { file, path: path.to_path_buf(), disk: Arc::clone(&self.disk), written })
+        Ok(DiskFile { file, path: path.to_path_buf(), disk: Arc::clone(&self.disk), written, direct: None })
     }
 }
 
@@ -203,7 +231,7 @@ impl TempFiles {
     /// A file that another process has made, to read.
     pub(crate) fn read(&self, path: &Path) -> Result<DiskFile, ConvertError> {
         let file = File::open(path).map_err(|e| ConvertError::io(path, "opening the file", e))?;
-        Ok(DiskFile { file, path: path.to_path_buf(), disk: Arc::clone(&self.disk), written: None })
+        Ok(DiskFile { file, path: path.to_path_buf(), disk: Arc::clone(&self.disk), written: None, direct: None })
     }
 }
 
@@ -276,4 +304,45 @@ pub(crate) fn rename(disk: &dyn Disk, from: &Path, to: &Path) -> io::Result<()> 
 pub(crate) fn exchange(disk: &dyn Disk, a: &Path, b: &Path) -> io::Result<bool> {
     disk.permit(DiskOperation::Rename)?;
     os_files::exchange(a, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writes of all sizes at all places, small ones over large ones and the other way round, read back at once and in the end.
+    #[test]
+    fn a_file_past_the_cache_has_the_bytes_that_were_written_last() {
+        let dir = tempfile::tempdir().unwrap();
+        let disk: Arc<dyn Disk> = Arc::new(SystemDisk);
+        let path = dir.path().join("file");
+        let file = DiskFile::create(&path, path.clone(), &disk).unwrap().past_cache(&path);
+        let mut random = pointmill_testkit::Random::new(5);
+        let mut expected = vec![0; 6 << 20];
+        file.set_len(expected.len() as u64, "").unwrap();
+        for round in 0..150u64 {
+            let len = if round % 3 == 0 { random.below(3 << 20) } else { random.below(70_000) } as usize;
+            let at = random.below((expected.len() - len) as u64) as usize;
+            let bytes: Vec<u8> = (0..len as u64).map(|i| (i * 31 + round) as u8).collect();
+            expected[at..at + len].copy_from_slice(&bytes);
+            file.write_at(&bytes, at as u64, "").unwrap();
+            let from = random.below((expected.len() - 100_000) as u64) as usize;
+            let mut read = vec![0; 100_000];
+            file.read_at(&mut read, from as u64, "").unwrap();
+            assert!(read == expected[from..from + 100_000], "round {round}");
+        }
+        for round in 0..20 {
+            expected[..4 << 20].fill(round);
+            file.write_at(&expected[..4 << 20], 0, "").unwrap();
+            let at = (4 << 20) - 90_000;
+            expected[at..at + 9].fill(!round);
+            file.write_at(&expected[at..at + 9], at as u64, "").unwrap();
+            let mut read = [0; 10];
+            file.read_at(&mut read, at as u64, "").unwrap();
+            assert!(read == expected[at..at + 10], "a small one over a large one, round {round}");
+        }
+        assert_eq!(file.len("").unwrap(), expected.len() as u64);
+        file.sync("").unwrap();
+        assert!(fs::read(&path).unwrap() == expected);
+    }
 }

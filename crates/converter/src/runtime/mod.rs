@@ -2,6 +2,7 @@
 
 mod budget;
 mod clock;
+mod direct;
 pub(crate) mod disk;
 mod events;
 mod lanes;
@@ -14,6 +15,7 @@ mod workers;
 
 pub(crate) use budget::{Budget, Least, TILE_POINTS};
 pub(crate) use clock::{Clock, PhaseTime};
+pub(crate) use direct::WRITER_BYTES;
 pub use disk::{Disk, DiskOperation, Replacing, SystemDisk};
 pub(crate) use disk::{DiskFile, Sequential, TempFiles};
 pub use events::{Events, Phase, Silent};

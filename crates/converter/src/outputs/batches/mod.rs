@@ -169,6 +169,7 @@ impl Output for BatchesSettings {
             None => (to.create_kept(name)?, None),
             Some(_) => (OutputFile::new(to.create(name)?), Some(rt.temp.make()?)),
         };
+        let made = to.past_cache(name, made);
         if let Some(units) = units {
             means.units(units, &tasks, made.kept(0))?;
         }

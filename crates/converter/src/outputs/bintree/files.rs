@@ -114,7 +114,7 @@ impl InPlace<Place> for Leaves<'_> {
 impl<'a> Leaves<'a> {
     pub(super) fn new(layout: Layout, stride: usize, staged: &'a StagedDataset) -> Result<Self, ConvertError> {
         let to = match layout {
-            Layout::Packed => To::File(staged.create_kept(PACKED_FILE)?),
+            Layout::Packed => To::File(staged.past_cache(PACKED_FILE, staged.create_kept(PACKED_FILE)?)),
             Layout::Files => To::Files { staged, written: Mutex::default() },
         };
         Ok(Self::to(to, layout, stride))

@@ -120,7 +120,8 @@ impl OctreeOutput for CopcSettings {
         heading.wkt = cloud.facts.crs.wkt_text().map(Cow::into_owned);
         let chunks_start = heading.chunks_start().map_err(|e| failed(&e))?;
         let chunks = ChunkEncoder::new(&content.layout).map_err(|e| failed(&e))?;
-        let file = to.create_kept(self.kind().marker_file())?;
+        let name = self.kind().marker_file();
+        let file = to.past_cache(name, to.create_kept(name)?);
         let encoding = Encoding { content, chunks, counted: Mutex::default(), events: rt.events() };
         Ok(Box::new(Writer {
             settings: self,

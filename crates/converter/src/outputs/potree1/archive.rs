@@ -13,7 +13,7 @@ use rawzip::{Crc32, crc32};
 
 use crate::error::{ConvertError, Unsupported};
 use crate::octree::FinishedNode;
-use crate::outputs::staging::StagedDataset;
+use crate::outputs::staging::{OutputFile, StagedDataset};
 use crate::runtime::{Consumer, DiskFile, Reservation, Runtime};
 
 /// What the archive is called.
@@ -88,7 +88,8 @@ impl Archive {
         let start = (head + MIN_ARCHIVE_PADDING + longest) as u64;
         let room = Reservation::new(&rt.memory, Consumer::Nodes);
         let sums = Mutex::new(Sums { nodes: Vec::new(), room, large: HashMap::new() });
-        Ok(Self { file: staged.create(name)?, start, sums })
+        let OutputFile { file, .. } = staged.past_cache(name, OutputFile::new(staged.create(name)?));
+        Ok(Self { file, start, sums })
     }
 
     /// Writes nodes, whose bytes begin at `offset` of the tree.

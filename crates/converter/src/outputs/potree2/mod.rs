@@ -41,6 +41,9 @@ use crate::warning::Warning;
 /// Elements of an attribute that readers of the format accept.
 pub(super) const MAX_ELEMENTS: usize = 16;
 
+/// The file of the nodes.
+const PAYLOADS: &str = "octree.bin";
+
 /// Bytes of a hierarchy record.
 const NODE_BYTES: u64 = 22;
 
@@ -150,7 +153,7 @@ impl OctreeOutput for Potree2Settings {
             EarlierDataset::open(cloud, rt, self, &spacing, &layout, &names)
         });
         Ok(Box::new(Payloads {
-            file: to.create_kept("octree.bin")?,
+            file: to.past_cache(PAYLOADS, to.create_kept(PAYLOADS)?),
             turn: Mutex::default(),
             layout,
             earlier,

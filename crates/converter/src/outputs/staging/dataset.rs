@@ -102,6 +102,11 @@ impl StagedDataset {
         self.open(name)
     }
 
+    /// A file that was just made and is to hold most of the output: its bytes go past the cache of the system.
+    pub(crate) fn past_cache(&self, name: &str, OutputFile { file, is_kept }: OutputFile) -> OutputFile {
+        OutputFile { file: file.past_cache(&self.folder.join(name)), is_kept }
+    }
+
     /// True if [`Self::create_kept`] makes files that a job has, too: not if it is on another file system, or on one without
     /// second names.
     pub(crate) fn can_keep(&self) -> bool {

@@ -51,7 +51,8 @@ impl StagedFile {
 
     /// Makes the file, empty.
     pub(crate) fn create(&self) -> Result<DiskFile, ConvertError> {
-        DiskFile::create(&self.hidden_path(), self.given.clone(), &self.disk)
+        let path = self.hidden_path();
+        Ok(DiskFile::create(&path, self.given.clone(), &self.disk)?.past_cache(&path))
     }
 
     /// Gives the file, which is complete and synced, its name.
