@@ -83,6 +83,15 @@ def test_relative_paths_are_those_of_the_caller(
     assert content(tmp_path / "out")
 
 
+def test_a_job_without_a_name_is_beside_the_output(tmp_path: Path, scans: Path, client: Client, program: Path) -> None:
+    seen = tmp_path / "seen"
+    with faulty(program, f'[ "$2" = run ] && ls "{tmp_path}/out.job" >> "{seen}"'):
+        on_dask.convert(scans / "0.las", f"{tmp_path}/out/", client=client)
+    assert "plan.json" in seen.read_text()
+    assert content(tmp_path / "out")
+    assert not (tmp_path / "out.job").exists()
+
+
 def test_an_input_that_is_broken_ends_it_with_its_line(tmp_path: Path, scans: Path, client: Client) -> None:
     whole = (scans / "0.las").read_bytes()
     (tmp_path / "cut.las").write_bytes(whole)

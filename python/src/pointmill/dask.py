@@ -60,7 +60,7 @@ def convert(
     inputs: Iterable[AnyPath] | AnyPath,
     out: AnyPath,
     *,
-    job: AnyPath,
+    job: AnyPath | None = None,
     client: Client | None = None,
     options: Sequence[str] = (),
     batches_per_worker: int = 4,
@@ -75,7 +75,7 @@ def convert(
     Args:
         inputs: Files, folders or patterns, as the workers see them.
         out: The folder of the dataset.
-        job: Folder for what the processes leave; made here, removed at the end.
+        job: Folder for what the processes leave, ``OUT.job`` if nothing is said; made here, removed at the end.
         client: Of a cluster, such as a ``LocalCluster`` or one of dask-jobqueue; without it, the current one.
         options: Those of ``pointmill convert``, such as ``["--to", "copc"]``; paths in them are absolute.
         batches_per_worker: Tasks per thread of a worker and layer of units. More lose less when a worker is lost, and
@@ -92,7 +92,8 @@ def convert(
         PointmillError: The program failed; the exception's text is its line. The job stays: :func:`resume` goes on.
     """
     cluster = _Cluster.of(client, batches_per_worker, threads, memory, resources, retries)
-    (folder,), (place,) = jobs.absolute(job), jobs.absolute(out)  # a task works in another folder
+    (place,) = jobs.absolute(out)  # a task works in another folder
+    (folder,) = jobs.absolute(f"{place}.job" if job is None else job)
     limit = [] if any(option.split("=")[0] == "--memory" for option in options) else cluster.memory_options()
     cluster.call("plan", jobs.plan, jobs.absolute(inputs), place, folder, [*options, *limit])
     return _do(cluster, folder, progress)
