@@ -201,8 +201,9 @@ impl Shared {
 
     fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
         match write_all_at(&self.direct, bytes, offset) {
-            Err(e) if e.kind() == io::ErrorKind::InvalidInput => write_all_at(&self.cached, bytes, offset),
-            written => written,
+            Ok(()) => Ok(()),
+            // a file system has many words for "not this way"; what fails for another reason fails here, too
+            Err(_) => write_all_at(&self.cached, bytes, offset),
         }
     }
 

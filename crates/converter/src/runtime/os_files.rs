@@ -154,6 +154,21 @@ pub(crate) fn is_same_file(file: &File, path: &Path) -> bool {
     }
 }
 
+/// True if the folder at `path` is the one that `meta` was read of; where the system does not tell, if there is one.
+pub(crate) fn is_same_folder(path: &Path, meta: &fs::Metadata) -> bool {
+    let Ok(found) = fs::symlink_metadata(path) else { return false };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt as _;
+        found.is_dir() && (found.dev(), found.ino()) == (meta.dev(), meta.ino())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = meta;
+        found.is_dir()
+    }
+}
+
 /// Gives a folder the owner and group of another; false if that is not permitted.
 pub(crate) fn adopt_owner(folder: &Path, of: &fs::Metadata) -> bool {
     #[cfg(unix)]

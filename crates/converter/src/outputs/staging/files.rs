@@ -7,7 +7,7 @@ use super::hidden::HiddenFolder;
 use super::leftovers;
 use super::place::resolve_path;
 use super::replace::Replace;
-use crate::error::ConvertError;
+use crate::error::{ConvertError, OutputFault};
 use crate::runtime::{Events, SystemDisk};
 use crate::warning::Warning;
 
@@ -56,7 +56,7 @@ impl StagedFiles {
         if is_there {
             replace.entries(replaced)?;
         } else {
-            replace.appear()?;
+            replace.appear()?.then_some(()).ok_or_else(|| OutputFault::Busy(self.output.clone()))?;
         }
         self.hidden.keep_parents();
         Ok(())

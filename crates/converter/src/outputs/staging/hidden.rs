@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::place::parent_of;
 use crate::runtime::disk::sync_folder;
 use crate::runtime::os_files::{FileLock, Locked, is_same_file};
-use crate::runtime::{Disk, DiskOperation};
+use crate::runtime::{Disk, DiskOperation, SystemDisk};
 
 /// Locked as long as the run lives; says for which output the folder was made.
 const LOCK: &str = "lock";
@@ -33,7 +33,7 @@ const RANDOM_BYTES: usize = 6;
 /// Another run may take a folder for one of a dead run before its lock is there; it is made anew then.
 const TRIES: usize = 16;
 
-/// A hidden folder, removed with all that is in it when it is dropped.
+/// A hidden folder, removed with all that is in it when it is dropped, unless it may hold what stood at the place of the output.
 ///
 /// `new` in it is to become the output. `old` holds what stood there while that is being moved.
 #[derive(Debug)]
@@ -110,7 +110,8 @@ impl HiddenFolder {
             };
             let text = [MAGIC, side.key(output)].concat();
             match &lock {
-                Some(lock) => lock.file().write_all(&text)?,
+                // safe before anything that it must be told apart by
+                Some(lock) => lock.file().write_all(&text).and_then(|()| lock.file().sync_data())?,
                 None => fs::write(&lock_path, text)?,
             }
             fs::create_dir(made.path_of_new())?;
@@ -151,6 +152,9 @@ impl HiddenFolder {
         }
         let text = Text::of(lock.file())?;
         let is_just_made = text.0.is_empty() && fs::read_dir(&path).is_ok_and(|entries| entries.count() == 1);
+        if text.0.is_empty() && !is_just_made {
+            return Some(Found::Unknown(path));
+        }
         let folder = Self { path, lock: Some(lock), parents: Vec::new(), is_kept: !(is_just_made || text.is_for(key)) };
         (!folder.is_kept).then_some(Found::Dead(folder))
     }
@@ -158,6 +162,11 @@ impl HiddenFolder {
     /// The folder itself.
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// True if it is in `output`, not beside it.
+    pub(super) fn is_inside(&self, output: &Path) -> bool {
+        self.path.parent() == Some(output)
     }
 
     /// The folder in it that is to become the output.
@@ -170,11 +179,14 @@ impl HiddenFolder {
         self.path.join("old")
     }
 
-    /// Called before what stands at the place of the output comes into this folder.
+    /// Called before what stands at the place of the output comes into this folder. From now on it stays when this is dropped,
+    /// until [`Self::holds_ours_alone`].
     pub(super) fn will_hold_old(&self, disk: &dyn Disk) -> io::Result<()> {
         disk.permit(DiskOperation::Create)?;
         File::create(self.path.join(HOLDS_OLD))?;
-        sync_folder(disk, &self.path)
+        sync_folder(disk, &self.path).inspect_err(|_| {
+            let _ = self.holds_ours_alone(); // nothing has come
+        })
     }
 
     /// True if what stood at the place of the output may be in it.
@@ -184,7 +196,14 @@ impl HiddenFolder {
 
     /// All that is in it may go, whoever finds it.
     pub(super) fn holds_ours_alone(&self) -> io::Result<()> {
-        fs::remove_file(self.path.join(HOLDS_OLD))
+        match fs::remove_file(self.path.join(HOLDS_OLD)) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+            _ => {
+                // before what it stands for goes; where that is not kept, the next run judges once more
+                let _ = sync_folder(&SystemDisk, &self.path);
+                Ok(())
+            }
+        }
     }
 
     /// It stays when this is dropped.
@@ -200,7 +219,7 @@ impl HiddenFolder {
 
 impl Drop for HiddenFolder {
     fn drop(&mut self) {
-        if self.is_kept {
+        if self.is_kept || self.may_hold_old() {
             return;
         }
         for entry in fs::read_dir(&self.path).into_iter().flatten().flatten().filter(|e| e.file_name() != LOCK) {

@@ -9,7 +9,7 @@ use super::nodes;
 use super::ours::Standing;
 use super::replace::{When, undo};
 use crate::error::{ConvertError, OutputFault};
-use crate::runtime::Events;
+use crate::runtime::{Events, SystemDisk};
 use crate::warning::Warning;
 
 /// Settles what runs that are over have left for an output: what they had moved is put back, the rest is removed.
@@ -102,7 +102,15 @@ fn try_clear(hidden: &HiddenFolder, events: &dyn Events) -> Result<(), (PathBuf,
         }
     }
     hidden.holds_ours_alone().map_err(|e| (hidden.path().to_path_buf(), e.to_string()))?;
-    ours.into_iter().try_for_each(|(folder, files)| remove(&files, events).map_err(|e| (folder, e.to_string())))
+    for (folder, files) in ours {
+        remove(&files, events).map_err(|e| (folder.clone(), e.to_string()))?;
+        if let Err(e) = fs::remove_dir(&folder) {
+            // something came after it was judged
+            let _ = hidden.will_hold_old(&SystemDisk);
+            return Err((folder, e.to_string()));
+        }
+    }
+    Ok(())
 }
 
 /// Files and folders, one after the other.

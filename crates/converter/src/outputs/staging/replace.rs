@@ -11,7 +11,7 @@ use super::ours::rank;
 use super::place::parent_of;
 use crate::error::ConvertError;
 use crate::runtime::disk::{exchange, rename, sync_folder};
-use crate::runtime::os_files::{self, adopt_mode, adopt_owner};
+use crate::runtime::os_files::{self, adopt_mode, adopt_owner, is_same_folder};
 use crate::runtime::{Disk, DiskOperation, Replacing};
 
 /// In the hidden folder while files are moved: their names, a line each, and a last line that says that these are all.
@@ -51,11 +51,20 @@ impl Replace<'_> {
     /// The folder as a whole. It keeps owner and permissions; what stood there is in the hidden folder then, as `new` or
     /// as `old`.
     pub(super) fn whole(self, replacing: Replacing) -> Result<(), ConvertError> {
+        let before = fs::metadata(self.output).map_err(self.failed("reading the output"))?;
+        self.try_whole(replacing, &before).inspect_err(|_| {
+            // whatever was said to have failed or to be undone: only where the old output is
+            if is_same_folder(self.output, &before) {
+                let _ = self.hidden.holds_ours_alone();
+            }
+        })
+    }
+
+    fn try_whole(&self, replacing: Replacing, before: &fs::Metadata) -> Result<(), ConvertError> {
         let (new, old, output) = (self.hidden.path_of_new(), self.hidden.path_of_old(), self.output);
-        let before = fs::metadata(output).map_err(self.failed("reading the output"))?;
-        adopt_owner(&new, &before);
+        adopt_owner(&new, before);
         // a folder that changes its parent must be writable
-        adopt_mode(&new, &before, true).map_err(self.failed("setting permissions"))?;
+        adopt_mode(&new, before, true).map_err(self.failed("setting permissions"))?;
         let giving = "giving the output its name";
         self.will_hold_old()?;
         let at_once = replacing == Replacing::AtOnce;
@@ -67,7 +76,7 @@ impl Replace<'_> {
                 return Err(self.failed(giving)(e));
             }
         }
-        let finish = sync_folder(self.disk, parent_of(output)).and_then(|()| adopt_mode(output, &before, false));
+        let finish = sync_folder(self.disk, parent_of(output)).and_then(|()| adopt_mode(output, before, false));
         if let Err(e) = finish {
             if is_done {
                 os_files::exchange(&new, output).map_err(self.failed("moving the old output back"))?;
@@ -102,13 +111,17 @@ impl Replace<'_> {
             file.sync_all()?;
             sync_folder(self.disk, self.hidden.path())
         };
-        write().map_err(self.failed("writing what is to be moved"))?;
+        if let Err(e) = write() {
+            let _ = self.hidden.holds_ours_alone(); // nothing was moved
+            return Err(self.failed("writing what is to be moved")(e));
+        }
         let moved = self.move_entries(going, &coming);
         if let Err(e) = moved {
             if let Err(e) = undo(self.hidden, self.output, When::Always) {
                 self.hidden.keep();
                 return Err(self.failed("moving the old output back")(e));
             }
+            let _ = self.hidden.holds_ours_alone();
             return Err(self.failed("moving the output to its place")(e));
         }
         // What was new is in its place, whatever happens; without `new` nothing is undone.
@@ -165,11 +178,16 @@ pub(super) fn undo(hidden: &HiddenFolder, output: &Path, when: When) -> io::Resu
     let (new, old) = (hidden.path_of_new(), hidden.path_of_old());
     let journal = hidden.path().join(MOVING);
     match fs::read_to_string(&journal) {
+        // what is inside of the output was never renamed as a whole
+        Err(e) if e.kind() == io::ErrorKind::NotFound && hidden.is_inside(output) => Ok(false),
         Err(e) if e.kind() == io::ErrorKind::NotFound => undo_rename(&new, &old, output),
         Err(e) => Err(e),
         Ok(text) => {
             let is_complete = !new.is_dir() || names_in(&new)?.is_empty();
             let is_undone = !(is_complete && when == When::Unfinished) && undo_entries(&text, &new, &old, output)?;
+            for folder in [old, new] {
+                let _ = fs::remove_dir(folder); // an empty one: both together would look like the half of two renames
+            }
             fs::remove_file(&journal)?;
             Ok(is_undone)
         }

@@ -224,6 +224,112 @@ fn what_a_run_that_is_killed_has_left_of_the_old_output_goes_with_the_next() {
     }
 }
 
+/// The old output cannot be put back, since something else is at its place by now.
+#[test]
+fn an_old_output_that_cannot_be_put_back_stays_for_the_next_run() {
+    #[derive(Debug)]
+    struct Disturbed(PathBuf, std::sync::atomic::AtomicUsize);
+
+    impl Disk for Disturbed {
+        fn permit(&self, operation: DiskOperation) -> io::Result<()> {
+            let renames = usize::from(operation == DiskOperation::Rename);
+            if renames > 0 && self.1.fetch_add(renames, std::sync::atomic::Ordering::Relaxed) == 1 {
+                fs::create_dir(&self.0)?;
+                fs::write(self.0.join("theirs"), "")?;
+            }
+            Ok(())
+        }
+
+        fn replacing(&self) -> Replacing {
+            Replacing::InTwoSteps
+        }
+    }
+
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("metadata.json"), METADATA).unwrap();
+    fs::write(out.join("octree.bin"), "old").unwrap();
+    let mut staged = StagedFolder::new(&out, true, Arc::new(Poor(Replacing::InTwoSteps)), &Silent).unwrap();
+    staged.whole().write("metadata.json", METADATA.as_bytes()).unwrap();
+    staged.disk = Arc::new(Disturbed(out.clone(), 0.into()));
+    let hidden = staged.path().to_path_buf();
+    assert!(staged.finish(&Silent).is_err());
+    assert_eq!(fs::read(hidden.join("old/octree.bin")).unwrap(), b"old");
+    assert!(out.join("theirs").exists() && stage(&out, true).is_err(), "it says so as long as that is there");
+    fs::remove_dir_all(&out).unwrap();
+    let next = stage(&out, true).unwrap();
+    assert_eq!(next.warnings, [Warning::OldOutputBack { output: out.clone() }]);
+    assert_eq!(fs::read(out.join("octree.bin")).unwrap(), b"old");
+    drop(next);
+    assert_eq!(dir.path().read_dir().unwrap().count(), 1);
+}
+
+#[test]
+fn a_run_that_is_killed_when_it_has_undone_the_moves_of_another_hinders_nobody() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("metadata.json"), METADATA).unwrap();
+    fs::write(out.join("octree.bin"), "old").unwrap();
+    let poor = || StagedFolder::new(&out, true, Arc::new(Poor(Replacing::EntryByEntry)), &Silent);
+    let dead = poor().unwrap();
+    dead.whole().write("metadata.json", METADATA.as_bytes()).unwrap();
+    let path = dead.path().to_path_buf();
+    dead.hidden.will_hold_old(&SystemDisk).unwrap();
+    fs::write(path.join("moving"), "metadata.json\nall of them\n").unwrap();
+    fs::create_dir(path.join("old")).unwrap();
+    fs::rename(out.join("metadata.json"), path.join("old/metadata.json")).unwrap();
+    drop(dead);
+    let found = HiddenFolder::find(&out, hidden::Side::Inside);
+    let [hidden::Found::Dead(second)] = &found[..] else { panic!("{found:?}") };
+    assert!(replace::undo(second, &out, replace::When::Unfinished).unwrap());
+    drop(found); // killed before it has cleared up: the folder stays
+    assert!(path.exists() && out.join("metadata.json").exists());
+    drop(poor().unwrap());
+    assert!(!path.exists());
+    assert_eq!(fs::read(out.join("octree.bin")).unwrap(), b"old");
+}
+
+#[test]
+fn what_comes_into_the_old_output_while_it_is_removed_is_kept_and_named() {
+    struct Writes(PathBuf);
+    impl Events for Writes {
+        fn stop_requested(&self) -> bool {
+            let _ = fs::write(self.0.join("new/letter.txt"), "dear");
+            false
+        }
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("metadata.json"), METADATA).unwrap();
+    let mut staged = stage(&out, true).unwrap();
+    staged.whole().write("metadata.json", METADATA.as_bytes()).unwrap();
+    let replace = Replace { hidden: &mut staged.hidden, output: &staged.place.path, disk: &SystemDisk };
+    replace.whole(Replacing::AtOnce).unwrap();
+    let hidden = staged.path().to_path_buf();
+    let left = leftovers::clear(staged.hidden, &Writes(hidden.clone()));
+    for left in [left, stage(&out, true).unwrap().warnings.pop()] {
+        assert!(matches!(&left, Some(Warning::Leftover { path, .. }) if path.starts_with(&hidden)), "{left:?}");
+        assert_eq!(fs::read(hidden.join("new/letter.txt")).unwrap(), b"dear");
+    }
+}
+
+/// As a power failure can leave it on some file systems.
+#[test]
+fn a_folder_whose_lock_says_nothing_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let mut dead = stage(&out, false).unwrap();
+    let path = dead.path().to_path_buf();
+    dead.hidden.keep();
+    drop(dead);
+    fs::write(path.join("lock"), "").unwrap();
+    let warnings = stage(&out, false).unwrap().warnings;
+    assert!(matches!(&warnings[..], [Warning::Leftover { path: left, .. }] if *left == path), "{warnings:?}");
+}
+
 #[test]
 fn two_runs_do_not_write_in_one_folder_entry_by_entry() {
     let dir = tempfile::tempdir().unwrap();
