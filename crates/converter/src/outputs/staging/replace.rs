@@ -54,7 +54,7 @@ impl Replace<'_> {
         let before = fs::metadata(self.output).map_err(self.failed("reading the output"))?;
         self.try_whole(replacing, &before).inspect_err(|_| {
             // whatever was said to have failed or to be undone: only where the old output is
-            if is_same_folder(self.output, &before) {
+            if is_same_folder(self.output, &before) && fs::symlink_metadata(self.hidden.path_of_old()).is_err() {
                 let _ = self.hidden.holds_ours_alone();
             }
         })
